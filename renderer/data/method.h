@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// The lists that the schema's enums, --help, /capabilities and the page's menus are filled from.
+#pragma once
+#include <cstddef>
+#include <span>
+#include <string_view>
+
+namespace scolopax {
+
+/// One line per entry: C++ name, wire name, what it is. Adding a tracker or blend mode is a line here and a
+/// struct in renderer/kernel; the instantiations expand these lists.
+#define SCOLOPAX_BLEND_MODES(X) \
+  X(density, "density", "extinctions add up; a collision shows the one channel it happened in (Eq. 6-7)")
+
+#define SCOLOPAX_METHODS(X)                                                                              \
+  X(superposed, "superposed",                                                                            \
+    "one Poisson process over all channels, one optical depth carried across macrocells; unbiased")      \
+  X(syncDda, "sync-dda", "one traversal, every channel tracked inside each macrocell (Listing 4); unbiased")
+
+#define SCOLOPAX_PIXEL_FILTERS(X)                              \
+  X(box, "box", "samples spread evenly over the pixel's area") \
+  X(point, "point", "every sample at the pixel's centre")
+
+struct NamedValue {
+  std::string_view name;
+  std::string_view doc;
+};
+
+#define SCOLOPAX_DECLARE_ENUM(Type, LIST, listName)                                        \
+  enum class Type { LIST(SCOLOPAX_ENUM_ENTRY) };                                           \
+  inline constexpr NamedValue listName[] = {LIST(SCOLOPAX_NAMED_ENTRY)};                   \
+  constexpr std::string_view nameOf(Type value) { return listName[std::size_t(value)].name; }
+#define SCOLOPAX_ENUM_ENTRY(name, wire, doc) name,
+#define SCOLOPAX_NAMED_ENTRY(name, wire, doc) {wire, doc},
+
+SCOLOPAX_DECLARE_ENUM(BlendMode, SCOLOPAX_BLEND_MODES, kBlendModes)
+SCOLOPAX_DECLARE_ENUM(Method, SCOLOPAX_METHODS, kMethods)
+SCOLOPAX_DECLARE_ENUM(PixelFilter, SCOLOPAX_PIXEL_FILTERS, kPixelFilters)
+
+#undef SCOLOPAX_ENUM_ENTRY
+#undef SCOLOPAX_NAMED_ENTRY
+
+}  // namespace scolopax

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// What to render, with every value resolved. Made by the server from the wire's scene and by
+// data/defaults; read by the render plan and by the reference.
+#pragma once
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "renderer/data/camera.h"
+#include "renderer/data/method.h"
+
+namespace scolopax {
+
+struct OpacityKnot {
+  double position;  ///< in [0,1] over the channel's range
+  double value;     ///< in [0,1]
+};
+struct ColorKnot {
+  double position;
+  glm::dvec3 color;  ///< linear RGB
+};
+
+/// How one channel looks. Scalar s (data units) -> clamp((s - lo) / (hi - lo), 0, 1)^gamma -> both curves,
+/// linear between knots and constant outside the first and last. Positions do not decrease; of two equal
+/// ones the later holds from there on. lo > hi reverses; lo == hi is a step: 0 below, 1 at lo and above.
+struct ChannelAppearance {
+  bool visible = true;
+  double rangeLo = 0, rangeHi = 1;   ///< data units
+  double gamma = 1;                  ///< > 0
+  double density = 1;                ///< extinction = opacity * density, per world unit; >= 0
+  std::vector<OpacityKnot> opacity{{0, 0}, {1, 1}};
+  std::vector<ColorKnot> color{{0, {1, 1, 1}}};
+};
+
+struct Scene {
+  std::vector<ChannelAppearance> channels;  ///< one per channel of the volume
+  Camera camera;
+  BlendMode blend = BlendMode::density;
+  Method method = Method::superposed;
+  int macrocell = 4;                        ///< voxels per macrocell edge
+  std::uint32_t seed = 0;
+  int width = 512, height = 512;
+  glm::vec3 background{0};                  ///< linear RGB
+  PixelFilter filter = PixelFilter::box;
+};
+
+}  // namespace scolopax

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// A multi-channel volume in memory. Comes from io/ or generate/; macrocells, kernels and the
+// reference read it. Immutable once built: sessions share it as shared_ptr<const Volume>.
+#pragma once
+#include <cstddef>
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "renderer/core/scalar_type.h"
+#include "renderer/data/histogram.h"
+
+namespace scolopax {
+
+/// Regular grid. Voxel centre (i,j,k), x fastest, lies at worldFromVoxel * (i,j,k,1) in world units.
+/// The box reaches half a voxel beyond the outer centres.
+struct Grid {
+  glm::ivec3 dims{1};                 ///< voxels per axis, each >= 1
+  glm::dmat4 worldFromVoxel{1.0};     ///< affine, not singular
+  std::size_t voxelCount() const {
+    return std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z);
+  }
+  /// Lengths of one voxel step along each axis, world units.
+  glm::dvec3 spacing() const;
+  /// Length of the box's longest diagonal, world units.
+  double diagonal() const;
+};
+
+/// Same dims, and affines that agree within 1e-4 voxel over the whole box.
+bool sameGrid(const Grid& a, const Grid& b);
+
+/// Owner of raw voxel memory: uninitialised on creation, move-only.
+class VoxelBuffer {
+ public:
+  VoxelBuffer() = default;
+  /// Throws Error(tooLarge) when the memory cannot be had.
+  VoxelBuffer(ScalarType type, std::size_t count);
+  ScalarType type() const { return type_; }
+  std::size_t count() const { return count_; }
+  std::size_t sizeBytes() const { return count_ * scolopax::sizeBytes(type_); }
+  std::byte* data() { return bytes_.get(); }
+  const std::byte* data() const { return bytes_.get(); }
+  /// The voxels as their own type; T must be the type of the buffer.
+  template <class T>
+  std::span<T> as() { return {reinterpret_cast<T*>(bytes_.get()), count_}; }
+  template <class T>
+  std::span<const T> as() const { return {reinterpret_cast<const T*>(bytes_.get()), count_}; }
+
+ private:
+  ScalarType type_ = ScalarType::u8;
+  std::size_t count_ = 0;
+  std::unique_ptr<std::byte[]> bytes_;
+};
+
+/// What a loader hands over for one channel. Data value = slope * stored + intercept.
+struct ChannelSource {
+  std::string name;  ///< "" lets the volume name it "channel i"
+  std::string unit;
+  VoxelBuffer voxels;
+  double slope = 1.0;
+  double intercept = 0.0;
+};
+
+/// One channel of a volume, with what was measured once when it was loaded.
+struct Channel {
+  std::string name;
+  std::string unit;
+  VoxelBuffer voxels;
+  double slope = 1.0;      ///< data value = slope * stored + intercept; slope != 0
+  double intercept = 0.0;
+  Histogram histogram;     ///< over data values, finite voxels only
+};
+
+class Volume {
+ public:
+  /// Measures every channel. Throws Error(badInput) when a channel's size is not the grid's, there is no
+  /// channel or more than kMaxChannels, or the grid is singular or not finite.
+  Volume(Grid grid, std::vector<ChannelSource> channels);
+  const Grid& grid() const { return grid_; }
+  std::span<const Channel> channels() const { return channels_; }
+
+ private:
+  Grid grid_;
+  std::vector<Channel> channels_;
+};
+
+inline constexpr int kMaxChannels = 32;
+
+}  // namespace scolopax

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// Volume files: one .cpp per format, one entry in the list of formats.cpp. A loader turns files into
+// grids and channel sources; Volume measures them.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "renderer/data/volume.h"
+
+namespace scolopax::io {
+
+/// Called with one line for what was changed on the way in (a widened or narrowed type, a skipped field).
+using Warn = std::function<void(const std::string&)>;
+
+/// What one file (with the files its header names) holds: channels on one grid.
+struct LoadedFile {
+  Grid grid;
+  std::vector<ChannelSource> channels;
+};
+
+struct Format {
+  std::string_view name;        ///< "NIfTI"
+  std::string_view extensions;  ///< for --help: ".nii, .nii.gz, .hdr + .img"
+  /// True when this loader is the one for the file: by its name, and where names are shared, its first bytes.
+  bool (*matches)(const std::filesystem::path& path);
+  /// Throws Error with one line: file, field, expected, found. Sizes are checked against `memoryLimitBytes`
+  /// and against the file before memory is taken.
+  LoadedFile (*load)(const std::filesystem::path& path, std::uint64_t memoryLimitBytes, const Warn& warn);
+};
+
+/// Every format, in the order in which they are asked.
+std::span<const Format> formats();
+
+/// Loads one file with the first format that matches; throws Error(unsupported) naming the known ones.
+LoadedFile loadFile(const std::filesystem::path& path, std::uint64_t memoryLimitBytes, const Warn& warn);
+
+/// A data set: files whose grids agree become the channels of one volume, in the order given.
+struct LoadedDataset {
+  std::string id;     ///< slug of the first file's stem, made unique among the data sets by a suffix
+  std::string title;  ///< the first file's name
+  std::vector<std::filesystem::path> files;
+  std::shared_ptr<const Volume> volume;
+};
+
+/// Loads the files and groups those whose grids agree (sameGrid), keeping the order of first appearance.
+std::vector<LoadedDataset> loadDatasets(std::span<const std::filesystem::path> paths,
+                                        std::uint64_t memoryLimitBytes, const Warn& warn);
+
+/// Half of what the machine has: what the program takes when nobody says otherwise.
+std::uint64_t defaultMemoryLimitBytes();
+
+// One loader per format; each in its own .cpp.
+bool matchesNifti(const std::filesystem::path& path);
+LoadedFile loadNifti(const std::filesystem::path& path, std::uint64_t memoryLimitBytes, const Warn& warn);
+bool matchesNrrd(const std::filesystem::path& path);
+LoadedFile loadNrrd(const std::filesystem::path& path, std::uint64_t memoryLimitBytes, const Warn& warn);
+bool matchesTiff(const std::filesystem::path& path);
+LoadedFile loadTiff(const std::filesystem::path& path, std::uint64_t memoryLimitBytes, const Warn& warn);
+bool matchesRaw(const std::filesystem::path& path);
+LoadedFile loadRaw(const std::filesystem::path& path, std::uint64_t memoryLimitBytes, const Warn& warn);
+
+/// Writes an attached, raw-encoded NRRD (LPS space) with the channels as the slowest axis; one type for all.
+void writeNrrd(const std::filesystem::path& path, const Grid& grid, std::span<const ChannelSource> channels);
+
+}  // namespace scolopax::io

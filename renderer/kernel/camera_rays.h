@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rays through pixels, in voxel space. Filled by data/camera.cpp in double precision.
+#pragma once
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "renderer/kernel/math.h"
+#include "renderer/kernel/portable.h"
+
+namespace scolopax::kernel {
+
+/// origin + t * direction in voxel coordinates, t >= 0 in WORLD units of length.
+struct Ray {
+  glm::vec3 origin;
+  glm::vec3 direction;
+};
+
+/// With film coordinates s = (x - width/2, height/2 - y) * pixelSize:
+/// origin = origin0 + s.x * originX + s.y * originY, the same for the direction, which is then divided by
+/// sqrt(1 + |s * perspective|^2): its length in world units.
+struct CameraRays {
+  glm::vec3 origin0, originX, originY;
+  glm::vec3 direction0, directionX, directionY;
+  float pixelSize;
+  float perspective;  ///< 1, or 0 for an orthographic camera
+  glm::vec2 halfSize; ///< width/2, height/2 in pixels
+
+  /// Ray through the point (x, y) of the image plane, in pixels from the top left corner.
+  SCOLOPAX_HD Ray operator()(float x, float y) const {
+    const float sx = (x - halfSize.x) * pixelSize;
+    const float sy = (halfSize.y - y) * pixelSize;
+    const float inverseLength = 1.0f / squareRoot(1.0f + perspective * (sx * sx + sy * sy));
+    return {origin0 + sx * originX + sy * originY,
+            (direction0 + sx * directionX + sy * directionY) * inverseLength};
+  }
+};
+
+}  // namespace scolopax::kernel

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// The backend interface: a volume and a scene in, an accumulating picture out. The server and the
+// commands use this; renderer/cpu implements it, cuda/ will.
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string_view>
+
+#include "renderer/data/image.h"
+#include "renderer/data/scene.h"
+#include "renderer/data/volume.h"
+
+namespace scolopax {
+
+/// What setScene had to redo.
+struct RebuildStats {
+  int macrocellChannels = 0;  ///< channels whose macrocells were measured again
+  int majorantChannels = 0;   ///< channels whose majorants were rebuilt
+  bool filmReset = false;     ///< false: the new scene makes the same picture, samples are kept
+  double rebuildMs = 0;
+};
+
+/// Counts over all samples since the film was reset; independent of the machine.
+struct RenderStats {
+  std::uint64_t rays = 0;
+  std::uint64_t fetches = 0;         ///< trilinear samples of one channel
+  std::uint64_t cellSteps = 0;       ///< macrocells visited
+  std::uint64_t randomNumbers = 0;
+  std::uint64_t truncatedRays = 0;   ///< ended by the bound on null collisions: thicker than can be tracked
+};
+
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+  virtual std::string_view backendName() const = 0;
+  /// Takes a new scene and redoes what it makes stale. Throws Error(badInput) for a scene that does not fit.
+  virtual RebuildStats setScene(const Scene& scene) = 0;
+  /// Adds one sample to every pixel. Returns false, with the film unchanged, when `cancel` became true.
+  virtual bool renderSample(const std::atomic<bool>& cancel) = 0;
+  /// Samples per pixel in the film.
+  virtual std::uint32_t samples() const = 0;
+  /// Estimated RMSE over linear premultiplied RGB of the picture as it stands; NaN below two samples.
+  virtual double estimatedError() const = 0;
+  virtual RenderStats stats() const = 0;
+  virtual Image image() const = 0;
+};
+
+/// `threads` 0 means all. Same scene, seed and sample count give the same bits for any number of threads.
+std::unique_ptr<Renderer> makeCpuRenderer(std::shared_ptr<const Volume> volume, int threads);
+
+}  // namespace scolopax
