@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Who may use the server: one token per start, shown by header, cookie or URL. Put before every request and
+// upgrade as net::Options::authorize.
+#pragma once
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "server/net/message.h"
+
+namespace scolopax {
+
+/// A token file that cannot be used: the message names it and says why.
+class TokenError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// 256 random bits as 43 URL-safe characters.
+std::string createToken();
+/// The file's one line; throws TokenError unless it is at least 16 printable ASCII characters without spaces.
+std::string readTokenFile(const std::string& path);
+/// In a time that depends on the lengths alone.
+bool sameToken(std::string_view a, std::string_view b);
+
+/// A refusal as application/problem+json (RFC 9457).
+net::Response problemResponse(int status, const std::string& detail);
+
+/// Immutable and thread-safe.
+class Authorizer {
+ public:
+  /// `loopback`: the server is bound to this machine only, so that any other Host is DNS rebinding.
+  Authorizer(std::string token, bool loopback);
+
+  /// nullopt: go on. Otherwise 401, 403, 421, or the 303 that turns `GET /?token=` into a cookie.
+  std::optional<net::Response> operator()(const net::Request& request) const;
+
+  const std::string& cookieName() const { return cookieName_; }
+
+ private:
+  std::string token_;
+  std::string cookieName_;  ///< cookies ignore ports: a hash of the token keeps two servers apart
+  bool loopback_;
+};
+
+/// Whether `host` (an option's value) can be reached from this machine only.
+bool isLoopback(std::string_view host);
+
+}  // namespace scolopax

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// One WebSocket client: control texts in order, and pictures of which only the latest matters.
+// The session offers frames as they are encoded; the connection sends what the client can take.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "server/net/message.h"
+
+namespace scolopax::net {
+
+/// One binary message: `header` is this client's own, `payload` is shared by all clients that see the
+/// picture.
+struct Frame {
+  std::uint32_t number = 0;  ///< what the client acknowledges; differs from those still unacknowledged
+  std::vector<unsigned char> header;
+  std::shared_ptr<const std::vector<unsigned char>> payload;  ///< may be null
+};
+
+struct WebSocketStats {
+  std::uint64_t framesSent = 0;
+  std::uint64_t framesReplaced = 0;  ///< offered, but a newer one came before the client could take it
+  std::uint64_t textsSent = 0;
+  int unacknowledged = 0;     ///< 0 .. kFrameWindow
+  bool framePending = false;  ///< one waits for the window or the socket
+  bool open = true;
+};
+
+/// Frames that may be on their way to a client: enough to keep the connection busy, few enough to stay fresh.
+inline constexpr int kFrameWindow = 2;
+
+/// Every function may be called from any thread, at any time, also after the end (then it does nothing).
+class WebSocket {
+ public:
+  virtual ~WebSocket() = default;
+  /// Queued in order; when Options::controlQueueLimit texts wait, the connection is closed with 1008.
+  virtual void sendText(std::string text) = 0;
+  /// Takes the one waiting place, replacing a frame that is still there.
+  virtual void offerFrame(Frame frame) = 0;
+  /// The client has shown `number` and thereby all frames sent before it; anything else is ignored.
+  virtual void acknowledge(std::uint32_t number) = 0;
+  /// Sends what is queued as text, then the close frame. `reason` is cut to 123 bytes.
+  virtual void close(std::uint16_t code, std::string reason) = 0;
+  virtual WebSocketStats stats() const = 0;
+};
+
+/// Called on a worker thread, one at a time per connection; the next message is read when onText returns.
+/// An exception from onText closes the connection with 1011. Keep a WebSocket only weakly in these.
+struct WebSocketEvents {
+  std::function<void(std::string)> onText;  ///< valid UTF-8; binary messages close with 1003
+  std::function<void()> onClose;            ///< exactly once, last, whatever ended the connection
+};
+
+/// Runs on a worker thread before the handshake is answered; decides by path. A Response refuses.
+/// What is sent or offered to the socket here already goes out right after the handshake.
+using UpgradeHandler =
+    std::function<std::variant<WebSocketEvents, Response>(const Request&, std::shared_ptr<WebSocket>)>;
+
+}  // namespace scolopax::net
