@@ -24,10 +24,10 @@ struct RebuildStats {
 /// Counts over all samples since the film was reset; independent of the machine.
 struct RenderStats {
   std::uint64_t rays = 0;
-  std::uint64_t fetches = 0;         ///< trilinear samples of one channel
-  std::uint64_t cellSteps = 0;       ///< macrocells visited
+  std::uint64_t fetches = 0;    ///< trilinear samples of one channel
+  std::uint64_t cellSteps = 0;  ///< macrocells visited
   std::uint64_t randomNumbers = 0;
-  std::uint64_t truncatedRays = 0;   ///< ended by the bound on null collisions: thicker than can be tracked
+  std::uint64_t truncatedRays = 0;  ///< ended by the bound on null collisions: thicker than can be tracked
 };
 
 class Renderer {

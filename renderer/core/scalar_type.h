@@ -24,8 +24,9 @@ enum class ScalarType : std::uint8_t {
 template <class F>
 constexpr decltype(auto) visitScalarType(ScalarType type, F&& f) {
   switch (type) {
-#define X(name, T) \
-  case ScalarType::name: return f(T{});
+#define X(name, T)       \
+  case ScalarType::name: \
+    return f(T{});
     SCOLOPAX_SCALAR_TYPES(X)
 #undef X
   }
@@ -34,9 +35,11 @@ constexpr decltype(auto) visitScalarType(ScalarType type, F&& f) {
 
 template <class T>
 struct ScalarTypeOf;
-#define X(name, T) \
-  template <>      \
-  struct ScalarTypeOf<T> { static constexpr ScalarType value = ScalarType::name; };
+#define X(name, T)                                        \
+  template <>                                             \
+  struct ScalarTypeOf<T> {                                \
+    static constexpr ScalarType value = ScalarType::name; \
+  };
 SCOLOPAX_SCALAR_TYPES(X)
 #undef X
 template <class T>
@@ -48,8 +51,9 @@ constexpr std::size_t sizeBytes(ScalarType type) {
 
 constexpr std::string_view nameOf(ScalarType type) {
   switch (type) {
-#define X(name, T) \
-  case ScalarType::name: return #name;
+#define X(name, T)       \
+  case ScalarType::name: \
+    return #name;
     SCOLOPAX_SCALAR_TYPES(X)
 #undef X
   }

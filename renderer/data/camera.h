@@ -14,8 +14,8 @@ struct Camera {
   glm::dvec3 eye{0, 0, 1};
   glm::dvec3 target{0};
   glm::dvec3 up{0, 1, 0};
-  double fovY = 35;                      ///< degrees, used without orthoHeight; in (0, 180)
-  std::optional<double> orthoHeight;     ///< full height of the view in world units: an orthographic camera
+  double fovY = 35;                   ///< degrees, used without orthoHeight; in (0, 180)
+  std::optional<double> orthoHeight;  ///< full height of the view in world units: an orthographic camera
 };
 
 /// Rays in voxel coordinates, computed in double and shifted to just before the box, so that neither an

@@ -12,9 +12,9 @@ namespace scolopax {
 #define SCOLOPAX_BLEND_MODES(X) \
   X(density, "density", "extinctions add up; a collision shows the one channel it happened in (Eq. 6-7)")
 
-#define SCOLOPAX_METHODS(X)                                                                              \
-  X(superposed, "superposed",                                                                            \
-    "one Poisson process over all channels, one optical depth carried across macrocells; unbiased")      \
+#define SCOLOPAX_METHODS(X)                                                                         \
+  X(superposed, "superposed",                                                                       \
+    "one Poisson process over all channels, one optical depth carried across macrocells; unbiased") \
   X(syncDda, "sync-dda", "one traversal, every channel tracked inside each macrocell (Listing 4); unbiased")
 
 #define SCOLOPAX_PIXEL_FILTERS(X)                              \
@@ -26,9 +26,9 @@ struct NamedValue {
   std::string_view doc;
 };
 
-#define SCOLOPAX_DECLARE_ENUM(Type, LIST, listName)                                        \
-  enum class Type { LIST(SCOLOPAX_ENUM_ENTRY) };                                           \
-  inline constexpr NamedValue listName[] = {LIST(SCOLOPAX_NAMED_ENTRY)};                   \
+#define SCOLOPAX_DECLARE_ENUM(Type, LIST, listName)                      \
+  enum class Type { LIST(SCOLOPAX_ENUM_ENTRY) };                         \
+  inline constexpr NamedValue listName[] = {LIST(SCOLOPAX_NAMED_ENTRY)}; \
   constexpr std::string_view nameOf(Type value) { return listName[std::size_t(value)].name; }
 #define SCOLOPAX_ENUM_ENTRY(name, wire, doc) name,
 #define SCOLOPAX_NAMED_ENTRY(name, wire, doc) {wire, doc},

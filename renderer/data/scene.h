@@ -25,9 +25,9 @@ struct ColorKnot {
 /// ones the later holds from there on. lo > hi reverses; lo == hi is a step: 0 below, 1 at lo and above.
 struct ChannelAppearance {
   bool visible = true;
-  double rangeLo = 0, rangeHi = 1;   ///< data units
-  double gamma = 1;                  ///< > 0
-  double density = 1;                ///< extinction = opacity * density, per world unit; >= 0
+  double rangeLo = 0, rangeHi = 1;  ///< data units
+  double gamma = 1;                 ///< > 0
+  double density = 1;               ///< extinction = opacity * density, per world unit; >= 0
   std::vector<OpacityKnot> opacity{{0, 0}, {1, 1}};
   std::vector<ColorKnot> color{{0, {1, 1, 1}}};
 };
@@ -37,10 +37,10 @@ struct Scene {
   Camera camera;
   BlendMode blend = BlendMode::density;
   Method method = Method::superposed;
-  int macrocell = 4;                        ///< voxels per macrocell edge
+  int macrocell = 4;  ///< voxels per macrocell edge
   std::uint32_t seed = 0;
   int width = 512, height = 512;
-  glm::vec3 background{0};                  ///< linear RGB
+  glm::vec3 background{0};  ///< linear RGB
   PixelFilter filter = PixelFilter::box;
 };
 

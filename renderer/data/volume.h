@@ -18,11 +18,9 @@ namespace scolopax {
 /// Regular grid. Voxel centre (i,j,k), x fastest, lies at worldFromVoxel * (i,j,k,1) in world units.
 /// The box reaches half a voxel beyond the outer centres.
 struct Grid {
-  glm::ivec3 dims{1};                 ///< voxels per axis, each >= 1
-  glm::dmat4 worldFromVoxel{1.0};     ///< affine, not singular
-  std::size_t voxelCount() const {
-    return std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z);
-  }
+  glm::ivec3 dims{1};              ///< voxels per axis, each >= 1
+  glm::dmat4 worldFromVoxel{1.0};  ///< affine, not singular
+  std::size_t voxelCount() const { return std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z); }
   /// Lengths of one voxel step along each axis, world units.
   glm::dvec3 spacing() const;
   /// Length of the box's longest diagonal, world units.
@@ -45,9 +43,13 @@ class VoxelBuffer {
   const std::byte* data() const { return bytes_.get(); }
   /// The voxels as their own type; T must be the type of the buffer.
   template <class T>
-  std::span<T> as() { return {reinterpret_cast<T*>(bytes_.get()), count_}; }
+  std::span<T> as() {
+    return {reinterpret_cast<T*>(bytes_.get()), count_};
+  }
   template <class T>
-  std::span<const T> as() const { return {reinterpret_cast<const T*>(bytes_.get()), count_}; }
+  std::span<const T> as() const {
+    return {reinterpret_cast<const T*>(bytes_.get()), count_};
+  }
 
  private:
   ScalarType type_ = ScalarType::u8;
@@ -69,9 +71,9 @@ struct Channel {
   std::string name;
   std::string unit;
   VoxelBuffer voxels;
-  double slope = 1.0;      ///< data value = slope * stored + intercept; slope != 0
+  double slope = 1.0;  ///< data value = slope * stored + intercept; slope != 0
   double intercept = 0.0;
-  Histogram histogram;     ///< over data values, finite voxels only
+  Histogram histogram;  ///< over data values, finite voxels only
 };
 
 class Volume {

@@ -17,7 +17,8 @@ void writeImage(const std::filesystem::path& path, const Image& image, glm::vec3
 /// Reads any picture OpenImageIO knows, as linear premultiplied RGBA (8- and 16-bit files are taken as sRGB).
 Image readImage(const std::filesystem::path& path);
 
-/// The bytes of a picture in memory: format "png" (8-bit sRGB RGB) or "exr" (float32 linear premultiplied RGBA).
+/// The bytes of a picture in memory: format "png" (8-bit sRGB RGB) or "exr" (float32 linear premultiplied
+/// RGBA).
 std::vector<unsigned char> encodeImage(const Image& image, glm::vec3 background, std::string_view format);
 
 }  // namespace scolopax::io

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/data/camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "renderer/core/error.h"
+
+namespace scolopax {
+namespace {
+
+struct Basis {
+  glm::dvec3 right, up, forward;  // orthonormal
+};
+
+/// Divides by the largest component first, so that lengths near 1e-200 or 1e200 stay in range.
+glm::dvec3 normalizeSafely(const glm::dvec3& v) {
+  const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  if (!(largest > 0) || !std::isfinite(largest)) return glm::dvec3(0);
+  return glm::normalize(v / largest);
+}
+
+Basis basisOf(const Camera& camera) {
+  const glm::dvec3 forward = normalizeSafely(camera.target - camera.eye);
+  if (forward == glm::dvec3(0))
+    throw Error(ErrorCode::badInput, "camera: eye and target must be different, finite points");
+  glm::dvec3 right = normalizeSafely(glm::cross(forward, normalizeSafely(camera.up)));
+  if (right == glm::dvec3(0)) {  // up along the view, or zero: any direction across it will do
+    const glm::dvec3 across = std::abs(forward.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
+    right = glm::normalize(glm::cross(forward, across));
+  }
+  return {right, glm::cross(right, forward), forward};
+}
+
+glm::dvec3 centreOf(const Grid& grid) {
+  return glm::dvec3(grid.worldFromVoxel * glm::dvec4(glm::dvec3(grid.dims - 1) * 0.5, 1));
+}
+
+}  // namespace
+
+kernel::CameraRays makeCameraRays(const Camera& camera, const Grid& grid, int width, int height) {
+  const Basis basis = basisOf(camera);
+  const glm::dmat4 voxelFromWorld = glm::inverse(grid.worldFromVoxel);
+  const glm::dmat3 linear(voxelFromWorld);
+  const double radius = 0.5 * grid.diagonal();
+  // All rays start on one plane across the view, moved forward to the box's bounding sphere when the eye is
+  // outside of it: numbers in the kernel are then no larger than the volume.
+  const double ahead = glm::dot(centreOf(grid) - camera.eye, basis.forward) - radius * 1.000001;
+  const double start = std::max(ahead, 0.0);
+  const glm::dvec3 startPoint(voxelFromWorld * glm::dvec4(camera.eye + start * basis.forward, 1));
+
+  const bool orthographic = camera.orthoHeight.has_value();
+  const double halfAngle = camera.fovY * 0.5 * 3.14159265358979323846 / 180.0;
+  const double viewHeight = orthographic ? *camera.orthoHeight : 2.0 * std::tan(halfAngle);
+  const glm::dvec3 right = linear * basis.right, up = linear * basis.up;
+  const double spread = orthographic ? 1.0 : start;
+  // Film coordinates are scaled to the view's height, so that their size is near 1 in either kind of camera.
+  kernel::CameraRays rays;
+  rays.origin0 = glm::vec3(startPoint);
+  rays.originX = glm::vec3(right * spread * viewHeight);
+  rays.originY = glm::vec3(up * spread * viewHeight);
+  rays.direction0 = glm::vec3(linear * basis.forward);
+  rays.directionX = orthographic ? glm::vec3(0) : glm::vec3(right * viewHeight);
+  rays.directionY = orthographic ? glm::vec3(0) : glm::vec3(up * viewHeight);
+  rays.pixelSize = float(1.0 / height);
+  rays.perspective = orthographic ? 0.0f : float(viewHeight * viewHeight);
+  rays.halfSize = {0.5f * float(width), 0.5f * float(height)};
+  return rays;
+}
+
+Camera framingCamera(const Grid& grid, double fovY, double aspect) {
+  Camera camera;
+  camera.fovY = fovY;
+  camera.target = centreOf(grid);
+  camera.up = {0, 0, 1};
+  // From the front left and a little above, in the axes of the world (RAS: front is +y).
+  const glm::dvec3 direction = glm::normalize(glm::dvec3(-0.55, 0.8, 0.35));
+  camera.eye = camera.target + direction;
+  const Basis basis = basisOf(camera);
+  const double tanY = std::tan(fovY * 0.5 * 3.14159265358979323846 / 180.0), tanX = tanY * aspect;
+  // The nearest eye from which every corner of the box lies inside the frame, and 5 % of margin.
+  double distance = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 v =
+        glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2 & 1) * glm::dvec3(grid.dims) - 0.5;
+    const glm::dvec3 p = glm::dvec3(grid.worldFromVoxel * glm::dvec4(v, 1)) - camera.target;
+    const double x = std::abs(glm::dot(p, basis.right)), y = std::abs(glm::dot(p, basis.up));
+    distance = std::max(distance, std::max(x / tanX, y / tanY) - glm::dot(p, basis.forward));
+  }
+  camera.eye = camera.target + direction * (distance * 1.05);
+  return camera;
+}
+
+}  // namespace scolopax

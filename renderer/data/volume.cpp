@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/data/volume.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <new>
+
+#include "renderer/core/error.h"
+
+namespace scolopax {
+namespace {
+
+bool isFinite(const glm::dmat4& m) {
+  for (int column = 0; column < 4; ++column)
+    for (int row = 0; row < 4; ++row)
+      if (!std::isfinite(m[column][row])) return false;
+  return true;
+}
+
+void checkGrid(const Grid& grid) {
+  if (grid.dims.x < 1 || grid.dims.y < 1 || grid.dims.z < 1)
+    throw Error(ErrorCode::badInput, "volume: every dimension must be at least 1, found " +
+                                         std::to_string(grid.dims.x) + "x" + std::to_string(grid.dims.y) +
+                                         "x" + std::to_string(grid.dims.z));
+  if (!isFinite(grid.worldFromVoxel))
+    throw Error(ErrorCode::badInput,
+                "volume: the affine from voxels to world has a value that is not finite");
+  // Singular relative to the lengths of its columns: a scale of 1e-9 is as good as 1.
+  const glm::dvec3 spacing = grid.spacing();
+  const double product = spacing.x * spacing.y * spacing.z;
+  if (!(product > 0) || !(std::abs(glm::determinant(glm::dmat3(grid.worldFromVoxel))) > 1e-6 * product))
+    throw Error(ErrorCode::badInput, "volume: the affine from voxels to world is singular");
+}
+
+/// Kernels interpolate in float. A power of two, moved from the voxels to the slope, keeps differences of
+/// huge values finite and spreads of tiny ones above the denormals; nothing is rounded.
+void normaliseMagnitude(Channel& channel) {
+  if (channel.voxels.type() != ScalarType::f32) return;
+  float largest = 0;
+  for (const float v : channel.voxels.as<float>())
+    if (std::isfinite(v)) largest = std::max(largest, std::abs(v));
+  if (largest == 0 || (largest < 0x1p124f && largest > 0x1p-100f)) return;
+  const int shift = -std::ilogb(largest);
+  for (float& v : channel.voxels.as<float>()) v = std::ldexp(v, shift);
+  channel.slope = std::ldexp(channel.slope, -shift);
+}
+
+}  // namespace
+
+glm::dvec3 Grid::spacing() const {
+  const auto& m = worldFromVoxel;
+  return {glm::length(glm::dvec3(m[0])), glm::length(glm::dvec3(m[1])), glm::length(glm::dvec3(m[2]))};
+}
+
+double Grid::diagonal() const {
+  const glm::dmat3 m(worldFromVoxel);
+  const glm::dvec3 d(dims);
+  double longest = 0;
+  for (const double sy : {1.0, -1.0})
+    for (const double sz : {1.0, -1.0})
+      longest = std::max(longest, glm::length(m * (d * glm::dvec3(1, sy, sz))));
+  return longest;
+}
+
+bool sameGrid(const Grid& a, const Grid& b) {
+  if (a.dims != b.dims) return false;
+  const glm::dmat4 bFromA = glm::inverse(b.worldFromVoxel) * a.worldFromVoxel;
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 p = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2 & 1) * glm::dvec3(a.dims - 1);
+    const glm::dvec3 q(bFromA * glm::dvec4(p, 1));
+    if (!(glm::length(q - p) <= 1e-4)) return false;
+  }
+  return true;
+}
+
+VoxelBuffer::VoxelBuffer(ScalarType type, std::size_t count) : type_(type), count_(count) {
+  try {
+    bytes_ = std::make_unique_for_overwrite<std::byte[]>(count * scolopax::sizeBytes(type));
+  } catch (const std::bad_alloc&) {
+    throw Error(ErrorCode::tooLarge,
+                "no memory for " + std::to_string(count) + " voxels of type " + std::string(nameOf(type)));
+  }
+}
+
+Volume::Volume(Grid grid, std::vector<ChannelSource> sources) : grid_(grid) {
+  checkGrid(grid_);
+  if (sources.empty() || sources.size() > std::size_t(kMaxChannels))
+    throw Error(ErrorCode::badInput, "volume: from 1 to " + std::to_string(kMaxChannels) +
+                                         " channels are possible, found " + std::to_string(sources.size()));
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    ChannelSource& source = sources[i];
+    Channel channel;
+    channel.name = source.name.empty() ? "channel " + std::to_string(i) : std::move(source.name);
+    channel.unit = std::move(source.unit);
+    channel.voxels = std::move(source.voxels);
+    channel.slope = source.slope;
+    channel.intercept = source.intercept;
+    if (channel.voxels.count() != grid_.voxelCount())
+      throw Error(ErrorCode::badInput, "volume: channel '" + channel.name + "' has " +
+                                           std::to_string(channel.voxels.count()) + " voxels, the grid has " +
+                                           std::to_string(grid_.voxelCount()));
+    if (!std::isfinite(channel.slope) || channel.slope == 0 || !std::isfinite(channel.intercept))
+      throw Error(ErrorCode::badInput, "volume: channel '" + channel.name +
+                                           "' needs a finite slope that is not 0 and a finite intercept");
+    normaliseMagnitude(channel);
+    channel.histogram = measureHistogram(channel.voxels, channel.slope, channel.intercept);
+    channels_.push_back(std::move(channel));
+  }
+}
+
+}  // namespace scolopax
