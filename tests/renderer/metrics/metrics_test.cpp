@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/metrics/metrics.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "renderer/core/error.h"
+
+namespace scolopax {
+namespace {
+
+Image makeImage(int width, int height, glm::vec4 value) {
+  return {width, height, std::vector<glm::vec4>(std::size_t(width) * std::size_t(height), value)};
+}
+
+TEST(ImageDifference, OfEqualPicturesIsZeroWithInfinitePsnr) {
+  const Image image = makeImage(3, 2, {0.25f, 0.5f, 0.75f, 1});
+  const ImageDifference d = compareImages(image, image);
+  EXPECT_EQ(d.rmse, 0);
+  EXPECT_EQ(d.maximum, 0);
+  EXPECT_EQ(d.psnr, std::numeric_limits<double>::infinity());
+}
+
+TEST(ImageDifference, HasTheValuesComputedByHand) {
+  Image a = makeImage(2, 1, {0, 0, 0, 0}), b = a;
+  // Squared differences 0.25, 0.0625, 0 and 1, 0, 0.0625: their mean over 6 components is 1.375 / 6.
+  a.pixels[0] = {0.5f, 0.25f, 0.125f, 1};
+  b.pixels[0] = {1.0f, 0.0f, 0.125f, 1};
+  a.pixels[1] = {2.0f, 0.5f, 0.5f, 1};
+  b.pixels[1] = {1.0f, 0.5f, 0.75f, 1};
+  const ImageDifference d = compareImages(a, b);
+  EXPECT_NEAR(d.rmse, 0.47871355387816905, 1e-15);
+  EXPECT_NEAR(d.psnr, 6.398486, 1e-6);
+  EXPECT_EQ(d.maximum, 1.0);
+}
+
+TEST(ImageDifference, OfAUniformTenthIsTwentyDecibels) {
+  const ImageDifference d = compareImages(makeImage(5, 7, {0, 0, 0, 1}), makeImage(5, 7, glm::vec4(0.1f)));
+  EXPECT_NEAR(d.rmse, 0.1, 1e-8);
+  EXPECT_NEAR(d.psnr, 20, 1e-6);
+  EXPECT_NEAR(d.maximum, 0.1, 1e-8);
+}
+
+TEST(ImageDifference, DoesNotLookAtAlpha) {
+  const ImageDifference d = compareImages(makeImage(2, 2, {0, 0, 0, 0}), makeImage(2, 2, {0, 0, 0, 1}));
+  EXPECT_EQ(d.rmse, 0);
+}
+
+TEST(ImageDifference, IsSymmetric) {
+  const Image a = makeImage(2, 2, {0.1f, 0.9f, 0.3f, 1}), b = makeImage(2, 2, {0.7f, 0.2f, 0.4f, 1});
+  EXPECT_EQ(compareImages(a, b).rmse, compareImages(b, a).rmse);
+  EXPECT_EQ(compareImages(a, b).maximum, compareImages(b, a).maximum);
+}
+
+TEST(ImageDifference, NeverPassesOverAPixelThatIsNotFinite) {
+  Image a = makeImage(3, 1, glm::vec4(0)), b = a;
+  a.pixels[1].y = std::numeric_limits<float>::quiet_NaN();
+  b.pixels[2].x = 0.5f;
+  EXPECT_TRUE(std::isnan(compareImages(a, b).rmse));
+  EXPECT_TRUE(std::isnan(compareImages(a, b).psnr));
+  EXPECT_TRUE(std::isnan(compareImages(a, b).maximum));
+  a.pixels[1].y = std::numeric_limits<float>::infinity();
+  EXPECT_TRUE(std::isinf(compareImages(a, b).rmse));
+  EXPECT_TRUE(std::isinf(compareImages(a, b).maximum));
+}
+
+TEST(ImageDifference, RefusesDifferentSizesAndNamesBoth) {
+  try {
+    compareImages(makeImage(3, 2, {}), makeImage(2, 3, {}));
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::badInput);
+    EXPECT_NE(std::string(error.what()).find("3x2"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("2x3"), std::string::npos);
+  }
+}
+
+TEST(ImageDifference, RefusesPicturesWithoutPixels) { EXPECT_THROW(compareImages({}, {}), Error); }
+
+}  // namespace
+}  // namespace scolopax
