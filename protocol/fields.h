@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// The table of the scene's fields: the single source of validation, serialisation, JSON Schema, patches and
+// documentation. A new field is one line here and one in scene.h, which also holds its default.
+#pragma once
+#include <cstddef>
+#include <optional>
+#include <string_view>
+#include <tuple>
+#include <vector>
+
+#include "protocol/lists.h"
+#include "protocol/scene.h"
+
+namespace scolopax::protocol {
+
+/// What values a field takes, beyond what its C++ type says. Bounds are in the field's unit.
+struct Traits {
+  std::string_view unit = "";
+  std::optional<double> atLeast = {}, above = {};  ///< inclusive, exclusive
+  std::optional<double> atMost = {}, below = {};
+  std::size_t maxItems = 0;                        ///< of a list
+  std::size_t maxLength = 0;                       ///< of a text, in code points; 0: colour or enum
+  std::vector<EnumEntry> Lists::*names = nullptr;  ///< the names that may stand here
+  bool color = false;                              ///< "#rrggbb"
+};
+
+template <class Struct, class Value>
+struct Field {
+  std::string_view name;  ///< the JSON key
+  Value Struct::*member;
+  std::string_view doc;
+  Traits traits;
+};
+
+template <class Struct, class Value>
+constexpr Field<Struct, Value> field(std::string_view name, Value Struct::*member, std::string_view doc,
+                                     Traits traits = {}) {
+  return {name, member, doc, traits};
+}
+
+/// Setting one of the two in a patch removes the other.
+struct Exclusive {
+  std::string_view first, second;
+  bool bothAreAnError;
+};
+
+inline constexpr std::size_t kMaxChannelItems = 32;
+inline constexpr std::size_t kMaxControlPoints = 4096;
+
+/// Specialised below: title, doc, exclusive pairs and the tuple of fields of one struct.
+template <class Struct>
+struct Table;
+
+template <class T>
+concept Described = requires {
+  Table<T>::fields;
+};
+
+template <>
+struct Table<Channel> {
+  static constexpr std::string_view title = "Channel";
+  static constexpr std::string_view doc = "How one channel of the data set looks.";
+  static constexpr Exclusive exclusive[] = {{"color", "colormap", true}};
+  static constexpr auto fields = std::tuple{
+      field("name", &Channel::name, "Label; null takes the data set's.", {.maxLength = 256}),
+      field("visible", &Channel::visible, "Whether the channel is drawn."),
+      field(
+          "range", &Channel::range,
+          "[lo, hi]: the data values at positions 0 and 1 of the curves; scalars outside clamp to the ends. "
+          "lo > hi reverses, lo = hi is a step. null is chosen from the histogram.",
+          {.unit = "data units"}),
+      field("color", &Channel::color,
+            "One colour for all values. Not together with colormap; null for both is chosen by the server.",
+            {.color = true}),
+      field("colormap", &Channel::colormap,
+            "Colour over the range: a name, or control points [position, color], interpolated in linear RGB.",
+            {.maxItems = kMaxControlPoints, .names = &Lists::colormaps}),
+      field("opacity", &Channel::opacity,
+            "Control points [position, value] over the range: linear between, constant outside; positions do "
+            "not decrease, of two equal ones the later holds from there on.",
+            {.maxItems = kMaxControlPoints}),
+      field("gamma", &Channel::gamma, "The position is raised to this power before both curves are read.",
+            {.above = 0, .atMost = 100}),
+      field("density", &Channel::density, "Extinction where opacity is 1; null is chosen from the data.",
+            {.unit = "1 / world unit", .atLeast = 0, .atMost = 1e30}),
+  };
+};
+
+template <>
+struct Table<Blend> {
+  static constexpr std::string_view title = "Blend";
+  static constexpr std::string_view doc = "How the channels are combined.";
+  static constexpr auto fields = std::tuple{
+      field("mode", &Blend::mode, "Blend mode.", {.names = &Lists::blendModes}),
+  };
+};
+
+template <>
+struct Table<Camera> {
+  static constexpr std::string_view title = "Camera";
+  static constexpr std::string_view doc =
+      "Right-handed, in world space. What is null of eye, target and up is chosen so that the box is in "
+      "view.";
+  static constexpr Exclusive exclusive[] = {{"fovY", "orthoHeight", false}};
+  static constexpr auto fields = std::tuple{
+      field("eye", &Camera::eye, "Where the camera stands; an orthographic camera's rays start in its plane.",
+            {.unit = "world units"}),
+      field("target", &Camera::target, "What it looks at.", {.unit = "world units"}),
+      field("up", &Camera::up, "Direction that points up in the picture; need not be normalised."),
+      field("fovY", &Camera::fovY, "Full vertical angle of view of a perspective camera.",
+            {.unit = "degrees", .above = 0, .below = 180}),
+      field("orthoHeight", &Camera::orthoHeight,
+            "Full height of the view of an orthographic camera; null is a perspective camera.",
+            {.unit = "world units", .above = 0}),
+  };
+};
+
+template <>
+struct Table<Integrator> {
+  static constexpr std::string_view title = "Integrator";
+  static constexpr std::string_view doc = "How the picture is computed; the expected picture is the same.";
+  static constexpr auto fields = std::tuple{
+      field("method", &Integrator::method, "Tracking method.", {.names = &Lists::methods}),
+      field("macrocell", &Integrator::macrocell, "Edge of the cells that bound the extinction.",
+            {.unit = "voxels", .atLeast = 1, .atMost = 64}),
+      field("seed", &Integrator::seed, "Same scene, seed and sample count: the same picture, bit for bit.",
+            {.atLeast = 0, .atMost = 4294967295.0}),
+  };
+};
+
+template <>
+struct Table<ImageSettings> {
+  static constexpr std::string_view title = "ImageSettings";
+  static constexpr std::string_view doc = "The picture.";
+  static constexpr auto fields = std::tuple{
+      field("width", &ImageSettings::width, "Width.", {.unit = "pixels", .atLeast = 1, .atMost = 16384}),
+      field("height", &ImageSettings::height, "Height.", {.unit = "pixels", .atLeast = 1, .atMost = 16384}),
+      field("background", &ImageSettings::background, "What 8-bit pictures are composited over.",
+            {.color = true}),
+      field("filter", &ImageSettings::filter, "Where the samples of a pixel lie.",
+            {.names = &Lists::filters}),
+  };
+};
+
+template <>
+struct Table<Stop> {
+  static constexpr std::string_view title = "Stop";
+  static constexpr std::string_view doc =
+      "When rendering ends: at the first of these that is reached. With none set, 64 samples for a render "
+      "and "
+      "4096 in a session.";
+  static constexpr auto fields = std::tuple{
+      field("samples", &Stop::samples, "Samples per pixel.", {.atLeast = 1, .atMost = 16777216}),
+      field("seconds", &Stop::seconds, "Time spent rendering.", {.unit = "seconds", .above = 0}),
+      field("error", &Stop::error, "Estimated RMSE over linear premultiplied RGB.", {.above = 0}),
+  };
+};
+
+template <>
+struct Table<Scene> {
+  static constexpr std::string_view title = "Scene";
+  static constexpr std::string_view doc = "All that a client can edit; {} is a valid scene.";
+  static constexpr auto fields = std::tuple{
+      field("dataset", &Scene::dataset, "Id of the data set; null is the first.", {.maxLength = 256}),
+      field("channels", &Scene::channels,
+            "Entry i is the i-th channel of the data set; missing ones take the defaults.",
+            {.maxItems = kMaxChannelItems}),
+      field("blend", &Scene::blend, "How the channels are combined."),
+      field("camera", &Scene::camera, "Where one looks from."),
+      field("integrator", &Scene::integrator, "How the picture is computed."),
+      field("image", &Scene::image, "The picture."),
+      field("stop", &Scene::stop, "When rendering ends."),
+  };
+};
+
+/// Calls f(field) for every field of the struct, in the table's order.
+template <Described Struct, class F>
+constexpr void forEachField(F&& f) {
+  std::apply([&](const auto&... fields) { (f(fields), ...); }, Table<Struct>::fields);
+}
+
+/// Calls f(exclusive) for every pair of which a patch sets one only.
+template <Described Struct, class F>
+constexpr void forEachExclusive(F&& f) {
+  if constexpr (requires { Table<Struct>::exclusive; }) {
+    for (const Exclusive& pair : Table<Struct>::exclusive) f(pair);
+  }
+}
+
+}  // namespace scolopax::protocol

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// The names an enumerated field may take. The caller fills them (the server from the renderer's lists):
+// the protocol itself knows no renderer.
+#pragma once
+#include <string>
+#include <vector>
+
+namespace scolopax::protocol {
+
+struct EnumEntry {
+  std::string name;  ///< as on the wire
+  std::string doc;   ///< what it is, one line
+};
+
+struct Lists {
+  std::vector<EnumEntry> blendModes;
+  std::vector<EnumEntry> methods;  ///< "auto" first
+  std::vector<EnumEntry> filters;
+  std::vector<EnumEntry> colormaps;
+};
+
+}  // namespace scolopax::protocol

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// The text messages of a session's WebSocket: those of a client are read, those of the server written.
+#pragma once
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "protocol/json_text.h"
+#include "protocol/problem.h"
+
+namespace scolopax::protocol {
+
+struct PatchMessage {
+  std::uint32_t id = 0;  ///< the client's own count, from 1 and rising; frames and errors name it
+  nlohmann::json patch;  ///< an object, otherwise unchecked: for applyPatch
+};
+struct AckMessage {
+  std::uint32_t frame = 0;  ///< this frame and all before it have arrived
+};
+struct PingMessage {
+  std::uint32_t id = 0;  ///< given back by pong
+};
+/// What the client can show; every such message replaces the one before it.
+struct ViewMessage {
+  bool visible = true;  ///< false: no frames
+  std::optional<std::uint32_t> maxWidth, maxHeight;
+  std::optional<double> maxFps;
+};
+struct ResumeMessage {
+  std::string token;
+};
+
+using ClientMessage = std::variant<PatchMessage, AckMessage, PingMessage, ViewMessage, ResumeMessage>;
+
+/// Throws ProtocolError: 400 and 413 as parseJson, 422 for an unknown type or a bad field.
+ClientMessage parseClientMessage(std::string_view text, const Limits& limits = {});
+
+std::string helloText(const nlohmann::json& capabilities, std::string_view session, std::string_view token);
+/// For the viewers that did not send the edit: what turns the resolved scene before it into the one after it.
+std::string sceneText(std::uint32_t revision, const nlohmann::json& patch);
+/// `patchId` is that of the refused patch; 0 when it was something else.
+std::string errorText(const ProtocolError& error, std::uint32_t patchId = 0);
+std::string noticeText(std::string_view text);
+std::string pongText(std::uint32_t id);
+
+}  // namespace scolopax::protocol

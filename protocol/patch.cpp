@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/patch.h"
+
+#include <charconv>
+#include <nlohmann/json.hpp>
+
+#include "protocol/read_fields.h"
+
+namespace scolopax::protocol {
+namespace {
+
+using nlohmann::json;
+
+/// "0", "7", "12"; nullopt for "", "-1", "07", "1e3" and what no list could hold.
+std::optional<std::size_t> indexOf(std::string_view key) {
+  if (key.empty() || key.size() > 9 || (key.size() > 1 && key[0] == '0')) return std::nullopt;
+  std::size_t index = 0;
+  const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), index);
+  if (error != std::errc() || end != key.data() + key.size()) return std::nullopt;
+  return index;
+}
+
+std::size_t indexBelow(const std::string& key, std::size_t count, const Path& list) {
+  const std::optional<std::size_t> index = indexOf(key);
+  if (!index) fail(list / key, "expected the index of an entry");
+  if (*index >= count) fail(list / key, "the list has room for " + std::to_string(count) + " entries");
+  return *index;
+}
+
+/// A value without a table: replaced, or, of a list, single entries that are there already.
+void patchLeaf(json& target, const json& patch, const Path& path) {
+  if (!patch.is_object()) {
+    target = patch;
+    return;
+  }
+  if (!target.is_array()) fail(path, "an object patches the entries of a list, and no list is set here");
+  for (const auto& [key, value] : patch.items()) {
+    json& entry = target[indexBelow(key, target.size(), path)];
+    if (value.is_null()) fail(path / key, "an entry of this list has no default");
+    patchLeaf(entry, value, path / key);
+  }
+}
+
+template <Described T>
+void patchStruct(json& target, const json& patch, const Path& path, std::size_t channelCount);
+
+template <class T>
+struct PatchValue {
+  static void apply(json& target, const json& patch, const Path& path, const Traits&, std::size_t) {
+    patchLeaf(target, patch, path);
+  }
+};
+
+template <Described T>
+struct PatchValue<T> {
+  static void apply(json& target, const json& patch, const Path& path, const Traits&,
+                    std::size_t channelCount) {
+    patchStruct<T>(target, patch, path, channelCount);
+  }
+};
+
+template <Described T>
+struct PatchValue<std::vector<T>> {
+  static void apply(json& target, const json& patch, const Path& path, const Traits& traits,
+                    std::size_t channelCount) {
+    std::size_t room = traits.maxItems;
+    if constexpr (std::is_same_v<T, Channel>) room = std::min(room, channelCount);
+    if (patch.is_array()) {
+      target = json::array();
+      if (patch.size() > room)
+        fail(path / room, "the list has room for " + std::to_string(room) + " entries");
+      for (std::size_t i = 0; i < patch.size(); ++i) patchEntry(target, i, patch[i], path / i, channelCount);
+    } else if (patch.is_object()) {
+      if (!target.is_array()) target = json::array();
+      for (const auto& [key, value] : patch.items()) {
+        patchEntry(target, indexBelow(key, room, path), value, path / key, channelCount);
+      }
+    } else {
+      failExpected(path, "a list, or an object with indices as keys", patch);
+    }
+  }
+
+  static void patchEntry(json& list, std::size_t index, const json& patch, const Path& path,
+                         std::size_t channelCount) {
+    while (list.size() <= index) list.push_back(json::object());
+    if (patch.is_null())
+      list[index] = json::object();
+    else
+      patchStruct<T>(list[index], patch, path, channelCount);
+  }
+};
+
+/// Of two fields that exclude each other, the one that alone is set removes the other.
+template <Described T>
+void removeExcluded(json& target, const json& patch) {
+  const auto sets = [&](std::string_view key) {
+    const auto found = patch.find(key);
+    return found != patch.end() && !found->is_null();
+  };
+  forEachExclusive<T>([&](const Exclusive& pair) {
+    if (sets(pair.first) && !patch.contains(pair.second)) target.erase(std::string(pair.second));
+    if (sets(pair.second) && !patch.contains(pair.first)) target.erase(std::string(pair.first));
+  });
+}
+
+template <Described T>
+void patchStruct(json& target, const json& patch, const Path& path, std::size_t channelCount) {
+  if (!patch.is_object()) failExpected(path, "an object", patch);
+  refuseUnknown<T>(patch, path);
+  if (!target.is_object()) target = json::object();
+  removeExcluded<T>(target, patch);
+  forEachField<T>([&]<class Value>(const Field<T, Value>& field) {
+    const auto found = patch.find(field.name);
+    if (found == patch.end()) return;
+    const std::string name(field.name);
+    if (found->is_null())
+      target.erase(name);
+    else
+      PatchValue<Value>::apply(target[name], *found, path / field.name, field.traits, channelCount);
+  });
+}
+
+template <Described T>
+json between(const json& from, const json& to);
+
+template <class T>
+struct Between {
+  static json of(const json&, const json& to) { return to; }
+};
+
+template <Described T>
+struct Between<T> {
+  static json of(const json& from, const json& to) { return between<T>(from, to); }
+};
+
+template <Described T>
+struct Between<std::vector<T>> {
+  static json of(const json& from, const json& to) {
+    if (to.size() < from.size()) return to;  // only a whole list makes one shorter
+    json patch = json::object();
+    for (std::size_t i = 0; i < to.size(); ++i) {
+      const json none = json::object();
+      const json& before = i < from.size() ? from[i] : none;
+      if (i >= from.size() || before != to[i]) patch[std::to_string(i)] = between<T>(before, to[i]);
+    }
+    return patch;
+  }
+};
+
+template <Described T>
+json between(const json& from, const json& to) {
+  json patch = json::object();
+  forEachField<T>([&]<class Value>(const Field<T, Value>& field) {
+    const std::string name(field.name);
+    const auto before = from.find(name), after = to.find(name);
+    if (after == to.end()) {
+      if (before != from.end()) patch[name] = nullptr;
+    } else if (before == from.end()) {
+      patch[name] = *after;
+    } else if (*before != *after) {
+      patch[name] = Between<Value>::of(*before, *after);
+    }
+  });
+  // A partner that stays must be named, or the patch would remove it.
+  forEachExclusive<T>([&](const Exclusive& pair) {
+    const std::string names[] = {std::string(pair.first), std::string(pair.second)};
+    for (const int i : {0, 1}) {
+      const std::string &set = names[i], &partner = names[1 - i];
+      if (patch.contains(set) && !patch[set].is_null() && !patch.contains(partner) && to.contains(partner)) {
+        patch[partner] = to.at(partner);
+      }
+    }
+  });
+  return patch;
+}
+
+}  // namespace
+
+json applyPatch(const json& sparse, const json& patch, std::size_t channelCount) {
+  json result = sparse;
+  patchStruct<Scene>(result, patch, Path(), channelCount);
+  return result;
+}
+
+json mergePatchBetween(const json& from, const json& to) { return between<Scene>(from, to); }
+
+}  // namespace scolopax::protocol

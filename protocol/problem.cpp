@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/problem.h"
+
+#include <nlohmann/json.hpp>
+
+namespace scolopax::protocol {
+
+std::string_view statusTitle(int status) {
+  switch (status) {
+    case 400:
+      return "Bad Request";
+    case 401:
+      return "Unauthorized";
+    case 403:
+      return "Forbidden";
+    case 404:
+      return "Not Found";
+    case 405:
+      return "Method Not Allowed";
+    case 406:
+      return "Not Acceptable";
+    case 408:
+      return "Request Timeout";
+    case 409:
+      return "Conflict";
+    case 413:
+      return "Content Too Large";
+    case 415:
+      return "Unsupported Media Type";
+    case 422:
+      return "Unprocessable Content";
+    case 429:
+      return "Too Many Requests";
+    case 431:
+      return "Request Header Fields Too Large";
+    case 500:
+      return "Internal Server Error";
+    case 503:
+      return "Service Unavailable";
+    default:
+      return "Error";
+  }
+}
+
+std::string problemJson(int status, std::string_view detail, std::string_view pointer) {
+  // The order is the reader's, not the alphabet's.
+  nlohmann::ordered_json body{
+      {"type", "about:blank"}, {"title", statusTitle(status)}, {"status", status}, {"detail", detail}};
+  if (!pointer.empty()) body["pointer"] = pointer;
+  return body.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+std::string problemJson(const ProtocolError& error) {
+  return problemJson(error.status, error.what(), error.pointer);
+}
+
+}  // namespace scolopax::protocol

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// The scene as it is on the wire: all that a client can edit. Comes from JSON (scene_json.h, described by
+// fields.h); the server resolves it into what the renderer takes. An empty optional means automatic.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace scolopax::protocol {
+
+/// On the wire `[position, value]`, both in [0,1].
+struct ControlPoint {
+  double position = 0;
+  double value = 0;
+};
+
+/// On the wire `[position, "#rrggbb"]`, position in [0,1].
+struct ColorPoint {
+  double position = 0;
+  std::string color;
+};
+
+/// The name of a colour table, or control points.
+using Colormap = std::variant<std::string, std::vector<ColorPoint>>;
+
+struct Channel {
+  std::optional<std::string> name;
+  bool visible = true;
+  std::optional<std::array<double, 2>> range;
+  std::optional<std::string> color;  ///< "#rrggbb"; never together with colormap
+  std::optional<Colormap> colormap;
+  std::vector<ControlPoint> opacity{{0, 0}, {1, 1}};
+  double gamma = 1;
+  std::optional<double> density;
+};
+
+struct Blend {
+  std::string mode = "density";
+};
+
+struct Camera {
+  std::optional<std::array<double, 3>> eye, target, up;
+  double fovY = 35;
+  std::optional<double> orthoHeight;  ///< when set, fovY is not used
+};
+
+struct Integrator {
+  std::string method = "auto";
+  std::uint32_t macrocell = 4;
+  std::uint32_t seed = 0;
+};
+
+struct ImageSettings {
+  std::uint32_t width = 512;
+  std::uint32_t height = 512;
+  std::string background = "#000000";
+  std::string filter = "box";
+};
+
+struct Stop {
+  std::optional<std::uint32_t> samples;
+  std::optional<double> seconds;
+  std::optional<double> error;
+};
+
+struct Scene {
+  std::optional<std::string> dataset;
+  std::vector<Channel> channels;
+  Blend blend;
+  Camera camera;
+  Integrator integrator;
+  ImageSettings image;
+  Stop stop;
+};
+
+}  // namespace scolopax::protocol

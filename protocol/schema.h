@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// What else the table of fields becomes: the JSON Schema that is checked in as schema.json and served, and
+// the section on fields of PROTOCOL.md.
+#pragma once
+#include <string>
+
+#include "protocol/lists.h"
+
+namespace scolopax::protocol {
+
+/// JSON Schema 2020-12 of the scene, indented, with a newline at its end.
+std::string schemaText(const Lists& lists);
+
+/// Markdown: one table of fields per object of the scene, and one per list of names.
+std::string fieldsMarkdown(const Lists& lists);
+
+}  // namespace scolopax::protocol
