@@ -24,9 +24,9 @@ struct RebuildStats {
 /// Counts over all samples since the film was reset; independent of the machine.
 struct RenderStats {
   std::uint64_t rays = 0;
-  std::uint64_t fetches = 0;    ///< trilinear samples of one channel
-  std::uint64_t cellSteps = 0;  ///< macrocells visited
-  std::uint64_t randomNumbers = 0;
+  std::uint64_t fetches = 0;        ///< trilinear samples of one channel
+  std::uint64_t cellSteps = 0;      ///< macrocells visited
+  std::uint64_t randomBlocks = 0;   ///< draws of up to four numbers
   std::uint64_t truncatedRays = 0;  ///< ended by the bound on null collisions: thicker than can be tracked
 };
 
@@ -42,6 +42,9 @@ class Renderer {
   virtual std::uint32_t samples() const = 0;
   /// Estimated RMSE over linear premultiplied RGB of the picture as it stands; NaN below two samples.
   virtual double estimatedError() const = 0;
+  /// From now on, count what samples cost; costs a little time and 16 bytes a pixel. Call before setScene.
+  virtual void countCosts() = 0;
+  /// All zero unless counting.
   virtual RenderStats stats() const = 0;
   virtual Image image() const = 0;
 };

@@ -16,6 +16,7 @@ struct Camera {
   glm::dvec3 up{0, 1, 0};
   double fovY = 35;                   ///< degrees, used without orthoHeight; in (0, 180)
   std::optional<double> orthoHeight;  ///< full height of the view in world units: an orthographic camera
+  bool operator==(const Camera&) const = default;
 };
 
 /// Rays in voxel coordinates, computed in double and shifted to just before the box, so that neither an

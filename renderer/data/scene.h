@@ -14,10 +14,12 @@ namespace scolopax {
 struct OpacityKnot {
   double position;  ///< in [0,1] over the channel's range
   double value;     ///< in [0,1]
+  bool operator==(const OpacityKnot&) const = default;
 };
 struct ColorKnot {
   double position;
   glm::dvec3 color;  ///< linear RGB
+  bool operator==(const ColorKnot&) const = default;
 };
 
 /// How one channel looks. Scalar s (data units) -> clamp((s - lo) / (hi - lo), 0, 1)^gamma -> both curves,
@@ -30,6 +32,7 @@ struct ChannelAppearance {
   double density = 1;               ///< extinction = opacity * density, per world unit; >= 0
   std::vector<OpacityKnot> opacity{{0, 0}, {1, 1}};
   std::vector<ColorKnot> color{{0, {1, 1, 1}}};
+  bool operator==(const ChannelAppearance&) const = default;
 };
 
 struct Scene {
@@ -42,6 +45,9 @@ struct Scene {
   int width = 512, height = 512;
   glm::vec3 background{0};  ///< linear RGB
   PixelFilter filter = PixelFilter::box;
+  bool operator==(const Scene&) const = default;
 };
+
+inline constexpr int kMaxImageSide = 16384;
 
 }  // namespace scolopax

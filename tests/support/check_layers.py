@@ -25,7 +25,7 @@ FORBIDDEN = [
 LIBRARIES = [
     (r"boost/", ["server/net/"]),
     (r"httplib\.h", ["server/net/"]),
-    (r"OpenImageIO/", ["renderer/io/"]),
+    (r"OpenImageIO/", ["renderer/io/", "renderer/data/colormap.cpp"]),
     (r"nifti|teem/", ["renderer/io/"]),
     (r"turbojpeg\.h", ["server/encoder.cpp"]),
     (r"tbb/|oneapi/", ["renderer/"]),

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+// The CPU backend: owns plan and film, runs the kernels over tiles with TBB. Every instance of
+// RenderPixel is made here from the lists of data/method.h.
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+#include "renderer/data/film.h"
+#include "renderer/data/render_plan.h"
+#include "renderer/kernel/render_pixel.h"
+#include "renderer/kernel/trackers/superposed.h"
+#include "renderer/kernel/trackers/sync_dda.h"
+#include "renderer/renderer.h"
+
+namespace scolopax {
+namespace {
+
+struct Pass {
+  kernel::SceneView scene;
+  std::uint32_t sample;
+  glm::vec4* pixels;
+  kernel::SampleCost* cost;
+};
+
+constexpr int kTile = 16;
+
+/// One tile of 16x16 pixels: neighbouring rays share voxels and macrocells.
+template <class Tracker, class Blend>
+void renderTile(const Pass& pass, int tileX, int tileY) {
+  const kernel::RenderPixel<Tracker, Blend> render{pass.scene, pass.sample, pass.pixels, pass.cost};
+  const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
+  const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
+  for (int y = tileY * kTile; y < endY; ++y)
+    for (int x = tileX * kTile; x < endX; ++x) render(y * pass.scene.width + x);
+}
+
+using TileFunction = void (*)(const Pass&, int, int);
+
+template <class Tracker>
+TileFunction tileFunctionOf(BlendMode blend) {
+  switch (blend) {
+    case BlendMode::density:
+      return renderTile<Tracker, kernel::BlendDensity>;
+  }
+  return nullptr;
+}
+
+TileFunction tileFunctionOf(Method method, BlendMode blend) {
+  switch (method) {
+    case Method::superposed:
+      return tileFunctionOf<kernel::Superposed>(blend);
+    case Method::syncDda:
+      return tileFunctionOf<kernel::SyncDda>(blend);
+  }
+  return nullptr;
+}
+
+class CpuRenderer final : public Renderer {
+ public:
+  CpuRenderer(std::shared_ptr<const Volume> volume, int threads)
+      : plan_(std::move(volume)), arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
+
+  std::string_view backendName() const override { return "cpu"; }
+
+  RebuildStats setScene(const Scene& scene) override {
+    // Memory first: when there is none, plan and film stay as they were.
+    Film resized;
+    const bool newSize = scene.width != film_.width() || scene.height != film_.height();
+    checkImageSize(scene);
+    if (newSize) resized.reset(scene.width, scene.height);
+    RebuildStats stats;
+    arena_.execute([&] { stats = plan_.update(scene); });
+    if (newSize)
+      film_ = std::move(resized);
+    else if (stats.filmReset)
+      film_.reset(scene.width, scene.height);
+    if (stats.filmReset && counting_) cost_.assign(film_.pixelCount(), {});
+    return stats;
+  }
+
+  bool renderSample(const std::atomic<bool>& cancel) override {
+    const kernel::SceneView& scene = plan_.view();
+    const Pass pass{scene, film_.samples(), film_.pass(), counting_ ? cost_.data() : nullptr};
+    const TileFunction renderTileAt = tileFunctionOf(plan_.scene().method, plan_.scene().blend);
+    const int tilesX = (scene.width + kTile - 1) / kTile, tilesY = (scene.height + kTile - 1) / kTile;
+    bool complete = false;
+    arena_.execute([&] {
+      tbb::parallel_for(0, tilesX * tilesY, [&](int i) {
+        if (!cancel.load(std::memory_order_relaxed)) renderTileAt(pass, i % tilesX, i / tilesX);
+      });
+      complete = !cancel.load();
+      if (complete) film_.add();
+    });
+    return complete;
+  }
+
+  std::uint32_t samples() const override { return film_.samples(); }
+  double estimatedError() const override { return film_.estimatedError(); }
+  Image image() const override { return film_.image(); }
+
+  void countCosts() override {
+    counting_ = true;
+    cost_.assign(film_.pixelCount(), {});
+  }
+
+  RenderStats stats() const override {
+    RenderStats stats;
+    stats.rays = std::uint64_t(film_.samples()) * cost_.size();
+    for (const kernel::SampleCost& cost : cost_) {
+      stats.fetches += cost.fetches;
+      stats.cellSteps += cost.cellSteps;
+      stats.randomBlocks += cost.randomBlocks;
+      stats.truncatedRays += cost.truncated;
+    }
+    return stats;
+  }
+
+ private:
+  RenderPlan plan_;
+  Film film_;
+  bool counting_ = false;
+  std::vector<kernel::SampleCost> cost_;  // one per pixel while counting
+  tbb::task_arena arena_;
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> makeCpuRenderer(std::shared_ptr<const Volume> volume, int threads) {
+  return std::make_unique<CpuRenderer>(std::move(volume), threads);
+}
+
+}  // namespace scolopax

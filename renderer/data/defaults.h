@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a scene that says nothing looks like: chosen from the data alone, never from the user's edits, so
+// that one edit does not move another value.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "renderer/data/scene.h"
+#include "renderer/data/volume.h"
+
+namespace scolopax {
+
+struct ValueRange {
+  double lo, hi;  ///< data units, lo < hi
+};
+
+/// From near the lowest to near the highest value, by percentile; never empty.
+ValueRange defaultRange(const Channel& channel);
+
+/// sRGB bytes, distinct for neighbouring indices.
+std::array<std::uint8_t, 3> defaultColor(int index);
+
+/// Colour map of the only channel of a volume; several channels have one colour each.
+inline constexpr std::string_view kDefaultColormap = "plasma";
+
+/// Density, per world unit, at which a linear ramp over the default range shows both the outside and some of
+/// the inside.
+double defaultDensity(const Volume& volume, int channel);
+
+}  // namespace scolopax

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Running sums per pixel, in double: ten million samples do not drift. Takes passes from a launcher, gives
+// images and the estimated error.
+#pragma once
+#include <cstdint>
+#include <glm/vec4.hpp>
+#include <vector>
+
+#include "renderer/data/image.h"
+
+namespace scolopax {
+
+class Film {
+ public:
+  /// Empties the film and sets its size. Throws Error(tooLarge) when the memory cannot be had.
+  void reset(int width, int height);
+  /// Where a launcher puts one sample of every pixel, width x height; committed by add(), otherwise lost.
+  glm::vec4* pass() { return pass_.data(); }
+  /// Adds the pass to every pixel.
+  void add();
+  int width() const { return width_; }
+  int height() const { return height_; }
+  std::size_t pixelCount() const { return sum_.size(); }
+  std::uint32_t samples() const { return samples_; }
+  /// Mean of the samples; all zero when there are none.
+  Image image() const;
+  /// Estimated RMSE over linear premultiplied RGB of image(), from the samples' variance; NaN below two
+  /// samples.
+  double estimatedError() const;
+
+ private:
+  int width_ = 0, height_ = 0;
+  std::uint32_t samples_ = 0;
+  std::vector<glm::vec4> pass_;
+  std::vector<glm::dvec4> sum_;
+  std::vector<double> squares_;  // sum of r^2 + g^2 + b^2
+};
+
+}  // namespace scolopax

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/data/render_plan.h"
+
+#include <chrono>
+
+#include "renderer/core/error.h"
+
+namespace scolopax {
+namespace {
+
+/// Whether the same voxels have the same extinction: what majorants depend on.
+bool sameExtinction(const ChannelAppearance& a, const ChannelAppearance& b) {
+  return a.rangeLo == b.rangeLo && a.rangeHi == b.rangeHi && a.gamma == b.gamma && a.density == b.density &&
+         a.opacity == b.opacity;
+}
+
+/// Whether both scenes make the same film: everything but the background, which is added to the finished
+/// image.
+bool samePicture(Scene a, const Scene& b) {
+  a.background = b.background;
+  return a == b;
+}
+
+void check(const Scene& scene, const Volume& volume) {
+  const auto fail = [](const std::string& what) { throw Error(ErrorCode::badInput, what); };
+  if (scene.channels.size() != volume.channels().size())
+    fail("scene: expected " + std::to_string(volume.channels().size()) + " channels, found " +
+         std::to_string(scene.channels.size()));
+  checkImageSize(scene);
+  if (scene.macrocell < 1 || scene.macrocell > 64)
+    fail("integrator.macrocell: expected 1 to 64, found " + std::to_string(scene.macrocell));
+}
+
+}  // namespace
+
+void checkImageSize(const Scene& scene) {
+  if (scene.width < 1 || scene.height < 1 || scene.width > kMaxImageSide || scene.height > kMaxImageSide)
+    throw Error(ErrorCode::badInput, "image: width and height must be from 1 to " +
+                                         std::to_string(kMaxImageSide) + ", found " +
+                                         std::to_string(scene.width) + "x" + std::to_string(scene.height));
+}
+
+RebuildStats RenderPlan::update(const Scene& scene) {
+  const auto start = std::chrono::steady_clock::now();
+  check(scene, *volume_);
+  RebuildStats stats;
+  stats.filmReset = !scene_ || !samePicture(*scene_, scene);
+  const auto rays = makeCameraRays(scene.camera, volume_->grid(), scene.width, scene.height);
+
+  // Everything that can throw comes first and into new objects; the plan is replaced at the end.
+  const bool newCells = !macrocells_ || macrocells_->size != scene.macrocell;
+  const auto macrocells = newCells ? sharedMacrocells(volume_, scene.macrocell) : macrocells_;
+  if (newCells) stats.macrocellChannels = int(volume_->channels().size());
+  std::vector<std::optional<ChannelPlan>> rebuilt(scene.channels.size());
+  bool combine = newCells || !scene_;
+  for (std::size_t i = 0; i < scene.channels.size(); ++i) {
+    const ChannelAppearance& appearance = scene.channels[i];
+    const bool stale = newCells || !scene_ || !sameExtinction(scene_->channels[i], appearance);
+    const bool recolored = !scene_ || scene_->channels[i].color != appearance.color;
+    if (scene_ && scene_->channels[i].visible != appearance.visible) combine = true;
+    const bool unbuilt = i < channels_.size() && channels_[i] && channels_[i]->majorants.empty();
+    if (!stale && !recolored && !(unbuilt && appearance.visible)) continue;
+    ChannelPlan plan{TransferFunction(volume_->channels()[i], appearance), {}};
+    const bool seen = appearance.visible && !plan.transfer.invisible();
+    if (seen && (stale || unbuilt)) {
+      plan.majorants = buildMajorants(macrocells->channels[i], plan.transfer);
+      ++stats.majorantChannels;
+      combine = true;
+    } else if (stale) {
+      combine = true;  // it may have been seen before
+    } else {
+      plan.majorants = channels_[i]->majorants;
+    }
+    rebuilt[i] = std::move(plan);
+  }
+
+  scene_ = scene;
+  macrocells_ = macrocells;
+  channels_.resize(scene.channels.size());
+  for (std::size_t i = 0; i < rebuilt.size(); ++i)
+    if (rebuilt[i]) channels_[i] = std::move(rebuilt[i]);
+
+  channelViews_.clear();
+  std::vector<const std::vector<float>*> bounds;
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    const ChannelPlan& plan = *channels_[i];
+    if (!scene.channels[i].visible || plan.majorants.empty()) continue;
+    channelViews_.push_back(plan.transfer.view(volume_->channels()[i]));
+    channelViews_.back().index = int(i);
+    bounds.push_back(&plan.majorants);
+  }
+  const glm::ivec3 cells = macrocells_->cells;
+  if (combine)
+    majorants_ = combineMajorants(bounds, std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z));
+
+  view_.rays = rays;
+  view_.width = scene.width;
+  view_.height = scene.height;
+  view_.seed = scene.seed;
+  view_.filterBox = scene.filter == PixelFilter::box;
+  view_.dims = volume_->grid().dims;
+  view_.channelCount = int(channelViews_.size());
+  view_.channels = channelViews_.data();
+  view_.majorants = {cells, float(macrocells_->size), majorants_.data()};
+  stats.rebuildMs =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return stats;
+}
+
+}  // namespace scolopax

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// From scene to what a kernel needs and nothing else: only channels that can be seen, only what changed
+// rebuilt. Every backend owns one; the launcher uploads or borrows its view.
+#pragma once
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "renderer/data/majorant_grid.h"
+#include "renderer/renderer.h"
+
+namespace scolopax {
+
+/// Throws Error(badInput) when a side is not in 1..kMaxImageSide.
+void checkImageSize(const Scene& scene);
+
+class RenderPlan {
+ public:
+  explicit RenderPlan(std::shared_ptr<const Volume> volume) : volume_(std::move(volume)) {}
+  /// Redoes what the new scene makes stale. The plan is unchanged when this throws Error(badInput).
+  RebuildStats update(const Scene& scene);
+  const Scene& scene() const { return *scene_; }
+  /// Valid until the next update.
+  const kernel::SceneView& view() const { return view_; }
+
+ private:
+  struct ChannelPlan {
+    TransferFunction transfer;
+    std::vector<float> majorants;  // empty while the channel cannot be seen
+  };
+  std::shared_ptr<const Volume> volume_;
+  std::optional<Scene> scene_;
+  std::shared_ptr<const MacrocellGrid> macrocells_;
+  std::vector<std::optional<ChannelPlan>> channels_;
+  std::vector<float> majorants_;
+  std::vector<kernel::ChannelView> channelViews_;
+  kernel::SceneView view_{};
+};
+
+}  // namespace scolopax

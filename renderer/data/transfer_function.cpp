@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/data/transfer_function.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "renderer/core/error.h"
+#include "renderer/kernel/classify.h"
+
+namespace scolopax {
+namespace {
+
+constexpr std::size_t kMaxKnots = 4096;  // indices fit the buckets' 16 bits
+
+template <class Value>
+void fillBuckets(Curve<Value>& curve) {
+  std::size_t knot = 0;
+  for (int b = 0; b <= kernel::kCurveBuckets; ++b) {
+    const float start = float(b) / float(kernel::kCurveBuckets);
+    while (knot + 1 < curve.positions.size() && curve.positions[knot + 1] <= start) ++knot;
+    curve.buckets.push_back(std::uint16_t(knot));
+  }
+}
+
+template <class Knot>
+void checkPositions(const std::vector<Knot>& knots, const char* what) {
+  if (knots.empty() || knots.size() > kMaxKnots)
+    throw Error(ErrorCode::badInput, std::string(what) + ": from 1 to " + std::to_string(kMaxKnots) +
+                                         " points are possible, found " + std::to_string(knots.size()));
+  double last = 0;
+  for (const Knot& knot : knots) {
+    if (!(knot.position >= last && knot.position <= 1))
+      throw Error(ErrorCode::badInput, std::string(what) +
+                                           ": positions must lie in [0,1] and not decrease, found " +
+                                           std::to_string(knot.position));
+    last = knot.position;
+  }
+}
+
+}  // namespace
+
+TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearance& a)
+    : gamma_(float(a.gamma)), density_(float(std::min(a.density, 1e30))) {
+  checkPositions(a.opacity, "opacity");
+  checkPositions(a.color, "colormap");
+  if (!(a.gamma > 0) || !(a.density >= 0) || !std::isfinite(a.rangeLo) || !std::isfinite(a.rangeHi))
+    throw Error(ErrorCode::badInput,
+                "channel '" + channel.name + "': gamma must be above 0, density not negative, range finite");
+  for (const OpacityKnot& knot : a.opacity) {
+    if (!(knot.value >= 0 && knot.value <= 1))
+      throw Error(ErrorCode::badInput,
+                  "opacity: values must lie in [0,1], found " + std::to_string(knot.value));
+    opacity_.positions.push_back(float(knot.position));
+    opacity_.values.push_back(float(knot.value));
+  }
+  for (const ColorKnot& knot : a.color) {
+    color_.positions.push_back(float(knot.position));
+    color_.values.push_back(glm::vec3(knot.color));
+  }
+  fillBuckets(opacity_);
+  fillBuckets(color_);
+
+  // Range in stored values. The origin is a float near the range, what rounding it loses goes to the offset:
+  // 280 to 310 K, or a spread of a few ulp, keep all the resolution that the voxels have.
+  const double lo = (a.rangeLo - channel.intercept) / channel.slope;
+  const double hi = (a.rangeHi - channel.intercept) / channel.slope;
+  constexpr double kLimit = 0x1p126;
+  origin_ = float(std::clamp(lo, -kLimit, kLimit));
+  if (a.rangeLo == a.rangeHi) {
+    // A step: 0 below, 1 from lo on. The origin is the last float at which the position may still be 1.
+    const float infinity = std::numeric_limits<float>::infinity();
+    const bool rising = channel.slope > 0;
+    if (rising && double(origin_) < lo) origin_ = std::nextafter(origin_, infinity);
+    if (!rising && double(origin_) > lo) origin_ = std::nextafter(origin_, -infinity);
+    scale_ = rising ? std::numeric_limits<float>::max() : -std::numeric_limits<float>::max();
+    offset_ = 1.0f;
+  } else {
+    const double scale = 1.0 / (hi - lo);
+    scale_ = float(std::clamp(scale, -kLimit, kLimit));
+    offset_ = float((double(origin_) - lo) * scale);
+  }
+}
+
+kernel::ChannelView TransferFunction::view(const Channel& channel) const {
+  kernel::ChannelView view{};
+  view.voxels = channel.voxels.data();
+  view.type = channel.voxels.type();
+  view.origin = origin_;
+  view.scale = scale_;
+  view.offset = offset_;
+  view.gamma = gamma_;
+  view.density = density_;
+  view.opacity = opacity_.view();
+  view.color = color_.view();
+  return view;
+}
+
+float TransferFunction::majorant(ValueInterval interval) const {
+  if (!(interval.lo <= interval.hi)) return 0.0f;
+  kernel::ChannelView channel{};
+  channel.origin = origin_;
+  channel.scale = scale_;
+  channel.offset = offset_;
+  channel.gamma = gamma_;
+  float a = kernel::curvePosition(channel, interval.lo);
+  float b = kernel::curvePosition(channel, interval.hi);
+  if (a > b) std::swap(a, b);
+  if (gamma_ != 1.0f) {  // the power function is within 2e-6 of monotone
+    a = kernel::clamp(a * (1.0f - 4e-6f), 0.0f, 1.0f);
+    b = kernel::clamp(b * (1.0f + 4e-6f), 0.0f, 1.0f);
+  }
+  const auto curve = opacity_.view();
+  float largest = std::max(kernel::evaluate(curve, a), kernel::evaluate(curve, b));
+  // Knots inside, and both sides of a jump at either end.
+  for (int i = kernel::knotBefore(curve, a) + 1; i < curve.count && curve.positions[i] <= b; ++i)
+    largest = std::max(largest, curve.values[i]);
+  return largest * density_;
+}
+
+bool TransferFunction::invisible() const {
+  return density_ == 0.0f || *std::max_element(opacity_.values.begin(), opacity_.values.end()) == 0.0f;
+}
+
+}  // namespace scolopax

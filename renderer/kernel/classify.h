@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Stored value -> position on the curves -> extinction and colour. Every step is monotone in float, so the
+// bound that data/majorant_grid takes over an interval's ends and inner knots holds to the last bit.
+#pragma once
+#include "renderer/kernel/math.h"
+#include "renderer/kernel/views.h"
+
+namespace scolopax::kernel {
+
+/// Index of the last knot at or before p, or -1 when p lies before the first.
+template <class Value>
+SCOLOPAX_HD int knotBefore(const CurveView<Value>& curve, float p) {
+  int i = curve.buckets[int(p * float(kCurveBuckets))];
+  while (i + 1 < curve.count && curve.positions[i + 1] <= p) ++i;
+  return p < curve.positions[i] ? -1 : i;
+}
+
+/// Between a and b also after rounding.
+SCOLOPAX_HD inline float between(float a, float b, float t) {
+  const float v = a + t * (b - a);
+  return a < b ? clamp(v, a, b) : clamp(v, b, a);
+}
+SCOLOPAX_HD inline glm::vec3 between(glm::vec3 a, glm::vec3 b, float t) { return a + t * (b - a); }
+
+/// Value of the curve at p in [0,1]; of two knots at one position the later holds there.
+template <class Value>
+SCOLOPAX_HD Value evaluate(const CurveView<Value>& curve, float p) {
+  if (curve.count == 1) return curve.values[0];
+  const int i = knotBefore(curve, p);
+  if (i < 0) return curve.values[0];
+  if (i + 1 >= curve.count) return curve.values[i];
+  const float t = (p - curve.positions[i]) / (curve.positions[i + 1] - curve.positions[i]);
+  return between(curve.values[i], curve.values[i + 1], t);
+}
+
+SCOLOPAX_HD inline float curvePosition(const ChannelView& channel, float stored) {
+  const float p = clamp((stored - channel.origin) * channel.scale + channel.offset, 0.0f, 1.0f);
+  return channel.gamma == 1.0f ? p : power(p, channel.gamma);
+}
+
+/// Extinction per world unit at a curve position.
+SCOLOPAX_HD inline float extinctionAt(const ChannelView& channel, float position) {
+  return evaluate(channel.opacity, position) * channel.density;
+}
+
+}  // namespace scolopax::kernel

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a kernel sees of a scene: plain views over memory that a launcher owns (data/render_plan fills them).
+// Only channels that can be seen are in here.
+#pragma once
+#include <cstdint>
+#include <glm/vec3.hpp>
+
+#include "renderer/core/scalar_type.h"
+#include "renderer/kernel/camera_rays.h"
+
+namespace scolopax::kernel {
+
+inline constexpr int kCurveBuckets = 256;
+
+/// Piecewise-linear curve over [0,1] with `count` >= 1 knots, constant outside the first and last.
+template <class Value>
+struct CurveView {
+  const float* positions;  ///< not decreasing
+  const Value* values;
+  const std::uint16_t* buckets;  ///< kCurveBuckets + 1: last knot at or before the bucket's start, or 0
+  int count;
+};
+
+/// One channel: where its voxels are and how a stored value becomes extinction and colour.
+struct ChannelView {
+  const void* voxels;
+  ScalarType type;
+  float origin, scale, offset;  ///< position = clamp((stored - origin) * scale + offset, 0, 1)
+  float gamma;                  ///< position^gamma goes into both curves
+  float density;                ///< extinction = opacity * density, per world unit
+  CurveView<float> opacity;
+  CurveView<glm::vec3> color;  ///< linear RGB
+  int index;                   ///< of the channel in the volume
+};
+
+/// Bounds of the extinction per macrocell. Cell (i,j,k) covers voxel coordinates [i, i+1] * cellSize; the
+/// outer cells reach to the faces of the box. Per cell: the sum over channels, then one bound per channel.
+struct MajorantView {
+  glm::ivec3 cells;
+  float cellSize;
+  const float* values;  ///< cells.x * cells.y * cells.z * (1 + channelCount), x fastest
+};
+
+struct SceneView {
+  CameraRays rays;
+  int width, height;
+  std::uint32_t seed;
+  bool filterBox;  ///< false: every sample at the pixel's centre
+  glm::ivec3 dims;
+  int channelCount;
+  const ChannelView* channels;
+  MajorantView majorants;
+};
+
+/// What a sample cost, for tests, benchmarks and the cost heat map.
+struct SampleCost {
+  std::uint32_t fetches = 0;
+  std::uint32_t cellSteps = 0;
+  std::uint32_t randomBlocks = 0;
+  std::uint32_t truncated = 0;
+};
+
+}  // namespace scolopax::kernel
