@@ -68,7 +68,7 @@ bool sameGrid(const Grid& a, const Grid& b) {
   if (a.dims != b.dims) return false;
   const glm::dmat4 bFromA = glm::inverse(b.worldFromVoxel) * a.worldFromVoxel;
   for (int corner = 0; corner < 8; ++corner) {
-    const glm::dvec3 p = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2 & 1) * glm::dvec3(a.dims - 1);
+    const glm::dvec3 p = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2 & 1) * glm::dvec3(a.dims) - 0.5;
     const glm::dvec3 q(bFromA * glm::dvec4(p, 1));
     if (!(glm::length(q - p) <= 1e-4)) return false;
   }

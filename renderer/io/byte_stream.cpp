@@ -55,7 +55,7 @@ fs::path resolveDataFile(const fs::path& header, std::string_view field, std::st
   };
   const auto outside = [&] {
     return refuse(ErrorCode::badInput,
-                  "expected a file in or below the header's folder, found " + quoted(name));
+                  "expected a file in or below the header's folder, found " + inQuotes(name));
   };
   const fs::path relative{std::string(name)};
   if (name.empty() || name.find('\0') != std::string_view::npos || relative.is_absolute()) throw outside();
@@ -65,7 +65,7 @@ fs::path resolveDataFile(const fs::path& header, std::string_view field, std::st
   std::error_code error;
   const fs::path realFolder = fs::weakly_canonical(fs::absolute(folder), error);
   const fs::path realFile = error ? fs::path() : fs::weakly_canonical(realFolder / relative, error);
-  if (error) throw refuse(ErrorCode::io, "cannot resolve " + quoted(name) + ": " + error.message());
+  if (error) throw refuse(ErrorCode::io, "cannot resolve " + inQuotes(name) + ": " + error.message());
   const auto [folderEnd, fileEnd] = std::ranges::mismatch(realFolder, realFile);
   if (folderEnd != realFolder.end()) throw outside();
   if (!fs::exists(realFile, error)) {
@@ -73,7 +73,7 @@ fs::path resolveDataFile(const fs::path& header, std::string_view field, std::st
       const std::string packed = std::string(name) + std::string(packedEnding);
       if (fs::exists(realFolder / packed, error)) return resolveDataFile(header, field, packed);
     }
-    throw refuse(ErrorCode::notFound, "names " + quoted(name) + ", which is not in " + shown(folder));
+    throw refuse(ErrorCode::notFound, "names " + inQuotes(name) + ", which is not in " + shown(folder));
   }
   return folder / relative;
 }

@@ -9,6 +9,7 @@
 #include <limits>
 #include <set>
 #include <type_traits>
+#include <utility>
 
 #include "renderer/core/error.h"
 #include "renderer/io/text.h"

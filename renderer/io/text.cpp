@@ -77,10 +77,12 @@ std::string cleanText(std::string_view text) {
   return result;
 }
 
-std::string quoted(std::string_view text) {
+std::string inQuotes(std::string_view text) {
   constexpr std::size_t kLongest = 80;
-  const bool cut = text.size() > kLongest;
-  return "\"" + cleanText(text.substr(0, kLongest)) + (cut ? "...\"" : "\"");
+  std::string result(1, '"');
+  result += cleanText(text.substr(0, kLongest));
+  if (text.size() > kLongest) result += "...";
+  return result += '"';
 }
 
 std::string shown(const std::filesystem::path& path) { return cleanText(path.string()); }

@@ -24,7 +24,7 @@ std::optional<double> parseNumber(std::string_view text);
 /// Text from a file as a name: valid UTF-8, control characters left out, other bytes become '?'.
 std::string cleanText(std::string_view text);
 /// Text from a file for a message: clean, in quotes, cut after 80 bytes.
-std::string quoted(std::string_view text);
+std::string inQuotes(std::string_view text);
 /// A path for a message: as it was given, clean.
 std::string shown(const std::filesystem::path& path);
 

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/io/image_file.h"
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include <cmath>
+#include <limits>
+
+#include "renderer/core/error.h"
+#include "renderer/io/byte_stream.h"
+#include "renderer/io/text.h"
+
+namespace scolopax::io {
+namespace fs = std::filesystem;
+namespace {
+
+/// A picture on its way out: 8-bit sRGB, or the float pixels as they are.
+struct Encoding {
+  OIIO::ImageSpec spec;
+  Image8 bytes;  ///< empty for float formats
+};
+
+Encoding prepare(const Image& image, glm::vec3 background, const std::string& extension) {
+  if (image.width < 1 || image.height < 1 ||
+      image.pixels.size() != std::size_t(image.width) * std::size_t(image.height)) {
+    throw Error(ErrorCode::badInput, "image: expected width x height pixels, at least one");
+  }
+  Encoding encoding;
+  if (extension == "exr" || extension == "tif" || extension == "tiff") {
+    encoding.spec = OIIO::ImageSpec(image.width, image.height, 4, OIIO::TypeFloat);
+    encoding.spec.attribute("oiio:ColorSpace", "Linear");
+    encoding.spec.attribute("compression", "zip");
+  } else if (extension == "png" || extension == "jpg" || extension == "jpeg") {
+    encoding.bytes = toSrgb8(image, background);
+    encoding.spec = OIIO::ImageSpec(image.width, image.height, 3, OIIO::TypeUInt8);
+    encoding.spec.attribute("oiio:ColorSpace", "sRGB");
+    if (extension != "png") {
+      encoding.spec.attribute("Compression", "jpeg:95");
+      encoding.spec.attribute("jpeg:subsampling", "4:4:4");
+    }
+  } else {
+    throw Error(ErrorCode::unsupported,
+                "image format: expected png, jpg, exr or tif, found " + inQuotes(extension));
+  }
+  return encoding;
+}
+
+/// Writes through `proxy`, or to the file `name` when there is none.
+void write(const std::string& name, const Image& image, const Encoding& encoding,
+           OIIO::Filesystem::IOProxy* proxy) {
+  const auto output = OIIO::ImageOutput::create(name);
+  const auto failed = [&](const std::string& why) {
+    return Error(ErrorCode::io, cleanText(name) + ": cannot be written: " + cleanText(why));
+  };
+  if (!output) throw failed(OIIO::geterror());
+  if (proxy) output->set_ioproxy(proxy);
+  const bool asFloat = encoding.bytes.rgb.empty();
+  const void* pixels = asFloat ? static_cast<const void*>(image.pixels.data()) : encoding.bytes.rgb.data();
+  const bool done = output->open(name, encoding.spec) &&
+                    output->write_image(asFloat ? OIIO::TypeFloat : OIIO::TypeUInt8, pixels) &&
+                    output->close();
+  if (!done) throw failed(output->geterror());
+}
+
+std::string extensionOf(const fs::path& path) {
+  const std::string extension = lowerCase(path.extension().string());
+  return extension.empty() ? extension : extension.substr(1);
+}
+
+}  // namespace
+
+void writeImage(const fs::path& path, const Image& image, glm::vec3 background) {
+  write(path.string(), image, prepare(image, background, extensionOf(path)), nullptr);
+}
+
+std::vector<unsigned char> encodeImage(const Image& image, glm::vec3 background, std::string_view format) {
+  if (format != "png" && format != "exr") {
+    throw Error(ErrorCode::unsupported, "image format: expected png or exr, found " + inQuotes(format));
+  }
+  std::vector<unsigned char> bytes;
+  OIIO::Filesystem::IOVecOutput proxy(bytes);
+  write("image." + std::string(format), image, prepare(image, background, std::string(format)), &proxy);
+  return bytes;
+}
+
+Image readImage(const fs::path& path) {
+  requireRegularFile(path);
+  constexpr int kLargestSide = 1 << 16;
+  constexpr std::int64_t kMostPixels = std::int64_t(1) << 28;
+  // Alpha that is not premultiplied stays so until the colours are linear.
+  OIIO::ImageSpec options;
+  options.attribute("oiio:UnassociatedAlpha", 1);
+  const auto input = OIIO::ImageInput::open(path.string(), &options);
+  if (!input) {
+    throw Error(ErrorCode::badInput, shown(path) + ": is not a picture: " + cleanText(OIIO::geterror()));
+  }
+  const OIIO::ImageSpec spec = input->spec();
+  const std::int64_t count = std::int64_t(spec.width) * spec.height;
+  if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.width > kLargestSide ||
+      spec.height > kLargestSide || count > kMostPixels || spec.nchannels < 1) {
+    throw Error(ErrorCode::tooLarge, shown(path) + ": expected a picture of at most 2^28 pixels, found " +
+                                         std::to_string(spec.width) + "x" + std::to_string(spec.height));
+  }
+  const int channels = std::min(spec.nchannels, 4);
+  std::vector<float> values(std::size_t(count) * std::size_t(channels));
+  if (!input->read_image(0, 0, 0, channels, OIIO::TypeFloat, values.data())) {
+    throw Error(ErrorCode::badInput, shown(path) + ": cannot be read: " + cleanText(input->geterror()));
+  }
+
+  const bool encoded = !spec.format.is_floating_point();
+  const bool straightAlpha = spec.get_int_attribute("oiio:UnassociatedAlpha") != 0;
+  const bool hasAlpha = channels == 2 || channels == 4;
+  Image image{spec.width, spec.height, std::vector<glm::vec4>(std::size_t(count))};
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    const float* value = &values[i * std::size_t(channels)];
+    const float alpha = hasAlpha ? value[channels - 1] : 1.0f;
+    glm::vec3 color = channels >= 3 ? glm::vec3(value[0], value[1], value[2]) : glm::vec3(value[0]);
+    if (encoded) {
+      // Premultiplied 8-bit files hold alpha times the encoded colour.
+      const float divide = straightAlpha || alpha <= 0 ? 1.0f : alpha;
+      for (int c = 0; c < 3; ++c)
+        color[c] = linearFromSrgb(color[c] / divide) * (straightAlpha ? 1.0f : divide);
+    }
+    if (straightAlpha) color *= alpha;
+    image.pixels[i] = glm::vec4(color, alpha);
+  }
+  return image;
+}
+
+}  // namespace scolopax::io

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+// Headerless voxels: files whose name says everything (name_XxYxZ_type.raw) and those that an Inviwo or
+// Voreen sidecar describes (.dat: "Key: value" lines, .ivf: XML).
+#include <algorithm>
+#include <array>
+#include <glm/gtc/matrix_transform.hpp>
+#include <map>
+#include <pugixml.hpp>
+#include <regex>
+
+#include "renderer/core/error.h"
+#include "renderer/io/convert.h"
+#include "renderer/io/format.h"
+#include "renderer/io/text.h"
+
+namespace scolopax::io {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::size_t kLongestSidecar = 1 << 20;
+
+struct RawDescription {
+  fs::path data;
+  VoxelLayout layout;
+  glm::dvec3 spacing{1};
+  std::uint64_t byteOffset = 0;
+  bool mayHoldMore = false;  ///< true: the sidecar gives an offset, so bytes behind the voxels are normal
+};
+
+Error badField(const fs::path& file, std::string_view field, const std::string& expected,
+               std::string_view found) {
+  return Error(ErrorCode::badInput, shown(file) + ": " + std::string(field) + ": expected " + expected +
+                                        ", found " + inQuotes(found));
+}
+
+std::string readSidecar(const fs::path& path) {
+  ByteStream stream(path, ByteStream::Encoding::plain);
+  if (stream.largestSize() > kLongestSidecar) {
+    throw Error(ErrorCode::badInput, shown(path) + ": expected a text header of at most 1 MiB, found " +
+                                         std::to_string(stream.largestSize()) + " bytes");
+  }
+  std::string text(std::size_t(stream.largestSize()), '\0');
+  text.resize(stream.readSome(std::as_writable_bytes(std::span(text))));
+  return text;
+}
+
+/// Inviwo's and Voreen's names: UCHAR or UINT8, USHORT, FLOAT, FLOAT32, ...
+StoredType sidecarType(const fs::path& file, std::string_view format) {
+  static const std::map<std::string, StoredType, std::less<>> kAliases = {
+      {"char", StoredType::i8},    {"uchar", StoredType::u8},  {"short", StoredType::i16},
+      {"ushort", StoredType::u16}, {"int", StoredType::i32},   {"uint", StoredType::u32},
+      {"float", StoredType::f32},  {"half", StoredType::f16},  {"double", StoredType::f64},
+      {"long", StoredType::i64},   {"ulong", StoredType::u64},
+  };
+  const std::string name = lowerCase(format);
+  if (const auto type = storedTypeFromName(name)) return *type;
+  const auto alias = kAliases.find(name);
+  if (alias == kAliases.end()) {
+    throw badField(file, "Format", "one scalar type such as UCHAR, UINT16 or FLOAT32", format);
+  }
+  return alias->second;
+}
+
+glm::ivec3 sidecarDims(const fs::path& file, std::string_view field, std::string_view x, std::string_view y,
+                       std::string_view z) {
+  std::array<std::int64_t, 3> dims{};
+  const std::array texts{x, y, z};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto value = parseInteger(texts[axis]);
+    if (!value) throw badField(file, field, "three whole numbers", texts[axis]);
+    dims[axis] = *value;
+  }
+  return checkedDims(shown(file) + ": " + std::string(field), dims[0], dims[1], dims[2]);
+}
+
+RawDescription fromDat(const fs::path& path, const Warn& warn) {
+  const std::string text = readSidecar(path);
+  std::map<std::string, std::string_view> fields;  // by key in lower case
+  for (std::string_view rest = text; !rest.empty();) {
+    const std::string_view line = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(std::min(rest.size(), line.size() + 1));
+    if (trimmed(line).empty() || trimmed(line).starts_with('#')) continue;
+    const auto colon = line.find(':');
+    if (colon == std::string_view::npos) throw badField(path, "header", "lines of \"Key: value\"", line);
+    const std::string key = lowerCase(trimmed(line.substr(0, colon)));
+    if (!fields.emplace(key, trimmed(line.substr(colon + 1))).second) {
+      throw badField(path, "header", "every key once", key);
+    }
+  }
+  const auto take = [&](std::initializer_list<const char*> names) -> std::optional<std::string_view> {
+    std::optional<std::string_view> value;
+    for (const char* name : names) {
+      if (const auto field = fields.extract(name)) value = field.mapped();
+    }
+    return value;
+  };
+  const auto required = [&](std::string_view shownName, std::initializer_list<const char*> names) {
+    const auto value = take(names);
+    if (!value)
+      throw Error(ErrorCode::badInput, shown(path) + ": " + std::string(shownName) + ": is missing");
+    return *value;
+  };
+
+  RawDescription raw;
+  const std::string_view resolution = required("Resolution", {"resolution"});
+  const auto words = splitWords(resolution);
+  if (words.size() != 3) throw badField(path, "Resolution", "three whole numbers", resolution);
+  raw.layout.dims = sidecarDims(path, "Resolution", words[0], words[1], words[2]);
+  raw.layout.type = sidecarType(path, required("Format", {"format"}));
+
+  if (const auto order = take({"byteorder", "endianess", "endianness", "endian"})) {
+    const std::string name = lowerCase(*order);
+    raw.layout.bigEndian = name.starts_with("big");
+    if (!name.starts_with("big") && !name.starts_with("little")) {
+      throw badField(path, "ByteOrder", "LittleEndian or BigEndian", *order);
+    }
+  }
+  if (const auto thickness = take({"slicethickness", "spacing"})) {
+    const auto lengths = splitWords(*thickness);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto length = lengths.size() == 3 ? parseNumber(lengths[axis]) : std::nullopt;
+      if (!length || !(*length > 0) || !std::isfinite(*length)) {
+        throw badField(path, "SliceThickness", "three lengths above 0", *thickness);
+      }
+      raw.spacing[int(axis)] = *length;
+    }
+  }
+  if (const auto offset = take({"byteoffset"})) {
+    const auto bytes = parseInteger(*offset);
+    if (!bytes || *bytes < 0) throw badField(path, "ByteOffset", "a whole number, 0 or more", *offset);
+    raw.byteOffset = std::uint64_t(*bytes);
+    raw.mayHoldMore = true;
+  }
+  raw.data = resolveDataFile(path, "ObjectFileName",
+                             required("ObjectFileName", {"objectfilename", "rawfile"}), ".gz");
+  for (const auto& [key, value] : fields) {
+    if (warn) warn(shown(path) + ": " + cleanText(key) + ": is not used");
+  }
+  return raw;
+}
+
+RawDescription fromIvf(const fs::path& path) {
+  const std::string text = readSidecar(path);
+  pugi::xml_document document;
+  const auto parsed = document.load_buffer(text.data(), text.size());
+  const pugi::xml_node root = document.child("InviwoTreeData");
+  if (!parsed || !root) {
+    throw Error(ErrorCode::badInput, shown(path) + ": expected XML with the element InviwoTreeData, found " +
+                                         (parsed ? "another one" : parsed.description()) + " at byte " +
+                                         std::to_string(parsed.offset));
+  }
+  const auto required = [&](const char* element, const char* attribute) {
+    const pugi::xml_attribute found = root.child(element).attribute(attribute);
+    if (!found) {
+      throw Error(ErrorCode::badInput,
+                  shown(path) + ": " + element + ": attribute " + attribute + " is missing");
+    }
+    return trimmed(found.value());
+  };
+  RawDescription raw;
+  raw.layout.dims = sidecarDims(path, "Dimension", required("Dimension", "x"), required("Dimension", "y"),
+                                required("Dimension", "z"));
+  raw.layout.type = sidecarType(path, required("Format", "content"));
+  if (const pugi::xml_node offset = root.child("ByteOffset")) {
+    const auto bytes = parseInteger(trimmed(offset.attribute("content").value()));
+    if (!bytes || *bytes < 0) {
+      throw badField(path, "ByteOffset", "a whole number, 0 or more", offset.attribute("content").value());
+    }
+    raw.byteOffset = std::uint64_t(*bytes);
+    raw.mayHoldMore = true;
+  }
+  for (const pugi::xml_node item : root.child("MetaDataMap").children("MetaDataItem")) {
+    if (std::string_view(item.attribute("key").value()) != "LittleEndian") continue;
+    const std::string_view value = item.child("MetaData").attribute("content").value();
+    if (value != "0" && value != "1") throw badField(path, "LittleEndian", "0 or 1", value);
+    raw.layout.bigEndian = value == "0";
+  }
+  raw.data = resolveDataFile(path, "RawFile", required("RawFile", "content"), ".gz");
+  return raw;
+}
+
+RawDescription fromName(const fs::path& path) {
+  requireRegularFile(path);
+  static const std::regex kPattern(R"(^.*_(\d+)x(\d+)x(\d+)_([a-z]+\d+)(\.[^_]*)?\.raw(\.gz)?$)");
+  const std::string name = path.filename().string();
+  std::smatch match;
+  const auto type =
+      std::regex_match(name, match, kPattern) ? storedTypeFromName(match[4].str()) : std::nullopt;
+  if (!type) {
+    throw badField(path, "file name",
+                   "name_XxYxZ_type.raw with a type from int8 to float64, or a .nhdr, .dat or .ivf header to "
+                   "open instead",
+                   name);
+  }
+  RawDescription raw;
+  raw.data = path;
+  raw.layout.type = *type;
+  raw.layout.dims = sidecarDims(path, "file name", match[1].str(), match[2].str(), match[3].str());
+  return raw;
+}
+
+}  // namespace
+
+bool matchesRaw(const fs::path& path) {
+  return hasEnding(path, ".raw") || hasEnding(path, ".raw.gz") || hasEnding(path, ".dat") ||
+         hasEnding(path, ".ivf");
+}
+
+LoadedFile loadRaw(const fs::path& path, std::uint64_t memoryLimitBytes, const Warn& warn) {
+  const RawDescription raw = hasEnding(path, ".dat")   ? fromDat(path, warn)
+                             : hasEnding(path, ".ivf") ? fromIvf(path)
+                                                       : fromName(path);
+  const bool packed = hasEnding(raw.data, ".gz");
+  ByteStream stream(raw.data, packed ? ByteStream::Encoding::gzip : ByteStream::Encoding::plain);
+  const std::string file = shown(path);
+  const std::uint64_t expected = saturatingSum(raw.byteOffset, raw.layout.sizeBytes());
+  if (!packed && expected != stream.largestSize() && !(raw.mayHoldMore && expected < stream.largestSize())) {
+    throw Error(ErrorCode::badInput, file + ": " + raw.layout.description() + ": expected a data file of " +
+                                         std::to_string(expected) + " bytes, found " +
+                                         std::to_string(stream.largestSize()));
+  }
+  LoadedFile loaded;
+  loaded.channels = readChannels(stream, raw.byteOffset, raw.layout, memoryLimitBytes, warn);
+  if (!raw.mayHoldMore && !stream.atEnd()) {
+    throw Error(ErrorCode::badInput, file + ": " + raw.layout.description() + ": expected data of " +
+                                         std::to_string(expected) + " bytes, found more");
+  }
+  loaded.channels[0].name = stemOf(path);
+  loaded.grid.dims = raw.layout.dims;
+  loaded.grid.worldFromVoxel = glm::scale(glm::dmat4(1.0), raw.spacing);
+  return loaded;
+}
+
+}  // namespace scolopax::io

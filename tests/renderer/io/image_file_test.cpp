@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/io/image_file.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/renderer/io/io_test_support.h"
+
+namespace scolopax::io {
+namespace {
+
+using testing::HasSubstr;
+
+/// Colours that 8 bits and halves do not hold, some beyond 1, some transparent.
+Image testImage() {
+  Image image{5, 3, {}};
+  for (int i = 0; i < 15; ++i) {
+    const float alpha = float(i) / 14.0f;
+    image.pixels.emplace_back(alpha * 0.1234567f, alpha * float(i) * 0.3f, alpha * 1e-6f, alpha);
+  }
+  return image;
+}
+
+TEST(ImageFile, FloatFormatsComeBackBitForBit) {
+  const TempDir folder;
+  const Image image = testImage();
+  for (const char* name : {"a.exr", "a.tif", "a.tiff", "A.EXR"}) {
+    writeImage(folder / name, image, glm::vec3(1));
+    const Image back = readImage(folder / name);
+    ASSERT_EQ(back.width, 5) << name;
+    ASSERT_EQ(back.height, 3) << name;
+    EXPECT_EQ(back.pixels, image.pixels) << name;
+  }
+}
+
+TEST(ImageFile, EightBitFormatsHoldTheCompositedSrgbPicture) {
+  const TempDir folder;
+  const Image image = testImage();
+  const glm::vec3 background(0.2f, 0.5f, 1.0f);
+  const Image8 expected = toSrgb8(image, background);
+  writeImage(folder / "a.png", image, background);
+  const Image back = readImage(folder / "a.png");
+  ASSERT_EQ(back.pixels.size(), 15u);
+  for (std::size_t i = 0; i < 15; ++i) {
+    EXPECT_EQ(back.pixels[i].a, 1.0f);
+    for (int c = 0; c < 3; ++c) {
+      const float want = linearFromSrgb(float(expected.rgb[i * 3 + std::size_t(c)]) / 255.0f);
+      EXPECT_NEAR(back.pixels[i][c], want, 1e-6f);
+    }
+  }
+}
+
+TEST(ImageFile, JpegKeepsColourAtFullResolution) {
+  const TempDir folder;
+  // Red and green columns in turn: with halved colour planes they would mix to a brownish mean.
+  Image image{32, 32, {}};
+  for (int i = 0; i < 32 * 32; ++i) image.pixels.emplace_back(i % 2 == 0, i % 2 == 1, 0, 1);
+  writeImage(folder / "a.jpg", image, glm::vec3(0));
+  const Image back = readImage(folder / "a.jpg");
+  for (std::size_t i = 0; i < back.pixels.size(); ++i) {
+    EXPECT_NEAR(back.pixels[i].r, image.pixels[i].r, 0.15f);
+    EXPECT_NEAR(back.pixels[i].g, image.pixels[i].g, 0.15f);
+  }
+}
+
+TEST(ImageFile, EncodingInMemoryGivesTheFilesPicture) {
+  const TempDir folder;
+  const Image image = testImage();
+  for (const std::string format : {"png", "exr"}) {
+    const auto bytes = encodeImage(image, glm::vec3(0.5f), format);
+    writeBytes(folder / ("memory." + format), {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    writeImage(folder / ("file." + format), image, glm::vec3(0.5f));
+    EXPECT_EQ(readImage(folder / ("memory." + format)).pixels, readImage(folder / ("file." + format)).pixels);
+    EXPECT_EQ(encodeImage(image, glm::vec3(0.5f), format), bytes) << "the same picture gives the same bytes";
+  }
+}
+
+TEST(ImageFile, BadRequestsAndFilesAreRefusedInOneLine) {
+  const TempDir folder;
+  const Image image = testImage();
+  EXPECT_THAT(errorOf([&] { writeImage(folder / "a.bmp", image, glm::vec3(0)); }),
+              HasSubstr("expected png, jpg, exr or tif"));
+  EXPECT_THAT(errorOf([&] { writeImage(folder / "a", image, glm::vec3(0)); }), HasSubstr("expected png"));
+  EXPECT_THAT(errorOf([&] { encodeImage(image, glm::vec3(0), "jpg"); }), HasSubstr("expected png or exr"));
+  EXPECT_THAT(errorOf([&] { writeImage(folder / "no/such/folder.png", image, glm::vec3(0)); }),
+              HasSubstr("cannot be written"));
+  EXPECT_THAT(errorOf([&] {
+                writeImage(folder / "a.png", Image{2, 2, {}}, glm::vec3(0));
+              }),
+              HasSubstr("width x height"));
+  EXPECT_THAT(errorOf([&] { readImage(folder / "gone.png"); }), HasSubstr("no such file"));
+  EXPECT_THAT(errorOf([&] { readImage(folder.path()); }), HasSubstr("found a folder"));
+  EXPECT_THAT(errorOf([&] { readImage(writeBytes(folder / "bad.png", "not a picture")); }),
+              HasSubstr("is not a picture"));
+  const auto png = encodeImage(image, glm::vec3(0), "png");
+  EXPECT_NE(errorOf([&] {
+              readImage(writeBytes(folder / "cut.png", {reinterpret_cast<const char*>(png.data()), 50}));
+            }),
+            "");
+}
+
+}  // namespace
+}  // namespace scolopax::io
