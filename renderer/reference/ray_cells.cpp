@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/reference/ray_cells.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+namespace scolopax::reference {
+namespace {
+
+// In voxels: how far rounding may carry a ray off the face it was meant to run along, and how much it may
+// drift across the box and still count as parallel to an axis.
+constexpr double kFaceTolerance = 1e-9;
+constexpr double kDriftTolerance = 1e-12;
+
+}  // namespace
+
+RayCells cutAtCells(const glm::dvec3& origin, const glm::dvec3& direction, const glm::ivec3& dims) {
+  const glm::dvec3 size(dims), centre = 0.5 * (size - 1.0);
+  // From the point nearest to the centre, so that a far eye is not felt in the differences below.
+  const double nearest = glm::dot(centre - origin, direction) / glm::dot(direction, direction);
+  RayCells ray{origin + nearest * direction, direction, {}};
+  double begin = -nearest, end = std::numeric_limits<double>::infinity();
+
+  const double crossing = glm::length(size) / glm::length(direction);  // no longer inside than this
+  for (int axis = 0; axis < 3; ++axis) {
+    double& o = ray.origin[axis];
+    double& d = ray.direction[axis];
+    const double low = -0.5, high = size[axis] - 0.5;
+    if (std::abs(d) * crossing < kDriftTolerance) {
+      if (o < low - kFaceTolerance || o > high + kFaceTolerance) return ray;
+      d = 0;
+      o = std::clamp(o, low, high);
+    } else {
+      const double a = (low - o) / d, b = (high - o) / d;
+      begin = std::max(begin, std::min(a, b));
+      end = std::min(end, std::max(a, b));
+    }
+  }
+  if (!(begin < end)) return ray;
+
+  ray.cuts = {begin, end};
+  for (int axis = 0; axis < 3; ++axis)
+    if (ray.direction[axis] != 0)
+      for (int k = 0; k < dims[axis]; ++k) {
+        const double t = (k - ray.origin[axis]) / ray.direction[axis];
+        if (t > begin && t < end) ray.cuts.push_back(t);
+      }
+  std::sort(ray.cuts.begin(), ray.cuts.end());
+  return ray;
+}
+
+}  // namespace scolopax::reference
