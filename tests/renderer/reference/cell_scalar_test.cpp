@@ -53,10 +53,13 @@ TEST(CellScalar, StaysWithinItsBoundsAndTheseWithinTheCorners) {
 }
 
 TEST(CellScalar, OfAConstantCellIsExactlyThatConstant) {
-  std::array<double, 8> corners;
-  corners.fill(0.1);
-  const CellScalar scalar(corners, {0.1, 0.7, 0.3}, {0.9, 0.2, 1.0 / 3});
-  for (double u = 0; u <= 1; u += 1.0 / 97) EXPECT_EQ(scalar(u), 0.1);
+  std::mt19937 random(4);
+  for (int trial = 0; trial < 200; ++trial) {
+    RandomCell cell(random);
+    cell.corners.fill(cell.corners[0]);
+    const CellScalar scalar = cell.scalar();
+    for (double u = 0; u <= 1; u += 1.0 / 32) EXPECT_EQ(scalar(u), cell.corners[0]);
+  }
 }
 
 TEST(CellScalar, FindsEveryCrossingThatAFineScanSees) {
