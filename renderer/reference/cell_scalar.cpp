@@ -21,7 +21,7 @@ CellScalar::CellScalar(const std::array<double, 8>& c, const glm::dvec3& p, cons
   b_[1] = (trilinear(c, q.x, p.y, p.z) + trilinear(c, p.x, q.y, p.z) + trilinear(c, p.x, p.y, q.z)) / 3;
   b_[2] = (trilinear(c, p.x, q.y, q.z) + trilinear(c, q.x, p.y, q.z) + trilinear(c, q.x, q.y, p.z)) / 3;
   b_[3] = trilinear(c, q.x, q.y, q.z);
-  // A mean of equal numbers may be off by a rounding error, which must not carry it across a step.
+  // Rounding in the means must not carry a value out of what the corners span, and so across a step.
   const auto [least, most] = std::minmax_element(c.begin(), c.end());
   for (double& b : b_) b = std::clamp(b, *least, *most);
 }

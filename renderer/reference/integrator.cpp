@@ -137,13 +137,13 @@ double voxel(const Channel& channel, std::size_t index) {
   return channel.slope * stored + channel.intercept;
 }
 
-/// The eight voxels around the points of a cell that begins at `cell`, clamped to the edge, x fastest; false
-/// when one of them is not finite.
+/// The eight voxels at the corners of the cell that begins at `cell`, x fastest (where there is one layer
+/// only, it is both); false when one of them is not finite.
 bool fetchCorners(const Channel& channel, const glm::ivec3& dims, const glm::ivec3& cell,
                   std::array<double, 8>& corners) {
   for (int corner = 0; corner < 8; ++corner) {
     const glm::ivec3 offset(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
-    const glm::ivec3 p = glm::clamp(cell + offset, glm::ivec3(0), dims - 1);
+    const glm::ivec3 p = glm::min(cell + offset, dims - 1);
     const std::size_t index =
         std::size_t(p.x) + std::size_t(dims.x) * (std::size_t(p.y) + std::size_t(dims.y) * std::size_t(p.z));
     corners[std::size_t(corner)] = voxel(channel, index);
@@ -185,8 +185,10 @@ RayResult Integrator::trace(const glm::dvec3& originWorld, const glm::dvec3& dir
   for (std::size_t i = 0; i + 1 < ray.cuts.size() && path.opticalDepth <= kOpaqueDepth; ++i) {
     const double begin = ray.cuts[i], end = ray.cuts[i + 1];
     if (!(begin < end)) continue;
-    // Cell [cell, cell+1): cells of the outer half voxels begin at -1 or at the last centre.
-    const glm::dvec3 cell = glm::floor(ray.origin + 0.5 * (begin + end) * ray.direction);
+    // Cell [cell, cell+1) between voxel centres; the outer half voxels, where values are clamped to the edge,
+    // belong to the outermost cells.
+    const glm::dvec3 cell = glm::clamp(glm::floor(ray.origin + 0.5 * (begin + end) * ray.direction),
+                                       glm::dvec3(0), glm::max(glm::dvec3(dims) - 2.0, 0.0));
     const auto inCell = [&](double t) {
       return glm::clamp(ray.origin + t * ray.direction - cell, glm::dvec3(0), glm::dvec3(1));
     };

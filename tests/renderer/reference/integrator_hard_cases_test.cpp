@@ -115,13 +115,25 @@ TEST(ReferenceVoxels, ThatAreNotFiniteEmptyTheCellsTheyBelongTo) {
 }
 
 TEST(ReferenceVoxels, ThatAreNotFiniteCountWithWeightZeroInTheCellOfTheSample) {
+  const auto depthAt = [&](int badRow, double y) {
+    const Volume volume = makeVolume(makeGrid({5, 5, 1}),
+                                     {[&](int i, int j, int) { return i == 2 && j == badRow ? kNaN : 1.0; }});
+    return depthOf(volume, uniform(1, kRed), {-3, y, 0}, {1, 0, 0});
+  };
+  EXPECT_NEAR(depthAt(1, 0), 3, 1e-12);  // row 0 is in the cells [0,1), at whose corners row 1 lies
+  EXPECT_NEAR(depthAt(1, 1), 3, 1e-12);
+  EXPECT_NEAR(depthAt(1, 1.99), 3, 1e-12);
+  EXPECT_NEAR(depthAt(1, 2), 5, 1e-12);      // cells [2,3)
+  EXPECT_NEAR(depthAt(1, -0.25), 3, 1e-12);  // the outer half voxels belong to the outermost cells
+  EXPECT_NEAR(depthAt(3, 4.25), 3, 1e-12);
+  EXPECT_NEAR(depthAt(3, 2), 3, 1e-12);
+  EXPECT_NEAR(depthAt(3, 1.99), 5, 1e-12);
+}
+
+TEST(ReferenceVoxels, ThatAreNotFiniteBesideTheEdgeEmptyTheOuterHalfVoxel) {
   const Volume volume =
-      makeVolume(makeGrid({5, 3, 1}), {[](int i, int j, int) { return i == 2 && j == 1 ? kNaN : 1.0; }});
-  const auto depthAt = [&](double y) { return depthOf(volume, uniform(1, kRed), {-3, y, 0}, {1, 0, 0}); };
-  EXPECT_NEAR(depthAt(0), 3, 1e-12);  // row 0 belongs to the cells [0,1), whose corners row 1 holds
-  EXPECT_NEAR(depthAt(1), 3, 1e-12);
-  EXPECT_NEAR(depthAt(2), 5, 1e-12);      // cells [2,3): row 2 alone, clamped
-  EXPECT_NEAR(depthAt(-0.25), 5, 1e-12);  // cells [-1,0): row 0 alone
+      makeVolume(makeGrid({6, 1, 1}), {[](int i, int, int) { return i == 1 ? kNaN : 1.0; }});
+  EXPECT_NEAR(depthOf(volume, uniform(1, kRed), {-3, 0, 0}, {1, 0, 0}), 3.5, 1e-12);
 }
 
 TEST(ReferenceVoxels, WithoutAFiniteOneNothingIsSeen) {

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "renderer/core/error.h"
+#include "renderer/io/image_file.h"
+#include "server/commands/compare.h"
+#include "server/commands/generate.h"
+
+namespace scolopax {
+namespace {
+
+class Commands : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() /
+              ("scolopax-commands-" + std::to_string(getpid()) + "-" +
+               testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  /// Runs `scolopax ARGUMENTS...` and returns what it prints.
+  static std::string run(std::vector<std::string> arguments) {
+    CLI::App app;
+    addGenerateCommand(app);
+    addCompareCommand(app);
+    std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes a vector
+    testing::internal::CaptureStdout();
+    try {
+      app.parse(arguments);
+    } catch (...) {
+      testing::internal::GetCapturedStdout();
+      throw;
+    }
+    return testing::internal::GetCapturedStdout();
+  }
+
+  std::string writePicture(const std::string& name, int width, glm::vec4 value) const {
+    io::writeImage(path(name), Image{width, 2, std::vector<glm::vec4>(std::size_t(width) * 2, value)}, {});
+    return path(name);
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(Commands, CompareTellsHowFarPicturesAreApart) {
+  const std::string a = writePicture("a.exr", 3, {0.5f, 0.5f, 0.5f, 1}),
+                    b = writePicture("b.tif", 3, {0.25f, 0.25f, 0.25f, 1});
+  const auto json = nlohmann::json::parse(run({"compare", a, b, "--json"}));
+  EXPECT_EQ(json.at("rmse"), 0.25);
+  EXPECT_EQ(json.at("max"), 0.25);
+  EXPECT_NEAR(json.at("psnr").get<double>(), 12.0411998, 1e-6);
+  EXPECT_EQ(run({"compare", a, b}), "rmse 0.25\npsnr 12.0411998 dB\nmax  0.25\n");
+}
+
+TEST_F(Commands, CompareOfEqualPicturesHasNoPsnr) {
+  const std::string a = writePicture("a.exr", 3, {0.5f, 0.5f, 0.5f, 1});
+  const auto json = nlohmann::json::parse(run({"compare", a, a, "--json"}));
+  EXPECT_EQ(json.at("rmse"), 0);
+  EXPECT_EQ(json.at("max"), 0);
+  EXPECT_TRUE(json.at("psnr").is_null());
+}
+
+TEST_F(Commands, CompareRefusesOtherSizesAndFilesThatAreNotThere) {
+  const std::string a = writePicture("a.exr", 3, glm::vec4(0)), b = writePicture("b.exr", 4, glm::vec4(0));
+  EXPECT_THROW(run({"compare", a, b}), Error);
+  EXPECT_THROW(run({"compare", a, path("none.exr")}), Error);
+  EXPECT_THROW(run({"compare", a}), CLI::ParseError);
+}
+
+TEST_F(Commands, GenerateWritesAnNrrdOfTheSizeAskedFor) {
+  run({"generate", "orbitals", path("o.nrrd"), "--size", "10", "--channels", "3"});
+  std::ifstream file(path("o.nrrd"), std::ios::binary);
+  std::stringstream content;
+  content << file.rdbuf();
+  EXPECT_EQ(content.str().substr(0, 4), "NRRD");
+  EXPECT_NE(content.str().find("sizes: 10 10 10 3"), std::string::npos);
+  const auto header = content.str().find("\n\n");
+  ASSERT_NE(header, std::string::npos);
+  EXPECT_EQ(content.str().size() - (header + 2), 10u * 10 * 10 * 3 * 2);
+}
+
+TEST_F(Commands, GenerateRefusesBadUsageAndPlacesItCannotWriteTo) {
+  EXPECT_THROW(run({"generate"}), CLI::ParseError);
+  EXPECT_THROW(run({"generate", "orbitals"}), CLI::ParseError);
+  EXPECT_THROW(run({"generate", "orbitals", path("o.nrrd"), "--size", "1"}), CLI::ParseError);
+  EXPECT_THROW(run({"generate", "orbitals", path("o.nrrd"), "--size", "1025"}), CLI::ParseError);
+  EXPECT_THROW(run({"generate", "orbitals", path("o.nrrd"), "--channels", "13"}), CLI::ParseError);
+  EXPECT_THROW(run({"generate", "orbitals", path("none/o.nrrd"), "--size", "4"}), Error);
+  EXPECT_FALSE(std::filesystem::exists(path("o.nrrd")));
+}
+
+}  // namespace
+}  // namespace scolopax
