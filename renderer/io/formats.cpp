@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::array kFormats = {
     Format{"NIfTI", ".nii, .nii.gz, .hdr + .img", matchesNifti, loadNifti},
+    Format{"NRRD", ".nrrd, .nhdr", matchesNrrd, loadNrrd},
     Format{"raw", "name_XxYxZ_type.raw, .dat, .ivf", matchesRaw, loadRaw},
 };
 
@@ -84,8 +85,12 @@ std::vector<LoadedDataset> loadDatasets(std::span<const fs::path> paths, std::ui
     std::string id = slug;
     for (int suffix = 2; taken(id); ++suffix) id = slug + "-" + std::to_string(suffix);
     std::string title = cleanText(group.files.front().filename().string());
-    auto volume = std::make_shared<const Volume>(group.grid, std::move(group.channels));
-    datasets.push_back({std::move(id), std::move(title), std::move(group.files), std::move(volume)});
+    try {
+      auto volume = std::make_shared<const Volume>(group.grid, std::move(group.channels));
+      datasets.push_back({std::move(id), std::move(title), std::move(group.files), std::move(volume)});
+    } catch (const Error& error) {  // which knows of grids and voxels, not of files
+      throw Error(error.code(), shown(group.files.front()) + ": " + error.what());
+    }
   }
   return datasets;
 }

@@ -1,0 +1,354 @@
+// SPDX-License-Identifier: Apache-2.0
+// NRRD (teem.sourceforge.net/nrrd/format.html), attached and detached, raw and gzip. Read by hand: the header
+// is simple text, and teem takes memory by what it says before looking at the data.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "renderer/core/error.h"
+#include "renderer/io/convert.h"
+#include "renderer/io/format.h"
+#include "renderer/io/nrrd_header.h"
+#include "renderer/io/text.h"
+
+namespace scolopax::io {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::int64_t kMostAxes = 16;  // NRRD_DIM_MAX of the format
+
+StoredType storedType(const NrrdHeader& header) {
+  static const std::map<std::string_view, StoredType> kNames = {
+      {"signed char", StoredType::i8},
+      {"int8", StoredType::i8},
+      {"int8_t", StoredType::i8},
+      {"uchar", StoredType::u8},
+      {"unsigned char", StoredType::u8},
+      {"uint8", StoredType::u8},
+      {"uint8_t", StoredType::u8},
+      {"short", StoredType::i16},
+      {"short int", StoredType::i16},
+      {"signed short", StoredType::i16},
+      {"signed short int", StoredType::i16},
+      {"int16", StoredType::i16},
+      {"int16_t", StoredType::i16},
+      {"ushort", StoredType::u16},
+      {"unsigned short", StoredType::u16},
+      {"unsigned short int", StoredType::u16},
+      {"uint16", StoredType::u16},
+      {"uint16_t", StoredType::u16},
+      {"int", StoredType::i32},
+      {"signed int", StoredType::i32},
+      {"int32", StoredType::i32},
+      {"int32_t", StoredType::i32},
+      {"uint", StoredType::u32},
+      {"unsigned int", StoredType::u32},
+      {"uint32", StoredType::u32},
+      {"uint32_t", StoredType::u32},
+      {"longlong", StoredType::i64},
+      {"long long", StoredType::i64},
+      {"long long int", StoredType::i64},
+      {"signed long long", StoredType::i64},
+      {"signed long long int", StoredType::i64},
+      {"int64", StoredType::i64},
+      {"int64_t", StoredType::i64},
+      {"ulonglong", StoredType::u64},
+      {"unsigned long long", StoredType::u64},
+      {"unsigned long long int", StoredType::u64},
+      {"uint64", StoredType::u64},
+      {"uint64_t", StoredType::u64},
+      {"float", StoredType::f32},
+      {"double", StoredType::f64},
+  };
+  const std::string_view name = header.require("type");
+  const auto found = kNames.find(std::string_view(lowerCase(name)));
+  if (found == kNames.end()) throw header.unsupported("type", "a scalar type", name);
+  return found->second;
+}
+
+/// One axis of the array, fastest first.
+struct Axis {
+  std::int64_t size = 1;
+  bool spatial = true;
+  std::string kind;  ///< lower case; "" when the header says nothing
+  double spacing = 1;
+  std::optional<glm::dvec3> direction;
+};
+
+glm::dvec3 parseVector(const NrrdHeader& header, std::string_view field, std::string_view text) {
+  glm::dvec3 vector;
+  std::string_view rest = text;
+  const bool enclosed = rest.starts_with('(') && rest.ends_with(')') && rest.size() >= 2;
+  if (enclosed) rest = rest.substr(1, rest.size() - 2);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto comma = rest.find(',');
+    const auto value = parseNumber(trimmed(rest.substr(0, comma)));
+    const bool last = comma == std::string_view::npos;
+    if (!enclosed || !value || !std::isfinite(*value) || last != (axis == 2)) {
+      throw header.bad(field, "vectors of three numbers such as (1,0,0)", text);
+    }
+    vector[axis] = *value;
+    if (!last) rest.remove_prefix(comma + 1);
+  }
+  return vector;
+}
+
+/// "(1,0,0) none (0, 1, 0)" in its parts: spaces inside the brackets do not separate.
+std::vector<std::string> splitVectors(std::string_view text) {
+  std::vector<std::string> parts;
+  bool inside = false, open = false;
+  for (const char c : text) {
+    if (c == '(') inside = true;
+    const bool blank = c == ' ' || c == '\t';
+    if (!blank || inside) {
+      if (!open) parts.emplace_back();
+      open = true;
+      if (!blank) parts.back() += c;
+    } else {
+      open = false;
+    }
+    if (c == ')') inside = open = false;
+  }
+  return parts;
+}
+
+std::vector<Axis> readAxes(const NrrdHeader& header, const Warn& warn) {
+  const auto dimension = parseInteger(header.require("dimension"));
+  if (!dimension || *dimension < 1 || *dimension > kMostAxes) {
+    throw header.bad("dimension", "1 to 16", header.require("dimension"));
+  }
+  std::vector<Axis> axes(static_cast<std::size_t>(*dimension));
+  // The field's words, one an axis.
+  const auto perAxis = [&](const char* field, std::string_view text, const auto& words, auto&& take) {
+    if (words.size() != axes.size()) throw header.bad(field, std::to_string(axes.size()) + " entries", text);
+    for (std::size_t i = 0; i < axes.size(); ++i) take(axes[i], words[i]);
+  };
+  const std::string_view sizes = header.require("sizes");
+  perAxis("sizes", sizes, splitWords(sizes), [&](Axis& axis, std::string_view word) {
+    const auto size = parseInteger(word);
+    if (!size || *size < 1) throw header.bad("sizes", "whole numbers, 1 or more", sizes);
+    axis.size = *size;
+  });
+  if (const auto kinds = header.find("kinds")) {
+    perAxis("kinds", *kinds, splitWords(*kinds), [&](Axis& axis, std::string_view word) {
+      axis.kind = lowerCase(word);
+      static constexpr std::array kSpatial{"domain", "space", "none", "???"};
+      axis.spatial = std::ranges::find(kSpatial, axis.kind) != kSpatial.end();
+      if (axis.kind == "complex") throw header.unsupported("kinds", "real voxels", word);
+    });
+  }
+  if (const auto spacings = header.find("spacings")) {
+    perAxis("spacings", *spacings, splitWords(*spacings), [&](Axis& axis, std::string_view word) {
+      const auto spacing = parseNumber(word);
+      if (!spacing) throw header.bad("spacings", "numbers", *spacings);
+      if (std::isfinite(*spacing) && *spacing != 0)
+        axis.spacing = *spacing;
+      else if (axis.spatial && !std::isnan(*spacing) && warn)
+        warn(header.file + ": spacings: 0 or infinite, taken as 1");
+    });
+  }
+  if (const auto directions = header.find("space directions")) {
+    perAxis("space directions", *directions, splitVectors(*directions),
+            [&](Axis& axis, const std::string& word) {
+              axis.spatial = lowerCase(word) != "none";
+              if (axis.spatial) axis.direction = parseVector(header, "space directions", word);
+            });
+  }
+  return axes;
+}
+
+/// Signs that bring the header's space to RAS; nothing is known of other spaces, which stay as they are.
+glm::dvec3 rasSigns(const NrrdHeader& header) {
+  if (const auto dimension = header.find("space dimension"); dimension && *dimension != "3") {
+    throw header.unsupported("space dimension", "3", *dimension);
+  }
+  const auto space = header.find("space");
+  if (!space) return glm::dvec3(1);
+  const std::string name = lowerCase(*space);
+  if (name == "right-anterior-superior" || name == "ras") return {1, 1, 1};
+  if (name == "left-anterior-superior" || name == "las") return {-1, 1, 1};
+  if (name == "left-posterior-superior" || name == "lps") return {-1, -1, 1};
+  if (name == "scanner-xyz" || name == "3d-right-handed" || name == "3d-left-handed") return {1, 1, 1};
+  throw header.unsupported("space", "a space of three dimensions", *space);
+}
+
+/// Dims, channels and grid from the axes: up to three spatial ones and at most one other at either end.
+struct Arrangement {
+  VoxelLayout layout;
+  Grid grid;
+};
+
+Arrangement arrange(const NrrdHeader& header, const Warn& warn) {
+  const std::vector<Axis> axes = readAxes(header, warn);
+  Arrangement result;
+  std::vector<const Axis*> spatial;
+  const Axis* other = nullptr;
+  for (const Axis& axis : axes) {
+    if (axis.spatial) {
+      spatial.push_back(&axis);
+      continue;
+    }
+    if (other)
+      throw header.unsupported("kinds", "at most one axis that is not spatial",
+                               std::to_string(axes.size()) + " axes");
+    if (&axis != &axes.front() && &axis != &axes.back()) {
+      throw header.unsupported("kinds", "the axis that is not spatial first or last", axis.kind);
+    }
+    other = &axis;
+  }
+  if (spatial.empty() || spatial.size() > 3) {
+    throw header.unsupported("kinds", "1 to 3 spatial axes and the others marked (list, vector, none)",
+                             std::to_string(spatial.size()) + " spatial axes");
+  }
+  std::array<std::int64_t, 3> dims{1, 1, 1};
+  for (std::size_t i = 0; i < spatial.size(); ++i) dims[i] = spatial[i]->size;
+  VoxelLayout& layout = result.layout;
+  layout.dims = checkedDims(header.file + ": sizes", dims[0], dims[1], dims[2]);
+  if (other && other->kind == "time") {
+    if (other != &axes.back()) throw header.unsupported("kinds", "time as the last axis", other->kind);
+    if (other->size > 1 && warn) {
+      warn(header.file + ": kinds: the first of " + std::to_string(other->size) + " time steps is loaded, " +
+           std::to_string(other->size - 1) + " are left out");
+    }
+  } else if (other) {
+    if (other->size > kMaxChannels) {
+      throw header.unsupported("sizes", "at most " + std::to_string(kMaxChannels) + " channels",
+                               std::to_string(other->size));
+    }
+    layout.channels = int(other->size);
+    layout.interleaved = other == &axes.front() && axes.size() > 1;
+  }
+
+  const glm::dvec3 signs = rasSigns(header);
+  glm::dmat4& m = result.grid.worldFromVoxel;
+  for (int i = 0; i < int(spatial.size()); ++i) {
+    const Axis& axis = *spatial[std::size_t(i)];
+    glm::dvec3 step(0);
+    step[i] = axis.spacing;
+    m[i] = glm::dvec4(signs * axis.direction.value_or(step), 0);
+  }
+  if (const auto origin = header.find("space origin")) {
+    m[3] = glm::dvec4(signs * parseVector(header, "space origin", *origin), 1);
+  } else if (header.find("axis mins") && warn) {
+    warn(header.file + ": axis mins: is not used, the origin is 0");
+  }
+  result.grid.dims = layout.dims;
+  return result;
+}
+
+/// What the data file's name says of several files, which are not read.
+void refuseManyFiles(const NrrdHeader& header, std::string_view name) {
+  const auto words = splitWords(name);
+  const bool pattern = words.size() >= 4 && words[0].find('%') != std::string_view::npos;
+  if (words.empty() || words[0] == "LIST" || pattern) {
+    throw header.unsupported("data file", "one file", name.empty() ? "LIST" : name);
+  }
+}
+
+std::int64_t skipField(const NrrdHeader& header, const char* field, std::int64_t smallest) {
+  const auto text = header.find(field);
+  if (!text) return 0;
+  const auto value = parseInteger(*text);
+  if (!value || *value < smallest)
+    throw header.bad(field, "a whole number, at least " + std::to_string(smallest), *text);
+  return *value;
+}
+
+/// The byte behind `lines` line ends, counted from `offset`.
+std::uint64_t offsetBehindLines(const NrrdHeader& header, const fs::path& data, std::uint64_t offset,
+                                std::int64_t lines) {
+  if (lines == 0) return offset;
+  ByteStream stream(data, ByteStream::Encoding::plain, offset);
+  std::array<char, 1 << 14> buffer;
+  for (std::uint64_t at = offset;;) {
+    const std::size_t got = stream.readSome(std::as_writable_bytes(std::span(buffer)));
+    if (got == 0)
+      throw header.bad("line skip", "no more lines than the data file has", std::to_string(lines));
+    for (std::size_t i = 0; i < got; ++i, ++at) {
+      if (buffer[i] == '\n' && --lines == 0) return at + 1;
+    }
+  }
+}
+
+double pairNumber(const NrrdHeader& header, const std::string& key, double otherwise) {
+  const auto pair = header.pairs.find(key);
+  if (pair == header.pairs.end()) return otherwise;
+  const auto value = parseNumber(trimmed(pair->second));
+  if (!value || !std::isfinite(*value)) throw header.bad(key, "a number", pair->second);
+  return *value;
+}
+
+/// Names, units and scales from the key/value pairs of writeNrrd.
+void describeChannels(const NrrdHeader& header, const std::string& stem,
+                      std::vector<ChannelSource>& channels) {
+  const auto textOf = [&](const std::string& key) {
+    const auto pair = header.pairs.find(key);
+    return pair == header.pairs.end() ? std::string() : cleanText(pair->second);
+  };
+  const auto kind = lowerCase(header.find("kinds").value_or(""));
+  const bool rgb = channels.size() >= 3 && kind.find("rgb") != std::string::npos;
+  static constexpr std::array kColors{"red", "green", "blue", "alpha"};
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    const std::string key = "channel " + std::to_string(i) + " ";
+    ChannelSource& channel = channels[i];
+    channel.name = textOf(key + "name");
+    channel.unit = textOf(key + "unit");
+    if (channel.unit.empty()) channel.unit = cleanText(header.find("sample units").value_or(""));
+    if (channel.name.empty()) {
+      channel.name =
+          channels.size() == 1 ? stem : stem + " " + (rgb && i < 4 ? kColors[i] : std::to_string(i));
+    }
+    channel.slope = pairNumber(header, key + "slope", 1);
+    if (channel.slope == 0) throw header.bad(key + "slope", "a number other than 0", "0");
+    channel.intercept = pairNumber(header, key + "intercept", 0);
+  }
+}
+
+}  // namespace
+
+bool matchesNrrd(const fs::path& path) { return hasEnding(path, ".nrrd") || hasEnding(path, ".nhdr"); }
+
+LoadedFile loadNrrd(const fs::path& path, std::uint64_t memoryLimitBytes, const Warn& warn) {
+  const NrrdHeader header(path);
+  auto [layout, grid] = arrange(header, warn);
+  layout.type = storedType(header);
+  if (sizeBytes(layout.type) > 1) {
+    const std::string order = lowerCase(header.require("endian"));
+    layout.bigEndian = order == "big";
+    if (order != "big" && order != "little") throw header.bad("endian", "little or big", order);
+  }
+  const std::string encoding = lowerCase(header.require("encoding"));
+  const bool packed = encoding == "gzip" || encoding == "gz";
+  if (!packed && encoding != "raw") throw header.unsupported("encoding", "raw or gzip", encoding);
+
+  fs::path data = path;
+  std::uint64_t start = 0;
+  if (const auto name = header.find("data file")) {
+    refuseManyFiles(header, *name);
+    data = resolveDataFile(path, "data file", *name);
+  } else if (header.attachedOffset) {
+    start = *header.attachedOffset;
+  } else {
+    throw Error(ErrorCode::badInput,
+                header.file + ": header: expected an empty line and data behind it, or a data file");
+  }
+  start = offsetBehindLines(header, data, start, skipField(header, "line skip", 0));
+
+  const std::int64_t byteSkip = skipField(header, "byte skip", -1);
+  ByteStream stream(data, packed ? ByteStream::Encoding::gzip : ByteStream::Encoding::plain, start);
+  std::uint64_t offset = std::uint64_t(std::max<std::int64_t>(byteSkip, 0));
+  if (byteSkip == -1) {  // the voxels are the file's last bytes
+    if (packed) throw header.bad("byte skip", "0 or more for gzip data", "-1");
+    checkFileHolds(stream, layout, 0);
+    offset = stream.largestSize() - layout.sizeBytes();
+  }
+  LoadedFile loaded;
+  loaded.grid = grid;
+  loaded.channels = readChannels(stream, offset, layout, memoryLimitBytes, warn);
+  describeChannels(header, stemOf(path), loaded.channels);
+  return loaded;
+}
+
+}  // namespace scolopax::io
