@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+# make run     build everything, make the demo data if DATA names none, serve it on loopback
+# make test    build and run the tests; make check adds sanitizers, clang-tidy, full statistics and fuzzing
+DATA ?=
+PORT ?= 8080
+JOBS ?= $(shell nproc)
+DEMO := build/demo/orbitals.nrrd
+SCOLOPAX := build/release/scolopax
+
+.PHONY: run build web test check check-asan-ubsan check-tsan check-tidy check-fuzz check-format deps test-deps format clean
+
+run: build web $(if $(strip $(DATA)),,$(DEMO))
+	exec $(SCOLOPAX) serve $(if $(strip $(DATA)),$(DATA),$(DEMO)) --port $(PORT)
+
+$(DEMO): | build
+	mkdir -p $(dir $@)
+	$(SCOLOPAX) generate orbitals $@
+
+# BUILD_TESTING=OFF would make this tree another one than `make test` uses; tests are just not built here.
+build: deps
+	cmake --preset release > /dev/null
+	cmake --build --preset release --target scolopax -j $(JOBS)
+
+web: deps
+	cd client_web && npm run --silent build
+
+test: test-deps web
+	cmake --preset release > /dev/null
+	cmake --build --preset release -j $(JOBS)
+	ctest --test-dir build/release -LE slow --output-on-failure
+
+check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz
+	ctest --test-dir build/release -L slow --output-on-failure --no-tests=ignore
+
+check-asan-ubsan check-tsan: check-%: test-deps
+	cmake --preset $* > /dev/null
+	cmake --build --preset $* -j $(JOBS)
+	ctest --test-dir build/$* -LE 'slow|web|statistics' --output-on-failure
+
+check-fuzz: test-deps
+	cmake --preset fuzz > /dev/null
+	cmake --build --preset fuzz -j $(JOBS)
+	ctest --test-dir build/fuzz -L fuzz --output-on-failure
+
+check-tidy: build
+	git ls-files 'renderer/*.cpp' 'protocol/*.cpp' 'server/*.cpp' | xargs -P $(JOBS) -n 4 clang-tidy --quiet -p build/release
+
+check-format: test-deps
+	git ls-files '*.cpp' '*.h' | xargs clang-format --dry-run --Werror
+
+format:
+	git ls-files '*.cpp' '*.h' | xargs clang-format -i
+
+deps:
+	@.ci/install build
+
+test-deps:
+	@.ci/install build test
+
+clean:
+	rm -rf build client_web/dist client_web/node_modules

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/commands/info.h"
+
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "server/dataset_store.h"
+
+namespace scolopax {
+namespace {
+
+void printText(const server::Dataset& dataset) {
+  const Grid& grid = dataset.volume->grid();
+  const glm::dvec3 spacing = grid.spacing();
+  fmt::print("{}: {} x {} x {} voxels, spacing {:g} x {:g} x {:g}, diagonal {:g}\n", dataset.id, grid.dims.x,
+             grid.dims.y, grid.dims.z, spacing.x, spacing.y, spacing.z, grid.diagonal());
+  int index = 0;
+  for (const Channel& channel : dataset.volume->channels()) {
+    const Histogram& h = channel.histogram;
+    fmt::print("  {:2} {:<28} {:<4} {:g} .. {:g}{}{}", index++, channel.name, nameOf(channel.voxels.type()),
+               h.minimum, h.maximum, channel.unit.empty() ? "" : " ", channel.unit);
+    if (h.nonFiniteCount > 0) fmt::print(", {} voxels not finite", h.nonFiniteCount);
+    fmt::print("\n");
+  }
+}
+
+}  // namespace
+
+CLI::App* addInfoCommand(CLI::App& root) {
+  struct Options {
+    std::vector<std::filesystem::path> paths;
+    bool json = false;
+  };
+  CLI::App* command = root.add_subcommand(
+      "info", "Say what files hold: dimensions, spacing, and each channel's name, type and range");
+  const auto options = std::make_shared<Options>();
+  command->add_option("PATH", options->paths, "Volume files; those of one grid are one data set")->required();
+  command->add_flag("--json", options->json, "Print JSON, as GET /api/v1/datasets/ID answers");
+  command->callback([options] {
+    const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
+    const auto datasets = io::loadDatasets(options->paths, io::defaultMemoryLimitBytes(), warn);
+    if (options->json) {
+      nlohmann::json list = nlohmann::json::array();
+      for (const auto& dataset : datasets) list.push_back(server::describeJson(dataset));
+      fmt::print("{}\n", list.dump(2));
+      return;
+    }
+    for (const auto& dataset : datasets) printText(dataset);
+  });
+  return command;
+}
+
+}  // namespace scolopax

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/commands/render.h"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "protocol/json_text.h"
+#include "renderer/core/error.h"
+#include "renderer/io/image_file.h"
+#include "renderer/renderer.h"
+#include "server/dataset_store.h"
+#include "server/scene_resolver.h"
+
+namespace scolopax {
+namespace {
+
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+struct Options {
+  std::string scene;
+  std::vector<std::filesystem::path> data;
+  std::filesystem::path out;
+  std::optional<std::uint32_t> samples;
+  std::optional<double> seconds, error;
+  std::vector<std::string> assignments;
+  std::filesystem::path stats;
+  int threads = 0;
+};
+
+json readScene(const std::string& path) {
+  if (path.empty()) return json::object();
+  std::ifstream file(path, std::ios::binary);
+  std::stringstream text;
+  if (!file || !(text << file.rdbuf())) throw Error(ErrorCode::io, path + ": cannot be read");
+  return protocol::parseJson(text.str(), {});
+}
+
+/// "channels.0.density=0.1" as the merge patch {"channels": {"0": {"density": 0.1}}}.
+json patchOf(const std::string& assignment) {
+  const auto equals = assignment.find('=');
+  if (equals == std::string::npos || equals == 0)
+    throw CLI::ValidationError("--set", "expected PATH=VALUE, found '" + assignment + "'");
+  const std::string text = assignment.substr(equals + 1);
+  json patch = json::parse(text, nullptr, false);
+  if (patch.is_discarded()) patch = text;
+  std::vector<std::string> keys;
+  std::stringstream path(assignment.substr(0, equals));
+  for (std::string key; std::getline(path, key, '.');) keys.push_back(key);
+  for (auto key = keys.rbegin(); key != keys.rend(); ++key) patch = json{{*key, std::move(patch)}};
+  return patch;
+}
+
+/// A line that is rewritten while one watches; nothing where nobody does.
+class ProgressBar {
+ public:
+  explicit ProgressBar(const server::StopRule& stop) : stop_(stop) {}
+  void show(std::uint32_t samples, double seconds) {
+    if (!terminal_ || seconds - shown_ < 0.1) return;
+    shown_ = seconds;
+    double done = stop_.samples > 0 ? double(samples) / stop_.samples : 0;
+    if (stop_.seconds > 0) done = std::max(done, seconds / stop_.seconds);
+    const int filled = int(std::min(done, 1.0) * kWidth);
+    fmt::print(stderr, "\r[{:=<{}}{: <{}}] {} samples, {:.1f} s ", "", filled, "", kWidth - filled, samples, seconds);
+    std::fflush(stderr);
+  }
+  void clear() const {
+    if (terminal_ && shown_ > 0) fmt::print(stderr, "\r{: <{}}\r", "", kWidth + 40);
+  }
+
+ private:
+  static constexpr int kWidth = 40;
+  server::StopRule stop_;
+  bool terminal_ = isatty(STDERR_FILENO) == 1;
+  double shown_ = 0;
+};
+
+void writeStats(const std::filesystem::path& path, const Renderer& renderer, const RebuildStats& rebuild,
+                double seconds, const server::ResolvedScene& scene) {
+  const RenderStats counts = renderer.stats();
+  const double error = renderer.estimatedError();
+  const json stats = {{"samples", renderer.samples()},
+                      {"seconds", seconds},
+                      {"estimatedError", std::isfinite(error) ? json(error) : json(nullptr)},
+                      {"rebuildMs", rebuild.rebuildMs},
+                      {"backend", renderer.backendName()},
+                      {"method", nameOf(scene.render.method)},
+                      {"seed", scene.render.seed},
+                      {"rays", counts.rays},
+                      {"fetches", counts.fetches},
+                      {"cellSteps", counts.cellSteps},
+                      {"randomBlocks", counts.randomBlocks},
+                      {"truncatedRays", counts.truncatedRays},
+                      {"scene", scene.resolved}};
+  std::ofstream file(path);
+  if (!(file << stats.dump(2) << '\n')) throw Error(ErrorCode::io, path.string() + ": cannot be written");
+}
+
+void render(const Options& options) {
+  io::checkImageName(options.out);  // before minutes are spent on a picture that cannot be written
+  json scene = readScene(options.scene);
+  const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
+  const auto store = std::make_shared<server::DatasetStore>(
+      io::loadDatasets(options.data, io::defaultMemoryLimitBytes(), warn));
+  const server::SceneResolver resolver(store, {});
+  auto resolved = resolver.replace(scene);
+  for (const std::string& assignment : options.assignments) resolved = resolver.patch(*resolved, patchOf(assignment));
+  server::StopRule stop = resolved->stop;
+  // A rule on the command line replaces the scene's: what is asked for last is what is meant.
+  if (options.samples || options.seconds || options.error)
+    stop = {options.samples.value_or(0), options.seconds.value_or(0), options.error.value_or(0)};
+
+  const auto renderer = makeCpuRenderer(resolved->dataset->volume, options.threads);
+  if (!options.stats.empty()) renderer->countCosts();
+  const RebuildStats rebuild = renderer->setScene(resolved->render);
+  const std::atomic<bool> cancel = false;
+  ProgressBar bar(stop);
+  const auto start = Clock::now();
+  double seconds = 0;
+  while (true) {
+    renderer->renderSample(cancel);
+    seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    bar.show(renderer->samples(), seconds);
+    if (stop.samples > 0 && renderer->samples() >= stop.samples) break;
+    if (stop.seconds > 0 && seconds >= stop.seconds) break;
+    // From 16 samples on: fewer can look alike by chance, and the estimate with them.
+    if (stop.error > 0 && renderer->samples() >= 16 && renderer->estimatedError() <= stop.error) break;
+  }
+  bar.clear();
+  io::writeImage(options.out, renderer->image(), resolved->render.background);
+  if (!options.stats.empty()) writeStats(options.stats, *renderer, rebuild, seconds, *resolved);
+}
+
+}  // namespace
+
+CLI::App* addRenderCommand(CLI::App& root) {
+  CLI::App* command = root.add_subcommand("render", "Render a scene into a picture file");
+  const auto o = std::make_shared<Options>();
+  command->add_option("SCENE", o->scene, "Scene file (JSON, see PROTOCOL.md); without one, a good first picture");
+  command->add_option("--data", o->data, "Volume files; those of one grid are one data set")->required();
+  command->add_option("-o,--output", o->out,
+                      "Picture: .png or .jpg (sRGB, over the background), .exr or .tif (float, linear premultiplied RGBA)")
+      ->required();
+  command->add_option("--samples", o->samples, "Stop at so many samples a pixel")->check(CLI::Range(1u, 1u << 24));
+  command->add_option("--seconds", o->seconds, "Stop after this time")->check(CLI::PositiveNumber);
+  command->add_option("--error", o->error, "Stop at this estimated RMSE over linear RGB")->check(CLI::PositiveNumber);
+  command->add_option("--set", o->assignments,
+                      "Set a field of the scene, as channels.0.density=0.1; the value is JSON, else a string")
+      ->allow_extra_args(false);
+  command->add_option("--threads", o->threads, "Threads to use; 0 takes all")->check(CLI::Range(0, 1024));
+  command->add_option("--stats", o->stats, "Write counts and times as JSON");
+  command->footer("With several stop rules the first that is met ends the rendering; without any, the scene's (64 samples).");
+  command->callback([o] { render(*o); });
+  return command;
+}
+
+}  // namespace scolopax
