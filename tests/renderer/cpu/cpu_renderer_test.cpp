@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <thread>
+
+#include "renderer/core/error.h"
+#include "renderer/generate/orbitals.h"
+#include "renderer/renderer.h"
+#include "tests/support/volumes.h"
+
+namespace scolopax {
+namespace {
+
+using namespace test;
+
+const std::atomic<bool> kNever = false;
+
+std::shared_ptr<const Volume> orbitals() {
+  GeneratedVolume generated = generateOrbitals(24, 3);
+  return std::make_shared<const Volume>(generated.grid, std::move(generated.channels));
+}
+
+Scene orbitalScene(const Volume& volume) {
+  Scene scene;
+  scene.width = 50;  // neither a multiple of the tile
+  scene.height = 37;
+  scene.camera = framingCamera(volume.grid(), 35, 50.0 / 37.0);
+  scene.channels.resize(volume.channels().size());
+  for (std::size_t i = 0; i < scene.channels.size(); ++i) {
+    scene.channels[i].rangeHi = volume.channels()[i].histogram.maximum;
+    scene.channels[i].density = 0.5;
+    scene.channels[i].color = {{0, glm::dvec3(i == 0, i == 1, i == 2)}};
+  }
+  return scene;
+}
+
+bool sameBits(const Image& a, const Image& b) {
+  return a.pixels.size() == b.pixels.size() &&
+         std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(a.pixels[0])) == 0;
+}
+
+Image render(const std::shared_ptr<const Volume>& volume, const Scene& scene, int samples, int threads) {
+  const auto renderer = makeCpuRenderer(volume, threads);
+  renderer->setScene(scene);
+  for (int i = 0; i < samples; ++i) renderer->renderSample(kNever);
+  return renderer->image();
+}
+
+TEST(CpuRenderer, GivesTheSameBitsForAnyNumberOfThreads) {
+  const auto volume = orbitals();
+  for (const Method method : {Method::superposed, Method::syncDda}) {
+    Scene scene = orbitalScene(*volume);
+    scene.method = method;
+    const Image one = render(volume, scene, 5, 1);
+    EXPECT_TRUE(sameBits(one, render(volume, scene, 5, 2)));
+    EXPECT_TRUE(sameBits(one, render(volume, scene, 5, 0)));
+    scene.seed = 1;
+    EXPECT_FALSE(sameBits(one, render(volume, scene, 5, 2)));
+  }
+}
+
+TEST(CpuRenderer, KeepsASampleIndependentOfHowManyCameBefore) {
+  // Sample 3 is sample 3, also when the first two were rendered by another renderer: no sample is lost or
+  // repeated.
+  const auto volume = orbitals();
+  const Scene scene = orbitalScene(*volume);
+  const Image three = render(volume, scene, 3, 2), four = render(volume, scene, 4, 2);
+  double difference = 0;
+  for (std::size_t i = 0; i < three.pixels.size(); ++i) {
+    const glm::vec4 fourth = four.pixels[i] * 4.0f - three.pixels[i] * 3.0f;
+    for (int c = 0; c < 4; ++c) {  // every sample of this scene is 0 or 1
+      const float nearest = fourth[c] < 0.5f ? 0.0f : 1.0f;
+      ASSERT_NEAR(fourth[c], nearest, 1e-5);
+    }
+    difference += fourth.a;
+  }
+  EXPECT_GT(difference, 0);
+}
+
+TEST(CpuRenderer, LeavesTheFilmAsItWasWhenAPassIsCancelled) {
+  const auto volume = orbitals();
+  const auto renderer = makeCpuRenderer(volume, 2);
+  renderer->setScene(orbitalScene(*volume));
+  renderer->renderSample(kNever);
+  const Image before = renderer->image();
+  const std::atomic<bool> always = true;
+  EXPECT_FALSE(renderer->renderSample(always));
+  EXPECT_EQ(renderer->samples(), 1u);
+  EXPECT_TRUE(sameBits(before, renderer->image()));
+  EXPECT_TRUE(renderer->renderSample(kNever));
+  EXPECT_TRUE(sameBits(renderer->image(), render(volume, orbitalScene(*volume), 2, 2)));
+}
+
+TEST(CpuRenderer, RebuildsOnlyTheEditedChannelAndNothingForAColour) {
+  const auto volume = orbitals();
+  const auto renderer = makeCpuRenderer(volume, 2);
+  Scene scene = orbitalScene(*volume);
+  RebuildStats stats = renderer->setScene(scene);
+  EXPECT_EQ(stats.majorantChannels, 3);
+  EXPECT_TRUE(stats.filmReset);
+
+  scene.channels[1].opacity = {{0, 0}, {0.5, 1}};
+  stats = renderer->setScene(scene);
+  EXPECT_EQ(stats.majorantChannels, 1);
+  EXPECT_EQ(stats.macrocellChannels, 0);
+  EXPECT_TRUE(stats.filmReset);
+
+  scene.channels[2].color = {{0, {1, 1, 0}}};
+  scene.camera.eye.x += 1;
+  stats = renderer->setScene(scene);
+  EXPECT_EQ(stats.majorantChannels, 0);
+  EXPECT_TRUE(stats.filmReset);
+
+  scene.background = {1, 1, 1};  // added to the finished image
+  stats = renderer->setScene(scene);
+  EXPECT_FALSE(stats.filmReset);
+
+  scene.channels[0].visible = false;
+  EXPECT_EQ(renderer->setScene(scene).majorantChannels, 0);
+  scene.channels[0].visible = true;
+  EXPECT_EQ(renderer->setScene(scene).majorantChannels, 0);
+
+  scene.macrocell = 8;
+  stats = renderer->setScene(scene);
+  EXPECT_EQ(stats.macrocellChannels, 3);
+  EXPECT_EQ(stats.majorantChannels, 3);
+}
+
+TEST(CpuRenderer, DrawsAfterAnySequenceOfEditsWhatAFreshRendererDraws) {
+  const auto volume = orbitals();
+  const auto edited = makeCpuRenderer(volume, 2);
+  Scene scene = orbitalScene(*volume);
+  const std::vector<std::function<void(Scene&)>> edits = {
+      [](Scene& s) { s.channels[0].visible = false; },
+      [](Scene& s) {
+        s.channels[0].opacity = {{0, 0}, {0.1, 1}};
+      },  // while hidden
+      [](Scene& s) { s.channels[0].visible = true; },
+      [](Scene& s) { s.channels[1].density = 0; },
+      [](Scene& s) { s.macrocell = 3; },
+      [](Scene& s) { s.channels[1].density = 2; },
+      [](Scene& s) {
+        s.channels[2].color = {{0, {1, 0, 1}}};
+      },
+      [](Scene& s) { s.width = 20, s.height = 61; },
+      [](Scene& s) { s.channels[2].rangeHi *= 0.3; },
+  };
+  edited->setScene(scene);
+  edited->renderSample(kNever);
+  for (std::size_t i = 0; i < edits.size(); ++i) {
+    edits[i](scene);
+    edited->setScene(scene);
+    EXPECT_EQ(edited->samples(), 0u);  // no mixing of two scenes in one image
+    edited->renderSample(kNever);
+    EXPECT_TRUE(sameBits(edited->image(), render(volume, scene, 1, 2))) << "edit " << i;
+  }
+}
+
+TEST(CpuRenderer, KeepsPlanAndFilmWhenASceneIsRefused) {
+  const auto volume = orbitals();
+  const auto renderer = makeCpuRenderer(volume, 2);
+  const Scene good = orbitalScene(*volume);
+  renderer->setScene(good);
+  renderer->renderSample(kNever);
+  const std::vector<std::function<void(Scene&)>> mistakes = {
+      [](Scene& s) { s.channels.pop_back(); },
+      [](Scene& s) { s.width = 0; },
+      [](Scene& s) { s.height = 1 << 30; },
+      [](Scene& s) { s.macrocell = 0; },
+      [](Scene& s) { s.camera.eye = s.camera.target; },
+      [](Scene& s) {
+        s.channels[0].opacity = {{0.5, 1}, {0.2, 1}};
+      },
+      [](Scene& s) { s.channels[0].opacity.clear(); },
+      [](Scene& s) { s.channels[1].gamma = 0; },
+      [](Scene& s) { s.channels[1].rangeHi = std::numeric_limits<double>::quiet_NaN(); },
+  };
+  for (std::size_t i = 0; i < mistakes.size(); ++i) {
+    Scene bad = good;
+    mistakes[i](bad);
+    EXPECT_THROW(renderer->setScene(bad), Error) << "mistake " << i;
+    EXPECT_EQ(renderer->samples(), 1u);
+  }
+  renderer->renderSample(kNever);
+  EXPECT_TRUE(sameBits(renderer->image(), render(volume, good, 2, 2)));
+}
+
+TEST(CpuRenderer, SpendsNothingOnChannelsThatCannotBeSeen) {
+  const auto volume = orbitals();
+  const auto fetchesOf = [&](const Scene& scene) {
+    const auto renderer = makeCpuRenderer(volume, 2);
+    renderer->countCosts();
+    renderer->setScene(scene);
+    renderer->renderSample(kNever);
+    return renderer->stats().fetches;
+  };
+  Scene one = orbitalScene(*volume);
+  one.channels[0].visible = one.channels[2].visible = false;
+  Scene transparent = orbitalScene(*volume);
+  transparent.channels[0].opacity = {{0, 0}};
+  transparent.channels[2].density = 0;
+  EXPECT_EQ(fetchesOf(one), fetchesOf(transparent));
+  EXPECT_LT(fetchesOf(one), fetchesOf(orbitalScene(*volume)));
+  Scene none = orbitalScene(*volume);
+  for (auto& channel : none.channels) channel.visible = false;
+  EXPECT_EQ(fetchesOf(none), 0u);
+}
+
+TEST(CpuRenderer, EstimatesTheErrorThatIsThere) {
+  // Against a picture of 64 times the samples; over 1850 pixels the two agree to a few percent.
+  const auto volume = orbitals();
+  const Scene scene = orbitalScene(*volume);
+  const auto renderer = makeCpuRenderer(volume, 2);
+  renderer->setScene(scene);
+  for (int i = 0; i < 16; ++i) renderer->renderSample(kNever);
+  Scene other = scene;
+  other.seed = 99;
+  const Image truth = render(volume, other, 1024, 2), found = renderer->image();
+  double squares = 0;
+  for (std::size_t i = 0; i < truth.pixels.size(); ++i)
+    for (int c = 0; c < 3; ++c) squares += std::pow(double(found.pixels[i][c] - truth.pixels[i][c]), 2);
+  const double rmse = std::sqrt(squares / (3.0 * double(truth.pixels.size())));
+  EXPECT_NEAR(renderer->estimatedError() / rmse, 1, 0.1);
+  EXPECT_TRUE(std::isnan(makeCpuRenderer(volume, 1)->estimatedError()));
+}
+
+}  // namespace
+}  // namespace scolopax

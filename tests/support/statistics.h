@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// Is an analog picture's expected value the reference's? Three questions, each with a stated chance of a
+// wrong alarm; seeds are fixed, so a test that passes once passes always.
+#pragma once
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "renderer/data/image.h"
+#include "renderer/reference/render.h"
+#include "renderer/renderer.h"
+
+namespace scolopax::test {
+
+/// `samples` of the scene with one method.
+inline Image renderAnalog(const std::shared_ptr<const Volume>& volume, Scene scene, Method method,
+                          int samples, int threads = 0) {
+  scene.method = method;
+  const auto renderer = makeCpuRenderer(volume, threads);
+  renderer->setScene(scene);
+  const std::atomic<bool> cancel = false;
+  for (int i = 0; i < samples; ++i) renderer->renderSample(cancel);
+  return renderer->image();
+}
+
+/// Compares per pixel and component. Every sample must be 0 or 1 in every component (colours of the scene's
+/// channels have only zeros and ones): the mean is then binomial and its variance known from the reference.
+///  - the largest deviation against Bernstein's inequality, valid for any distribution on [0,1], split over
+///  all
+///    pixels and components: chance of a wrong alarm 1e-9;
+///  - the mean deviation of each component, which shows a small bias of the whole picture: 6 sigma, 1e-8;
+///  - the mean squared deviation, which shows a bias whose sign changes over the picture: 6 sigma.
+inline ::testing::AssertionResult isUnbiased(const Image& found, int samples,
+                                             const reference::ReferenceImage& expected) {
+  const double n = samples;
+  const std::size_t pixels = found.pixels.size();
+  const double logTerm = std::log(2.0 * 4.0 * double(pixels) / 1e-9);
+  const double tolerance = expected.maximumRayError + 1e-6;
+  double squares = 0, variance = 0, varianceOfSquares = 0;
+  for (int c = 0; c < 4; ++c) {
+    double sum = 0, sumVariance = 0;
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const double p = std::clamp(double(expected.image.pixels[i][c]), 0.0, 1.0), pq = p * (1 - p);
+      const double error = expected.standardError.empty() ? 0.0 : double(expected.standardError[i][c]);
+      const double d = double(found.pixels[i][c]) - p;
+      const double bound = (logTerm / 3 + std::sqrt(logTerm * logTerm / 9 + 2 * n * pq * logTerm)) / n;
+      if (!(std::abs(d) <= bound + tolerance + 6 * error))
+        return ::testing::AssertionFailure()
+               << "pixel " << i << " component " << c << ": found " << found.pixels[i][c] << ", expected "
+               << p << " within " << bound;
+      const double v = pq / n + error * error;
+      sum += d;
+      sumVariance += v;
+      squares += d * d;
+      variance += v;
+      varianceOfSquares += 2 * v * v + pq * std::max(0.0, 1 - 6 * pq) / (n * n * n);
+    }
+    if (!(std::abs(sum) <= 6 * std::sqrt(sumVariance) + double(pixels) * tolerance))
+      return ::testing::AssertionFailure() << "component " << c << ": mean deviation " << sum / double(pixels)
+                                           << " is " << sum / std::sqrt(sumVariance) << " sigma";
+  }
+  if (variance > 0 && std::abs(squares - variance) >
+                          6 * std::sqrt(varianceOfSquares) + 4 * double(pixels) * tolerance * tolerance)
+    return ::testing::AssertionFailure()
+           << "mean squared deviation is " << squares / variance << " of what binomial noise gives, "
+           << (squares - variance) / std::sqrt(varianceOfSquares) << " sigma away";
+  return ::testing::AssertionSuccess();
+}
+
+/// Every tracker against a reference picture of the scene.
+inline void expectTrackersMatch(const reference::ReferenceImage& expected,
+                                const std::shared_ptr<const Volume>& volume, const Scene& scene,
+                                int samples) {
+  for (const Method method : {Method::superposed, Method::syncDda})
+    EXPECT_TRUE(isUnbiased(renderAnalog(volume, scene, method, samples), samples, expected))
+        << nameOf(method);
+}
+inline void expectTrackersMatchReference(const std::shared_ptr<const Volume>& volume, const Scene& scene,
+                                         int samples, int samplesPerAxis = 4) {
+  expectTrackersMatch(reference::renderReference(*volume, scene, samplesPerAxis), volume, scene, samples);
+}
+
+}  // namespace scolopax::test
