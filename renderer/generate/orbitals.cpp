@@ -39,8 +39,8 @@ double laguerre(int k, int a, double x) {
 /// States whose lobes interleave inside one box, of similar size where they stand next to each other.
 constexpr struct {
   int n, l, m;
-} kDemoStates[kMaxOrbitals] = {{4, 3, 1}, {3, 2, 0}, {3, 2, 1}, {2, 1, 0}, {4, 3, 3}, {4, 3, 0},
-                               {4, 2, 1}, {3, 2, 2}, {2, 1, 1}, {4, 3, 2}, {4, 2, 0}, {3, 1, 0}};
+} kDemoStates[kMaxOrbitals] = {{4, 3, 0}, {4, 3, 3}, {3, 2, 1}, {3, 2, 0}, {4, 3, 1}, {2, 1, 0},
+                               {4, 3, 2}, {4, 2, 1}, {3, 2, 2}, {2, 1, 1}, {4, 2, 0}, {3, 1, 0}};
 
 }  // namespace
 

@@ -42,7 +42,7 @@ struct GeneratedVolume {
 
 inline constexpr int kMaxOrbitals = 12;
 /// Half the edge of the box that generateOrbitals fills, in a0.
-inline constexpr double kOrbitalBoxHalfEdge = 40;
+inline constexpr double kOrbitalBoxHalfEdge = 36;
 
 /// The state in channel i of generateOrbitals; 0 <= i < kMaxOrbitals.
 HydrogenOrbital demoOrbital(int i);

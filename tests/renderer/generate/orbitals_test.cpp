@@ -192,9 +192,9 @@ TEST(Orbitals, AreDistinctAndFourOfThemOn128CubedByDefault) {
 
 TEST(Orbitals, KeepASlopeWhenEveryVoxelLiesOnANodalSurface) {
   // The centres of 2^3 voxels lie on the diagonals of the cube, where 3d m=0 is 0.
-  const GeneratedVolume volume = generateOrbitals(2, 2);
-  ASSERT_EQ(volume.channels[1].name, "3d m=0");
-  EXPECT_GT(volume.channels[1].slope, 0);
+  const GeneratedVolume volume = generateOrbitals(2, 4);
+  ASSERT_EQ(volume.channels[3].name, "3d m=0");
+  EXPECT_GT(volume.channels[3].slope, 0);
 }
 
 TEST(Orbitals, RefuseSizesAndChannelCountsOutOfRange) {
