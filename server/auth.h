@@ -2,10 +2,12 @@
 // Who may use the server: one token per start, shown by header, cookie or URL. Put before every request and
 // upgrade as net::Options::authorize.
 #pragma once
+#include <cstdint>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/net/message.h"
 
@@ -19,7 +21,7 @@ class TokenError : public std::runtime_error {
 
 /// 256 random bits as 43 URL-safe characters.
 std::string createToken();
-/// The file's one line; throws TokenError unless it is at least 16 printable ASCII characters without spaces.
+/// The file's one line; throws TokenError unless it is 16 to 512 letters, digits and -._~+/= (RFC 6750).
 std::string readTokenFile(const std::string& path);
 /// In a time that depends on the lengths alone.
 bool sameToken(std::string_view a, std::string_view b);
@@ -30,8 +32,9 @@ net::Response problemResponse(int status, const std::string& detail);
 /// Immutable and thread-safe.
 class Authorizer {
  public:
-  /// `loopback`: the server is bound to this machine only, so that any other Host is DNS rebinding.
-  Authorizer(std::string token, bool loopback);
+  /// `loopback`: the server is bound to this machine only, so that a Host that is neither this machine nor
+  /// that of an allowed origin (a proxy in front) is DNS rebinding.
+  Authorizer(std::string token, bool loopback, std::vector<std::string> allowedOrigins = {});
 
   /// nullopt: go on. Otherwise 401, 403, 421, or the 303 that turns `GET /?token=` into a cookie.
   std::optional<net::Response> operator()(const net::Request& request) const;
@@ -39,12 +42,21 @@ class Authorizer {
   const std::string& cookieName() const { return cookieName_; }
 
  private:
+  bool isHostAllowed(const net::Request& request) const;
+  bool hasBearer(const net::Request& request) const;
+  bool hasQueryToken(const net::Request& request) const;
+  bool hasCookie(const net::Request& request) const;
+  net::Response cookieAndRedirect(const net::Request& request) const;
+
   std::string token_;
   std::string cookieName_;  ///< cookies ignore ports: a hash of the token keeps two servers apart
   bool loopback_;
+  std::vector<std::string> allowedOrigins_;
 };
 
 /// Whether `host` (an option's value) can be reached from this machine only.
 bool isLoopback(std::string_view host);
+/// The URL that opens the page, for the ready line; a wildcard address becomes this machine's own.
+std::string tokenUrl(std::string_view host, std::uint16_t port, std::string_view token);
 
 }  // namespace scolopax

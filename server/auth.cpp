@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/auth.h"
+
+#include <openssl/crypto.h>
+#include <openssl/rand.h>
+#include <openssl/sha.h>
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "server/net/url.h"
+
+namespace scolopax {
+namespace {
+
+constexpr std::size_t kTokenBytes = 32;
+constexpr std::size_t kTokenMin = 16;
+constexpr std::size_t kTokenMax = 512;
+
+/// RFC 6750's b64token: what a Bearer header and a cookie can both carry.
+bool isTokenCharacter(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+         std::string_view("-._~+/=").find(c) != std::string_view::npos;
+}
+
+std::string_view withoutPort(std::string_view host) {
+  if (!host.empty() && host.front() == '[') return host.substr(0, host.find(']') + 1);
+  return host.substr(0, host.rfind(':'));
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
+  return text;
+}
+
+std::string_view titleOf(int status) {
+  constexpr std::array<std::pair<int, std::string_view>, 18> kTitles{
+      {{400, "Bad Request"},
+       {401, "Unauthorized"},
+       {403, "Forbidden"},
+       {404, "Not Found"},
+       {405, "Method Not Allowed"},
+       {408, "Request Timeout"},
+       {409, "Conflict"},
+       {413, "Content Too Large"},
+       {414, "URI Too Long"},
+       {415, "Unsupported Media Type"},
+       {417, "Expectation Failed"},
+       {421, "Misdirected Request"},
+       {422, "Unprocessable Content"},
+       {429, "Too Many Requests"},
+       {431, "Request Header Fields Too Large"},
+       {500, "Internal Server Error"},
+       {501, "Not Implemented"},
+       {503, "Service Unavailable"}}};
+  const auto* found =
+      std::find_if(kTitles.begin(), kTitles.end(), [&](const auto& entry) { return entry.first == status; });
+  return found == kTitles.end() ? "Error" : found->second;
+}
+
+}  // namespace
+
+std::string createToken() {
+  std::array<unsigned char, kTokenBytes> bytes{};
+  if (RAND_bytes(bytes.data(), static_cast<int>(bytes.size())) != 1) {
+    throw TokenError("cannot create a token: the system has no random numbers");
+  }
+  // Base64url (RFC 4648, 5): six bits a character, the last two bytes fill three.
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
+  std::string token;
+  unsigned bits = 0;
+  int count = 0;
+  for (const unsigned char byte : bytes) {
+    bits = bits << 8 | byte;
+    for (count += 8; count >= 6; count -= 6) token += kDigits[bits >> (count - 6) & 63];
+    bits &= (1U << count) - 1;
+  }
+  if (count > 0) token += kDigits[bits << (6 - count) & 63];
+  return token;
+}
+
+std::string readTokenFile(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string text(kTokenMax + 3, '\0');
+  if (in) in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (!in.is_open() || in.bad()) throw TokenError("token file " + path + ": cannot be read");
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  if (!text.empty() && text.back() == '\n') text.pop_back();
+  if (!text.empty() && text.back() == '\r') text.pop_back();
+  if (text.size() < kTokenMin || text.size() > kTokenMax) {
+    throw TokenError("token file " + path + ": expected one line of " + std::to_string(kTokenMin) + " to " +
+                     std::to_string(kTokenMax) + " characters, found " +
+                     (text.size() > kTokenMax ? "more" : std::to_string(text.size())));
+  }
+  if (!std::all_of(text.begin(), text.end(), isTokenCharacter)) {
+    throw TokenError("token file " + path + ": expected letters, digits and -._~+/= only, on one line");
+  }
+  return text;
+}
+
+bool sameToken(std::string_view a, std::string_view b) {
+  return a.size() == b.size() && CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
+}
+
+net::Response problemResponse(int status, const std::string& detail) {
+  const nlohmann::json problem = {
+      {"type", "about:blank"}, {"title", titleOf(status)}, {"status", status}, {"detail", detail}};
+  constexpr auto kReplace = nlohmann::json::error_handler_t::replace;
+  return {status, "application/problem+json", problem.dump(-1, ' ', false, kReplace), {}};
+}
+
+Authorizer::Authorizer(std::string token, bool loopback, std::vector<std::string> allowedOrigins)
+    : token_(std::move(token)),
+      cookieName_("scolopax-"),
+      loopback_(loopback),
+      allowedOrigins_(std::move(allowedOrigins)) {
+  std::array<unsigned char, SHA256_DIGEST_LENGTH> digest{};
+  SHA256(reinterpret_cast<const unsigned char*>(token_.data()), token_.size(), digest.data());
+  for (int i = 0; i < 4; ++i) {
+    cookieName_ += "0123456789abcdef"[digest[static_cast<std::size_t>(i)] >> 4];
+    cookieName_ += "0123456789abcdef"[digest[static_cast<std::size_t>(i)] & 15];
+  }
+}
+
+bool Authorizer::isHostAllowed(const net::Request& request) const {
+  const std::string* host = request.header("Host");
+  if (!loopback_ || !host) return true;  // HTTP/1.0 without a Host is no browser
+  const std::string_view name = withoutPort(*host);
+  if (name == "127.0.0.1" || name == "[::1]" || net::equalIgnoringCase(name, "localhost")) return true;
+  return std::any_of(allowedOrigins_.begin(), allowedOrigins_.end(),
+                     [&](const std::string& origin) { return net::sameOrigin(origin, *host); });
+}
+
+bool Authorizer::hasBearer(const net::Request& request) const {
+  const std::string* header = request.header("Authorization");
+  if (!header) return false;
+  const std::string_view text = *header;
+  const std::size_t space = text.find(' ');
+  return space != std::string_view::npos && net::equalIgnoringCase(text.substr(0, space), "Bearer") &&
+         sameToken(trimmed(text.substr(space)), token_);
+}
+
+bool Authorizer::hasQueryToken(const net::Request& request) const {
+  const std::string* token = request.queryValue("token");
+  return token && (request.method == "GET" || request.method == "HEAD") && sameToken(*token, token_);
+}
+
+bool Authorizer::hasCookie(const net::Request& request) const {
+  const auto [begin, end] = request.headers.equal_range("Cookie");
+  for (auto header = begin; header != end; ++header) {
+    std::string_view rest = header->second;
+    while (!rest.empty()) {
+      const std::string_view pair = trimmed(rest.substr(0, rest.find(';')));
+      rest.remove_prefix(std::min(rest.find(';'), rest.size() - 1) + 1);
+      const std::size_t equals = pair.find('=');
+      if (equals == std::string_view::npos || pair.substr(0, equals) != cookieName_) continue;
+      if (sameToken(pair.substr(equals + 1), token_)) return true;
+    }
+  }
+  return false;
+}
+
+net::Response Authorizer::cookieAndRedirect(const net::Request& request) const {
+  std::string location = "./";
+  char separator = '?';
+  for (const auto& [name, value] : request.query) {
+    if (name == "token") continue;
+    location += separator + net::percentEncodePath(name) + "=" + net::percentEncodePath(value);
+    separator = '&';
+  }
+  net::Response response;
+  response.status = 303;
+  response.headers = {{"Location", location},
+                      {"Set-Cookie", cookieName_ + "=" + token_ + "; HttpOnly; SameSite=Strict; Path=/"},
+                      {"Cache-Control", "no-store"},
+                      {"Referrer-Policy", "no-referrer"}};
+  return response;
+}
+
+std::optional<net::Response> Authorizer::operator()(const net::Request& request) const {
+  if (!isHostAllowed(request)) {
+    return problemResponse(421, "This server answers to localhost only; found another name in Host.");
+  }
+  const bool reading = request.method == "GET" || request.method == "HEAD";
+  if (reading && (request.path == "/healthz" || request.path == "/readyz")) return std::nullopt;
+  if (hasBearer(request)) return std::nullopt;
+  if (hasQueryToken(request)) {
+    if (request.method == "GET" && request.path == "/") return cookieAndRedirect(request);
+    return std::nullopt;
+  }
+  if (hasCookie(request)) {
+    // The browser adds the cookie by itself, so that a write must also show that our own page made it.
+    if (reading || (request.header("Origin") && net::originAllowed(request, allowedOrigins_)))
+      return std::nullopt;
+    return problemResponse(403, "A write with the cookie needs the Origin of this page.");
+  }
+  net::Response response =
+      problemResponse(401, "A token is needed: open the URL that the server printed, or send it as Bearer.");
+  response.headers.emplace_back("WWW-Authenticate", "Bearer");
+  return response;
+}
+
+bool isLoopback(std::string_view host) {
+  return net::equalIgnoringCase(host, "localhost") || host == "::1" || host == "[::1]" ||
+         host.substr(0, 4) == "127.";
+}
+
+std::string tokenUrl(std::string_view host, std::uint16_t port, std::string_view token) {
+  std::string shown(host);
+  if (shown == "0.0.0.0" || shown == "::") shown = "127.0.0.1";
+  if (shown.find(':') != std::string::npos && shown.front() != '[') shown = "[" + shown + "]";
+  return "http://" + shown + ":" + std::to_string(port) + "/?token=" + net::percentEncodePath(token);
+}
+
+}  // namespace scolopax

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// What all connections of one server share: options, routes, threads, and the list of who is connected.
+#pragma once
+#include <utility>  // Asio 1.74 needs it first under C++20
+
+#include <atomic>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+
+#include "server/net/router.h"
+#include "server/net/server.h"
+#include "server/net/static_files.h"
+
+namespace scolopax::net {
+
+namespace asio = boost::asio;
+
+/// Something with a socket that has to end before the server does. Both may be called from any thread.
+class Connection {
+ public:
+  virtual ~Connection() = default;
+  virtual void beginStop() = 0;  ///< finish politely and soon
+  virtual void cut() = 0;        ///< close the socket now
+};
+
+class Core {
+ public:
+  explicit Core(Options options);
+
+  /// Refusals of the server's own, in the format that the owner chose.
+  Response problem(int status, const std::string& detail) const;
+  void log(const std::string& line) const;
+  /// Runs a handler and turns what it throws into a 500.
+  Response guarded(const Handler& handler, const Request& request) const;
+
+  /// From here until leave() the server waits for this connection when it stops.
+  void enter(const std::shared_ptr<Connection>& connection);
+  /// The last thing that a connection does with its core.
+  void leave(Connection* connection);
+  std::size_t connectionCount() const;
+
+  bool stopping() const { return stopping_; }
+  void beginStop();
+  bool waitUntilEmpty(std::chrono::milliseconds patience);
+  void cutAll();
+  void waitUntilEmpty();
+
+  Options options;
+  Router router;
+  StaticFiles files;
+  UpgradeHandler upgradeHandler;
+  /// Shared with WebSocket handles, which may outlive the server.
+  std::shared_ptr<asio::io_context> io = std::make_shared<asio::io_context>();
+  asio::thread_pool workers;
+  asio::thread_pool slowWorkers;
+  std::atomic<int> slowRunning{0};
+
+ private:
+  std::vector<std::shared_ptr<Connection>> connections() const;
+
+  mutable std::mutex mutex_;
+  std::condition_variable left_;
+  std::map<Connection*, std::weak_ptr<Connection>> connections_;
+  std::atomic<bool> stopping_{false};
+  bool cutting_ = false;
+};
+
+/// Runs `work` on the pool and resumes the awaiting coroutine on its own executor with the result.
+template <typename Result, typename Work>
+asio::awaitable<Result> runOn(asio::thread_pool& pool, Work work) {
+  return asio::async_initiate<const asio::use_awaitable_t<>, void(Result)>(
+      [&pool](auto&& completion, Work task) {
+        asio::post(pool, [completion = std::move(completion), task = std::move(task)]() mutable {
+          auto executor = asio::get_associated_executor(completion);
+          asio::post(executor, [completion = std::move(completion), result = task()]() mutable {
+            std::move(completion)(std::move(result));
+          });
+        });
+      },
+      asio::use_awaitable, std::move(work));
+}
+
+}  // namespace scolopax::net

@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/net/http_connection.h"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+#include <limits>
+#include <optional>
+#include <variant>
+
+#include "server/net/head_rules.h"
+#include "server/net/url.h"
+#include "server/net/web_socket_connection.h"
+
+namespace scolopax::net {
+namespace {
+
+namespace http = boost::beast::http;
+using asio::awaitable;
+using asio::ip::tcp;
+using boost::system::error_code;
+using Milliseconds = std::chrono::milliseconds;
+using Parser = http::request_parser<http::string_body>;
+
+constexpr std::size_t kBufferSlack = 64 << 10;
+constexpr Milliseconds kLingerTime{2'000};
+constexpr std::size_t kLingerBytes = 64 << 20;
+
+auto into(error_code& error) { return asio::redirect_error(asio::use_awaitable, error); }
+
+/// While it lives and its time is up, whatever the socket is waiting for fails. Repeatedly: a composed
+/// operation may just be between two steps when the time is up.
+class Deadline {
+ public:
+  Deadline(tcp::socket& socket, Milliseconds time) : state_(std::make_shared<State>(socket)) {
+    State::wait(state_, time);
+  }
+  ~Deadline() {
+    state_->alive = false;
+    state_->timer.cancel();
+  }
+  Deadline(const Deadline&) = delete;
+  Deadline& operator=(const Deadline&) = delete;
+  bool expired() const { return state_->expired; }
+
+ private:
+  struct State {
+    explicit State(tcp::socket& s) : socket(s), timer(s.get_executor()) {}
+    static void wait(const std::shared_ptr<State>& state, Milliseconds time) {
+      state->timer.expires_after(time);
+      state->timer.async_wait([state](const error_code&) {
+        if (!state->alive) return;
+        state->expired = true;
+        error_code ignored;
+        state->socket.cancel(ignored);
+        wait(state, Milliseconds(20));
+      });
+    }
+    tcp::socket& socket;
+    asio::steady_timer timer;
+    bool alive = true;
+    bool expired = false;
+  };
+  std::shared_ptr<State> state_;
+};
+
+/// One of the slots for slow requests, if there is one.
+class SlowSlot {
+ public:
+  explicit SlowSlot(Core& core) : core_(core), taken_(++core.slowRunning <= core.options.longRequests) {}
+  ~SlowSlot() { --core_.slowRunning; }
+  SlowSlot(const SlowSlot&) = delete;
+  SlowSlot& operator=(const SlowSlot&) = delete;
+  bool taken() const { return taken_; }
+
+ private:
+  Core& core_;
+  bool taken_;
+};
+
+bool isSafeHeader(const std::string& name, const std::string& value) {
+  return !name.empty() && (name + value).find_first_of(std::string("\r\n\0", 3)) == std::string::npos;
+}
+
+class HttpConnection : public Connection, public std::enable_shared_from_this<HttpConnection> {
+ public:
+  HttpConnection(Core& core, tcp::socket socket, bool full)
+      : core_(core),
+        socket_(std::move(socket)),
+        executor_(socket_.get_executor()),
+        buffer_(core.options.headerLimit + kBufferSlack),
+        full_(full) {}
+
+  void beginStop() override {
+    asio::post(executor_, [self = shared_from_this()] {
+      if (self->idle_) self->closeSocket();
+    });
+  }
+  void cut() override {
+    asio::post(executor_, [self = shared_from_this()] { self->closeSocket(); });
+  }
+
+  static awaitable<void> run(std::shared_ptr<HttpConnection> self) {
+    try {
+      error_code ignored;
+      const auto peer = self->socket_.remote_endpoint(ignored);
+      self->remoteAddress_ = peer.address().to_string();
+      Milliseconds patience = self->core_.options.headTimeout;
+      while (co_await self->exchange(patience)) patience = self->core_.options.idleTimeout;
+      if (self->linger_) co_await self->linger();
+    } catch (const std::exception& error) {
+      self->core_.log(std::string("connection: ") + error.what());
+    }
+    self->closeSocket();
+    self->core_.leave(self.get());
+  }
+
+ private:
+  /// One request and its answer; false when the connection ends.
+  awaitable<bool> exchange(Milliseconds patience) {
+    if (!co_await waitForByte(patience)) co_return false;
+    Parser parser;
+    parser.header_limit(static_cast<std::uint32_t>(core_.options.headerLimit));
+    // The limit on bodies is ours to check: this one would refuse before anybody has been authorised.
+    parser.body_limit(std::numeric_limits<std::uint64_t>::max());
+    error_code error;
+    {
+      const Deadline deadline(socket_, core_.options.headTimeout);
+      co_await http::async_read_header(socket_, buffer_, parser, into(error));
+      if (error && deadline.expired())
+        co_return co_await refuse(408, "The head of the request took too long.");
+    }
+    if (error) {
+      if (const auto refusal = refusalOf(error)) co_return co_await refuse(refusal->status, refusal->detail);
+      co_return false;
+    }
+
+    Request request;
+    request.remoteAddress = remoteAddress_;
+    head_ = parser.get().method() == http::verb::head;
+    version_ = parser.get().version();
+    keepAlive_ = parser.keep_alive();
+    const bool hasBody = parser.chunked() || parser.content_length().value_or(0) > 0;
+    if (const auto refusal = readHead(parser.get(), core_.options.bodyLimit, request)) {
+      co_return co_await refuse(refusal->status, refusal->detail);
+    }
+    // From here on only an unread body stands between this request and the next.
+    const bool keepAlive = keepAlive_;
+    keepAlive_ = keepAlive_ && !hasBody;
+    if (full_) co_return co_await write(withRetry(core_.problem(503, "Too many connections.")), false);
+    if (core_.options.authorize) {
+      std::optional<Response> refused = authorize(request);
+      if (refused) co_return co_await write(std::move(*refused), keepAlive_);
+    }
+    if (boost::beast::websocket::is_upgrade(parser.get())) co_return co_await upgrade(parser, request);
+
+    RouteMatch match = core_.router.find(request.method, request.path);
+    if (!match.route && (request.method == "GET" || request.method == "HEAD") && !hasBody) {
+      Response file = co_await runOn<Response>(core_.workers, [&] { return serveFile(request, match); });
+      co_return co_await write(std::move(file), keepAlive_);
+    }
+    if (!match.route) co_return co_await write(noRoute(match), keepAlive_);
+    if (hasBody && !co_await readBody(parser, request)) co_return false;
+    keepAlive_ = keepAlive;
+    request.matches = std::move(match.matches);
+    Response response = co_await handle(*match.route, request);
+    co_return co_await write(std::move(response), keepAlive_);
+  }
+
+  awaitable<bool> waitForByte(Milliseconds patience) {
+    if (buffer_.size() > 0) co_return true;  // pipelined
+    idle_ = true;
+    if (core_.stopping()) co_return false;
+    const Deadline deadline(socket_, patience);
+    error_code error;
+    const std::size_t count = co_await socket_.async_read_some(buffer_.prepare(4096), into(error));
+    buffer_.commit(count);
+    idle_ = false;
+    co_return !error;
+  }
+
+  /// False when a refusal was sent instead, or nobody is left.
+  awaitable<bool> readBody(Parser& parser, Request& request) {
+    parser.body_limit(core_.options.bodyLimit);
+    error_code error;
+    const Deadline deadline(socket_, core_.options.bodyTimeout);
+    if (request.header("Expect") && version_ >= 11 && buffer_.size() == 0) {
+      static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
+      co_await asio::async_write(socket_, asio::buffer(kContinue), into(error));
+    }
+    if (!error) co_await http::async_read(socket_, buffer_, parser, into(error));
+    if (!error) {
+      request.body = std::move(parser.get().body());
+      co_return true;
+    }
+    std::optional<Refusal> refusal = refusalOf(error);
+    if (deadline.expired()) refusal = Refusal{408, "The body of the request took too long."};
+    if (refusal) co_await refuse(refusal->status, refusal->detail);
+    co_return false;
+  }
+
+  std::optional<Response> authorize(const Request& request) const {
+    std::optional<Response> refused;
+    const auto check = [&](const Request& checked) {
+      refused = core_.options.authorize(checked);
+      return Response{};
+    };
+    const Response failed = core_.guarded(check, request);
+    return failed.status == 500 ? failed : refused;
+  }
+
+  Response serveFile(const Request& request, const RouteMatch& match) const {
+    return core_.guarded(
+        [&](const Request& asked) {
+          const auto file = core_.files.find(asked.path);
+          return file ? core_.files.respond(*file, asked) : noRoute(match);
+        },
+        request);
+  }
+
+  Response noRoute(const RouteMatch& match) const {
+    if (match.allow.empty()) return core_.problem(404, "There is nothing at this path.");
+    Response response = core_.problem(405, "This path has other methods: " + match.allow + ".");
+    response.headers.emplace_back("Allow", match.allow);
+    return response;
+  }
+
+  static Response withRetry(Response response) {
+    response.headers.emplace_back("Retry-After", "1");
+    return response;
+  }
+
+  awaitable<Response> handle(const Route& route, const Request& request) {
+    if (route.kind == RouteKind::quick) {
+      co_return co_await runOn<Response>(core_.workers,
+                                         [&] { return core_.guarded(route.handler, request); });
+    }
+    const SlowSlot slot(core_);
+    if (!slot.taken()) co_return withRetry(core_.problem(503, "Too many long requests at once."));
+    co_return co_await runOn<Response>(core_.slowWorkers,
+                                       [&] { return core_.guarded(route.handler, request); });
+  }
+
+  awaitable<bool> upgrade(Parser& parser, const Request& request) {
+    if (buffer_.size() > 0 || !parser.is_done()) {
+      co_return co_await refuse(400, "Nothing may follow an upgrade before it is answered.");
+    }
+    if (!originAllowed(request, core_.options.allowedOrigins)) {
+      co_return co_await write(core_.problem(403, "Pages of another origin may not connect."), keepAlive_);
+    }
+    if (!core_.upgradeHandler)
+      co_return co_await write(core_.problem(404, "There is no WebSocket here."), keepAlive_);
+    const std::shared_ptr<PreparedWebSocket> socket = prepareWebSocket(core_);
+    using Answer = std::variant<WebSocketEvents, Response>;
+    Answer answer = co_await runOn<Answer>(core_.workers, [&]() -> Answer {
+      Answer decided;
+      const auto decide = [&](const Request& asked) {
+        decided = core_.upgradeHandler(asked, socket);
+        return Response{};
+      };
+      Response failed = core_.guarded(decide, request);
+      if (failed.status == 500) decided = std::move(failed);
+      return decided;
+    });
+    if (auto* refused = std::get_if<Response>(&answer)) {
+      socket->abandon();
+      co_return co_await write(std::move(*refused), keepAlive_);
+    }
+    socket->start(std::move(socket_), parser.release(), std::move(std::get<WebSocketEvents>(answer)));
+    co_return false;
+  }
+
+  /// For requests after which the stream cannot be trusted: always ends the connection.
+  awaitable<bool> refuse(int status, std::string_view detail) {
+    Response response = core_.problem(status, std::string(detail));
+    co_return co_await write(std::move(response), false);
+  }
+
+  awaitable<bool> write(Response response, bool keepAlive) {
+    if (core_.options.decorate) core_.options.decorate(response);
+    keepAlive = keepAlive && !core_.stopping();
+    http::response<http::string_body> message(http::int_to_status(static_cast<unsigned>(response.status)),
+                                              version_);
+    message.result(static_cast<unsigned>(response.status));
+    for (const auto& [name, value] : response.headers) {
+      if (isSafeHeader(name, value)) {
+        message.insert(name, value);
+      } else {
+        core_.log("dropped a response header that would have split the response");
+      }
+    }
+    if (!response.contentType.empty()) message.set(http::field::content_type, response.contentType);
+    const bool bodiless = response.status == 204 || response.status == 304;
+    if (!bodiless) message.content_length(response.body.size());
+    message.keep_alive(keepAlive);
+    if (!bodiless) message.body() = std::move(response.body);
+
+    http::response_serializer<http::string_body> serializer(message);
+    serializer.split(head_);
+    error_code error;
+    while (!error && !(head_ ? serializer.is_header_done() : serializer.is_done())) {
+      // Per piece: a slow reader may take its time over a large answer, a stalled one may not.
+      const Deadline deadline(socket_, core_.options.bodyTimeout);
+      co_await http::async_write_some(socket_, serializer, into(error));
+    }
+    linger_ = !error && !keepAlive;
+    co_return !error && keepAlive;
+  }
+
+  /// Reads on after the last answer: closing with unread bytes would reset the connection, and the client
+  /// might never see why it was refused.
+  awaitable<void> linger() {
+    idle_ = true;
+    if (core_.stopping()) co_return;
+    error_code error;
+    socket_.shutdown(tcp::socket::shutdown_send, error);
+    const Deadline deadline(socket_, kLingerTime);
+    buffer_.consume(buffer_.size());
+    std::size_t total = 0;
+    while (!error && total < kLingerBytes) {
+      total += co_await socket_.async_read_some(buffer_.prepare(kBufferSlack), into(error));
+    }
+  }
+
+  void closeSocket() {
+    error_code ignored;
+    socket_.close(ignored);
+  }
+
+  Core& core_;
+  tcp::socket socket_;
+  asio::any_io_executor executor_;  ///< kept apart: cut() may come when the socket has moved on
+  boost::beast::flat_buffer buffer_;
+  std::string remoteAddress_;
+  bool full_;
+  bool idle_ = false;  ///< between requests: a stopping server need not wait for it
+  bool linger_ = false;
+  bool head_ = false;
+  bool keepAlive_ = false;
+  unsigned version_ = 11;
+};
+
+}  // namespace
+
+void serveHttp(Core& core, tcp::socket socket, bool full) {
+  const auto executor = socket.get_executor();
+  auto connection = std::make_shared<HttpConnection>(core, std::move(socket), full);
+  core.enter(connection);
+  asio::co_spawn(executor, HttpConnection::run(std::move(connection)), asio::detached);
+}
+
+}  // namespace scolopax::net

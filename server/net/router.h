@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which handler a method and path belong to. cpp-httplib does the matching; bodies, queries and headers never
+// reach it, so that none of its limits and conversions apply to them.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/net/server.h"
+
+namespace scolopax::net {
+
+struct Route {
+  Handler handler;
+  RouteKind kind = RouteKind::quick;
+};
+
+struct RouteMatch {
+  const Route* route = nullptr;      ///< null: no such path, or not with this method
+  std::vector<std::string> matches;  ///< regex groups, [0] the whole path
+  std::string allow;                 ///< for 405: the methods that this path does have, "GET, HEAD"
+};
+
+class Router {
+ public:
+  Router();
+  ~Router();
+  /// Throws NetError for a method it does not know or a pattern that is no regex.
+  void add(const std::string& method, const std::string& pattern, Route route);
+  /// `path` is decoded. Thread-safe once all routes are added.
+  RouteMatch find(const std::string& method, const std::string& path) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace scolopax::net

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/net/server.h"
+
+#include "server/net/core.h"
+#include "server/net/http_connection.h"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/strand.hpp>
+#include <thread>
+
+namespace scolopax::net {
+namespace {
+
+using asio::ip::tcp;
+using boost::system::error_code;
+
+constexpr int kIoThreads = 2;
+/// Connections beyond the limit that are still told 503; further ones are closed without a word.
+constexpr std::size_t kRefusedAtOnce = 32;
+constexpr std::chrono::milliseconds kAcceptPause{50};
+
+}  // namespace
+
+struct Server::Impl {
+  explicit Impl(Options options)
+      : core(std::move(options)),
+        strand(asio::make_strand(*core.io)),
+        acceptor(strand),
+        work(core.io->get_executor()) {}
+
+  void bind() {
+    const Options& options = core.options;
+    const std::string where = options.host + ":" + std::to_string(options.port);
+    error_code error;
+    tcp::resolver resolver(*core.io);
+    const auto found = resolver.resolve(options.host, std::to_string(options.port),
+                                        tcp::resolver::passive | tcp::resolver::numeric_service, error);
+    if (error || found.empty()) throw NetError("cannot listen on " + where + ": no such host");
+    const tcp::endpoint endpoint = found.begin()->endpoint();
+    acceptor.open(endpoint.protocol(), error);
+    // Lets a restart follow at once; unlike SO_REUSEPORT it never lets two servers share the port.
+    if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+    if (!error) acceptor.bind(endpoint, error);
+    if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+    if (error == asio::error::address_in_use) {
+      throw NetError("cannot listen on " + where +
+                     ": another program has this port; choose a different one, or 0 for any that is free");
+    }
+    if (error) throw NetError("cannot listen on " + where + ": " + error.message());
+    boundPort = acceptor.local_endpoint().port();
+  }
+
+  asio::awaitable<void> accept() {
+    while (acceptor.is_open()) {
+      error_code error;
+      tcp::socket socket = co_await acceptor.async_accept(asio::make_strand(*core.io),
+                                                          asio::redirect_error(asio::use_awaitable, error));
+      if (error == asio::error::operation_aborted || core.stopping()) break;
+      if (error) {
+        // Most likely out of descriptors: those who are connected go on, and some will leave.
+        core.log("accept: " + error.message());
+        asio::steady_timer pause(strand, kAcceptPause);
+        co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, error));
+        continue;
+      }
+      const std::size_t count = core.connectionCount();
+      if (count >= core.options.maxConnections + kRefusedAtOnce) continue;
+      socket.set_option(tcp::no_delay(true), error);
+      serveHttp(core, std::move(socket), count >= core.options.maxConnections);
+    }
+  }
+
+  Core core;
+  asio::strand<asio::io_context::executor_type> strand;
+  tcp::acceptor acceptor;
+  asio::executor_work_guard<asio::io_context::executor_type> work;
+  std::vector<std::thread> threads;
+  std::uint16_t boundPort = 0;
+  std::mutex stopMutex;
+  bool stopped = false;
+};
+
+Server::Server(Options options) : impl_(std::make_unique<Impl>(std::move(options))) {}
+
+Server::~Server() { stop(std::chrono::milliseconds(0)); }
+
+void Server::route(const std::string& method, const std::string& pattern, Handler handler, RouteKind kind) {
+  impl_->core.router.add(method, pattern, {std::move(handler), kind});
+}
+
+void Server::upgrade(UpgradeHandler handler) { impl_->core.upgradeHandler = std::move(handler); }
+
+void Server::start() {
+  impl_->bind();
+  asio::co_spawn(impl_->strand, impl_->accept(), asio::detached);
+  for (int i = 0; i < kIoThreads; ++i) impl_->threads.emplace_back([this] { impl_->core.io->run(); });
+}
+
+std::uint16_t Server::port() const { return impl_->boundPort; }
+
+void Server::stop(std::chrono::milliseconds grace) {
+  const std::lock_guard lock(impl_->stopMutex);
+  if (impl_->stopped) return;
+  impl_->stopped = true;
+  asio::post(impl_->strand, [this] {
+    error_code ignored;
+    impl_->acceptor.close(ignored);
+  });
+  impl_->core.beginStop();
+  if (!impl_->core.waitUntilEmpty(grace)) {
+    impl_->core.cutAll();
+    impl_->core.waitUntilEmpty();
+  }
+  impl_->work.reset();
+  // Without io->stop(): what is left to run are cancelled timers, and running them is what frees them.
+  for (std::thread& thread : impl_->threads) thread.join();
+  impl_->core.workers.join();
+  impl_->core.slowWorkers.join();
+}
+
+}  // namespace scolopax::net

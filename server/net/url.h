@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Request targets and origins: decoding and comparing, nothing else.
+#pragma once
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/net/message.h"
+
+namespace scolopax::net {
+
+/// nullopt when a "%" is not followed by two hex digits, or when a NUL would come out.
+std::optional<std::string> percentDecode(std::string_view text, bool plusIsSpace);
+/// Everything but unreserved characters and "/" (RFC 3986) becomes %XX.
+std::string percentEncodePath(std::string_view path);
+
+struct Target {
+  std::string path;
+  Query query;
+};
+/// Origin form alone ("/path?query"); nullopt for anything else or for bad encoding.
+std::optional<Target> parseTarget(std::string_view target);
+
+/// Whether an Origin header names the host that the request was sent to. The scheme is ignored: a proxy in
+/// front may speak TLS. False for "null".
+bool sameOrigin(std::string_view origin, std::string_view host);
+/// The rule for upgrades: no Origin (not a browser), the own one, or one of `allowed`.
+bool originAllowed(const Request& request, const std::vector<std::string>& allowed);
+
+/// ASCII only.
+bool equalIgnoringCase(std::string_view a, std::string_view b);
+
+}  // namespace scolopax::net

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/net/web_socket_connection.h"
+
+#include <array>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/strand.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/websocket/stream.hpp>
+#include <optional>
+
+#include "server/net/outbox.h"
+
+namespace scolopax::net {
+namespace {
+
+namespace beast = boost::beast;
+namespace websocket = boost::beast::websocket;
+using asio::ip::tcp;
+using boost::system::error_code;
+
+/// Compression is compiled out: pictures are compressed already, and it would cost memory per client.
+using Stream = websocket::stream<beast::tcp_stream, false>;
+
+constexpr std::chrono::seconds kHandshakeTimeout{5};
+constexpr int kSendBufferBytes = 128 << 10;  ///< a large one hides stale frames in the kernel
+constexpr std::size_t kReasonLimit = 123;    ///< RFC 6455, 5.5
+
+/// At most kReasonLimit bytes, cut between two characters.
+websocket::reason_string reasonString(const std::string& text) {
+  std::size_t size = std::min(text.size(), kReasonLimit);
+  while (size < text.size() && size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0) == 0x80) --size;
+  return {text.data(), size};
+}
+
+/// Of a stream and its neighbours everything is touched on the strand alone, the outbox under the mutex.
+/// There is always one read (the handshake counts) and at most one write under way; when both have ended the
+/// connection has.
+class WebSocketConnection : public PreparedWebSocket,
+                            public Connection,
+                            public std::enable_shared_from_this<WebSocketConnection> {
+ public:
+  explicit WebSocketConnection(Core& core)
+      : io_(core.io), core_(core), outbox_(core.options.controlQueueLimit) {}
+
+  // The handle, from any thread.
+
+  void sendText(std::string text) override {
+    const std::lock_guard lock(mutex_);
+    if (ended_) return;
+    if (!outbox_.pushText(std::move(text))) outbox_.close({1008, "too many messages wait for you"}, true);
+    wake();
+  }
+  void offerFrame(Frame frame) override {
+    const std::lock_guard lock(mutex_);
+    if (ended_) return;
+    outbox_.offer(std::move(frame));
+    wake();
+  }
+  void acknowledge(std::uint32_t number) override {
+    const std::lock_guard lock(mutex_);
+    outbox_.acknowledge(number);
+    wake();
+  }
+  void close(std::uint16_t code, std::string reason) override {
+    const std::lock_guard lock(mutex_);
+    outbox_.close({code, std::move(reason)}, false);
+    wake();
+  }
+  WebSocketStats stats() const override {
+    const std::lock_guard lock(mutex_);
+    WebSocketStats stats = outbox_.stats();
+    stats.open = !ended_;
+    return stats;
+  }
+
+  // The server's side.
+
+  void beginStop() override { close(1001, "the server is stopping"); }
+
+  void cut() override {
+    const std::lock_guard lock(mutex_);
+    cut_ = true;
+    if (strand_ && !ended_) asio::post(*strand_, [self = shared_from_this()] { self->closeSocket(); });
+  }
+
+  void abandon() override {
+    {
+      const std::lock_guard lock(mutex_);
+      ended_ = true;
+    }
+    core_.leave(this);
+  }
+
+  void start(tcp::socket socket, UpgradeRequest request, WebSocketEvents events) override {
+    request_ = std::move(request);
+    events_ = std::move(events);
+    error_code ignored;
+    socket.set_option(tcp::no_delay(true), ignored);
+    socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+    const auto executor = socket.get_executor();
+    stream_.emplace(std::move(socket));
+    closeTimer_.emplace(executor);
+    stream_->set_option(websocket::stream_base::timeout{kHandshakeTimeout, core_.options.pingTimeout, true});
+    stream_->read_message_max(core_.options.messageLimit);
+    stream_->auto_fragment(false);
+    {
+      const std::lock_guard lock(mutex_);
+      strand_ = executor;
+      if (cut_) closeSocket();
+    }
+    stream_->async_accept(request_,
+                          [self = shared_from_this()](const error_code& error) { self->onAccept(error); });
+  }
+
+ private:
+  /// With the mutex held: sees to it that the strand looks at the outbox.
+  void wake() {
+    if (!strand_ || ended_ || woken_) return;
+    woken_ = true;
+    asio::post(*strand_, [self = shared_from_this()] { self->pump(); });
+  }
+
+  void onAccept(const error_code& error) {
+    accepted_ = !error;
+    if (error) return finish();
+    pump();
+    read();
+  }
+
+  void read() {
+    stream_->async_read(
+        buffer_, [self = shared_from_this()](const error_code& error, std::size_t) { self->onRead(error); });
+  }
+
+  void onRead(const error_code& error) {
+    if (error) return finish();
+    if (!stream_->got_text()) {
+      close(1003, "only text messages are read here");
+      buffer_.consume(buffer_.size());
+      return read();
+    }
+    std::string text = beast::buffers_to_string(buffer_.data());
+    buffer_.consume(buffer_.size());
+    asio::post(core_.workers, [self = shared_from_this(), text = std::move(text)]() mutable {
+      self->deliver(std::move(text));
+      asio::post(*self->strand_, [self] { self->read(); });
+    });
+  }
+
+  void deliver(std::string text) {
+    try {
+      if (events_.onText) events_.onText(std::move(text));
+    } catch (const std::exception& error) {
+      core_.log(std::string("WebSocket message: ") + error.what());
+      close(1011, "the server failed");
+    }
+  }
+
+  void pump() {
+    std::optional<Outbox::Item> item;
+    {
+      const std::lock_guard lock(mutex_);
+      woken_ = false;
+      if (readEnded_ || !accepted_) return;
+      if (outbox_.closing()) startCloseTimer();
+      if (writing_) return;
+      item = outbox_.next();
+    }
+    if (!item) return;
+    writing_ = true;
+    current_ = std::move(*item);
+    const auto done = [self = shared_from_this()](const error_code& error, std::size_t = 0) {
+      self->onWritten(error);
+    };
+    if (const auto* text = std::get_if<std::string>(&current_)) {
+      stream_->text(true);
+      stream_->async_write(asio::buffer(*text), done);
+    } else if (const auto* frame = std::get_if<Frame>(&current_)) {
+      stream_->binary(true);
+      const auto payload = frame->payload ? asio::buffer(*frame->payload) : asio::const_buffer();
+      stream_->async_write(std::array<asio::const_buffer, 2>{asio::buffer(frame->header), payload}, done);
+    } else {
+      const auto& message = std::get<CloseMessage>(current_);
+      websocket::close_reason reason(static_cast<websocket::close_code>(message.code));
+      reason.reason = reasonString(message.reason);
+      stream_->async_close(reason, [done, self = shared_from_this()](const error_code& error) {
+        self->closeSocket();
+        done(error);
+      });
+    }
+  }
+
+  void onWritten(const error_code& error) {
+    writing_ = false;
+    current_ = std::string();  // lets go of the picture
+    if (readEnded_) return end();
+    if (error) return closeSocket();  // the read fails in turn
+    pump();
+  }
+
+  /// A client that does not read cannot be told: the close message would wait behind the write for ever.
+  void startCloseTimer() {
+    if (closeTimerStarted_) return;
+    closeTimerStarted_ = true;
+    closeTimer_->expires_after(kHandshakeTimeout);
+    closeTimer_->async_wait([self = shared_from_this()](const error_code& error) {
+      if (!error) self->closeSocket();
+    });
+  }
+
+  void closeSocket() {
+    if (stream_) beast::get_lowest_layer(*stream_).close();
+  }
+
+  /// The read has ended, and with it the connection, once the write has too.
+  void finish() {
+    readEnded_ = true;
+    closeSocket();
+    closeTimer_->cancel();
+    if (!writing_) end();
+  }
+
+  void end() {
+    {
+      const std::lock_guard lock(mutex_);
+      ended_ = true;
+    }
+    stream_.reset();
+    asio::post(core_.workers, [self = shared_from_this()] {
+      try {
+        if (self->events_.onClose) self->events_.onClose();
+      } catch (const std::exception& error) {
+        self->core_.log(std::string("WebSocket close: ") + error.what());
+      }
+      self->events_ = {};
+      self->core_.leave(self.get());
+    });
+  }
+
+  std::shared_ptr<asio::io_context>
+      io_;      ///< first: handles outlive the server, and timers need it to be destroyed
+  Core& core_;  ///< valid until leave()
+
+  mutable std::mutex mutex_;
+  Outbox outbox_;
+  std::optional<asio::any_io_executor> strand_;  ///< from start() on
+  bool woken_ = false;
+  bool cut_ = false;
+  bool ended_ = false;
+
+  std::optional<Stream> stream_;
+  std::optional<asio::steady_timer> closeTimer_;
+  UpgradeRequest request_;
+  WebSocketEvents events_;
+  beast::flat_buffer buffer_;
+  Outbox::Item current_;  ///< what is being written
+  bool accepted_ = false;
+  bool writing_ = false;
+  bool readEnded_ = false;
+  bool closeTimerStarted_ = false;
+};
+
+}  // namespace
+
+std::shared_ptr<PreparedWebSocket> prepareWebSocket(Core& core) {
+  auto connection = std::make_shared<WebSocketConnection>(core);
+  core.enter(connection);
+  return connection;
+}
+
+}  // namespace scolopax::net
