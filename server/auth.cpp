@@ -8,9 +8,9 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <utility>
 
+#include "protocol/problem.h"
 #include "server/net/url.h"
 
 namespace scolopax {
@@ -37,29 +37,9 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-std::string_view titleOf(int status) {
-  constexpr std::array<std::pair<int, std::string_view>, 18> kTitles{
-      {{400, "Bad Request"},
-       {401, "Unauthorized"},
-       {403, "Forbidden"},
-       {404, "Not Found"},
-       {405, "Method Not Allowed"},
-       {408, "Request Timeout"},
-       {409, "Conflict"},
-       {413, "Content Too Large"},
-       {414, "URI Too Long"},
-       {415, "Unsupported Media Type"},
-       {417, "Expectation Failed"},
-       {421, "Misdirected Request"},
-       {422, "Unprocessable Content"},
-       {429, "Too Many Requests"},
-       {431, "Request Header Fields Too Large"},
-       {500, "Internal Server Error"},
-       {501, "Not Implemented"},
-       {503, "Service Unavailable"}}};
-  const auto* found =
-      std::find_if(kTitles.begin(), kTitles.end(), [&](const auto& entry) { return entry.first == status; });
-  return found == kTitles.end() ? "Error" : found->second;
+/// An IPv4 address of this machine's own net, and not a name that only begins like one.
+bool isLoopbackAddress(std::string_view host) {
+  return host.substr(0, 4) == "127." && host.find_first_not_of("0123456789.") == std::string_view::npos;
 }
 
 }  // namespace
@@ -107,10 +87,7 @@ bool sameToken(std::string_view a, std::string_view b) {
 }
 
 net::Response problemResponse(int status, const std::string& detail) {
-  const nlohmann::json problem = {
-      {"type", "about:blank"}, {"title", titleOf(status)}, {"status", status}, {"detail", detail}};
-  constexpr auto kReplace = nlohmann::json::error_handler_t::replace;
-  return {status, "application/problem+json", problem.dump(-1, ' ', false, kReplace), {}};
+  return {status, std::string(protocol::kProblemType), protocol::problemJson(status, detail), {}};
 }
 
 Authorizer::Authorizer(std::string token, bool loopback, std::vector<std::string> allowedOrigins)
@@ -130,7 +107,7 @@ bool Authorizer::isHostAllowed(const net::Request& request) const {
   const std::string* host = request.header("Host");
   if (!loopback_ || !host) return true;  // HTTP/1.0 without a Host is no browser
   const std::string_view name = withoutPort(*host);
-  if (name == "127.0.0.1" || name == "[::1]" || net::equalIgnoringCase(name, "localhost")) return true;
+  if (isLoopbackAddress(name) || name == "[::1]" || net::equalIgnoringCase(name, "localhost")) return true;
   return std::any_of(allowedOrigins_.begin(), allowedOrigins_.end(),
                      [&](const std::string& origin) { return net::sameOrigin(origin, *host); });
 }
@@ -206,7 +183,7 @@ std::optional<net::Response> Authorizer::operator()(const net::Request& request)
 
 bool isLoopback(std::string_view host) {
   return net::equalIgnoringCase(host, "localhost") || host == "::1" || host == "[::1]" ||
-         host.substr(0, 4) == "127.";
+         isLoopbackAddress(host);
 }
 
 std::string tokenUrl(std::string_view host, std::uint16_t port, std::string_view token) {

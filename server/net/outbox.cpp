@@ -36,6 +36,14 @@ void Outbox::close(CloseMessage message, bool dropTexts) {
   stats_.framePending = false;
 }
 
+void Outbox::clear() {
+  texts_.clear();
+  pending_.reset();
+  close_.reset();
+  closeSent_ = true;
+  stats_.framePending = false;
+}
+
 std::optional<Outbox::Item> Outbox::next() {
   if (!texts_.empty()) {
     Item item = std::move(texts_.front());

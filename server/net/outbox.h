@@ -32,6 +32,9 @@ class Outbox {
   /// Texts first, then a frame if the window is open, the close message last of all; nullopt: nothing now.
   std::optional<Item> next();
 
+  /// The connection has ended: nothing is kept that could not be sent.
+  void clear();
+
   bool closing() const { return close_.has_value() || closeSent_; }
   const WebSocketStats& stats() const { return stats_; }
 

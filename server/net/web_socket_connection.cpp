@@ -89,6 +89,7 @@ class WebSocketConnection : public PreparedWebSocket,
     {
       const std::lock_guard lock(mutex_);
       ended_ = true;
+      outbox_.clear();
     }
     core_.leave(this);
   }
@@ -226,6 +227,7 @@ class WebSocketConnection : public PreparedWebSocket,
     {
       const std::lock_guard lock(mutex_);
       ended_ = true;
+      outbox_.clear();
     }
     stream_.reset();
     asio::post(core_.workers, [self = shared_from_this()] {

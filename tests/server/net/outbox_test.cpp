@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/net/outbox.h"
+
+#include <gtest/gtest.h>
+
+namespace scolopax::net {
+namespace {
+
+Frame frame(std::uint32_t number) { return {number, {}, nullptr}; }
+
+/// Number of the frame that goes out next; 0 when none does.
+std::uint32_t nextFrame(Outbox& outbox) {
+  const auto item = outbox.next();
+  return item ? std::get<Frame>(*item).number : 0;
+}
+
+TEST(Outbox, SendsAtMostTwoUnacknowledgedFrames) {
+  Outbox outbox(4);
+  for (std::uint32_t number = 1; number <= 2; ++number) {
+    outbox.offer(frame(number));
+    EXPECT_EQ(nextFrame(outbox), number);
+  }
+  outbox.offer(frame(3));
+  EXPECT_EQ(nextFrame(outbox), 0U);
+  outbox.acknowledge(1);
+  EXPECT_EQ(nextFrame(outbox), 3U);
+}
+
+TEST(Outbox, KeepsOnlyTheLatestFrameThatWaits) {
+  Outbox outbox(4);
+  for (std::uint32_t number = 1; number <= 5; ++number) outbox.offer(frame(number));
+  EXPECT_EQ(nextFrame(outbox), 5U);
+  EXPECT_EQ(nextFrame(outbox), 0U);
+  EXPECT_EQ(outbox.stats().framesReplaced, 4U);
+  EXPECT_EQ(outbox.stats().framesSent, 1U);
+}
+
+TEST(Outbox, TakesAnAcknowledgementForAllFramesBeforeIt) {
+  Outbox outbox(4);
+  for (std::uint32_t number = 1; number <= 2; ++number) {
+    outbox.offer(frame(number));
+    nextFrame(outbox);
+  }
+  outbox.acknowledge(2);
+  EXPECT_EQ(outbox.stats().unacknowledged, 0);
+}
+
+TEST(Outbox, IgnoresAcknowledgementsOfFramesThatAreNotOnTheirWay) {
+  Outbox outbox(4);
+  for (std::uint32_t number = 1; number <= 2; ++number) {
+    outbox.offer(frame(number));
+    nextFrame(outbox);
+  }
+  for (const std::uint32_t number : {0U, 3U, 0xFFFFFFFFU}) outbox.acknowledge(number);
+  EXPECT_EQ(outbox.stats().unacknowledged, 2);
+  outbox.acknowledge(1);
+  outbox.acknowledge(1);
+  EXPECT_EQ(outbox.stats().unacknowledged, 1);
+}
+
+TEST(Outbox, KeepsCountWhenFrameNumbersWrapAround) {
+  Outbox outbox(4);
+  outbox.offer(frame(0xFFFFFFFF));
+  nextFrame(outbox);
+  outbox.offer(frame(0));
+  ASSERT_TRUE(outbox.next());
+  outbox.acknowledge(0);
+  EXPECT_EQ(outbox.stats().unacknowledged, 0);
+}
+
+TEST(Outbox, SendsTextsInOrderAndBeforeFrames) {
+  Outbox outbox(4);
+  outbox.offer(frame(1));
+  EXPECT_TRUE(outbox.pushText("a"));
+  EXPECT_TRUE(outbox.pushText("b"));
+  EXPECT_EQ(std::get<std::string>(*outbox.next()), "a");
+  EXPECT_EQ(std::get<std::string>(*outbox.next()), "b");
+  EXPECT_EQ(nextFrame(outbox), 1U);
+}
+
+TEST(Outbox, RefusesMoreTextsThanItsLimit) {
+  Outbox outbox(2);
+  EXPECT_TRUE(outbox.pushText("a"));
+  EXPECT_TRUE(outbox.pushText("b"));
+  EXPECT_FALSE(outbox.pushText("c"));
+  outbox.next();
+  EXPECT_TRUE(outbox.pushText("d"));
+}
+
+TEST(Outbox, ClosesAfterTheTextsAndSendsNothingMore) {
+  Outbox outbox(4);
+  outbox.offer(frame(1));
+  outbox.pushText("last");
+  outbox.close({1000, "done"}, false);
+  outbox.close({1001, "second"}, false);
+  outbox.pushText("too late");
+  outbox.offer(frame(2));
+  EXPECT_EQ(std::get<std::string>(*outbox.next()), "last");
+  EXPECT_EQ(std::get<CloseMessage>(*outbox.next()).code, 1000);
+  EXPECT_FALSE(outbox.next());
+}
+
+}  // namespace
+}  // namespace scolopax::net
