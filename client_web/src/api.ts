@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// The HTTP calls that the page makes, with the server's problem details as errors. All addresses are
+// relative to the page, so that a path prefix in front of the server needs no setting.
+import type { Histogram } from './histogram';
+import type { JsonObject } from './merge-patch';
+
+export interface Named {
+  name: string;
+  doc?: string;
+  /** Control points of a colour map, where the server gives them. */
+  points?: [number, string][];
+}
+
+export interface Capabilities {
+  blendModes?: Named[];
+  methods?: Named[];
+  filters?: Named[];
+  colormaps?: Named[];
+  limits?: Record<string, number>;
+}
+
+export interface ChannelInfo {
+  name: string;
+  unit?: string;
+}
+
+export interface DatasetSummary {
+  id: string;
+  title: string;
+  /** Voxels along x, y, z. */
+  dims: [number, number, number];
+}
+
+export interface DatasetInfo extends DatasetSummary {
+  /** World units between voxel centres. */
+  spacing: [number, number, number];
+  /** Of the box, world units. */
+  diagonal: number;
+  channels: ChannelInfo[];
+}
+
+export interface SessionInfo {
+  id: string;
+  token: string;
+}
+
+export interface SceneAnswer {
+  revision: number;
+  scene: JsonObject;
+}
+
+/** RFC 9457, with the pointer to the field that is at fault. */
+export interface Problem {
+  title?: string;
+  detail?: string;
+  status?: number;
+  pointer?: string;
+}
+
+export class ApiError extends Error {
+  constructor(
+    readonly status: number,
+    readonly problem: Problem,
+  ) {
+    super(problem.detail ?? problem.title ?? `the server answered ${status}`);
+  }
+}
+
+export async function problemOf(response: Response): Promise<ApiError> {
+  return new ApiError(response.status, (await response.json().catch(() => ({}))) as Problem);
+}
+
+async function call<T>(path: string, init?: RequestInit): Promise<T> {
+  const response = await fetch(`api/v1/${path}`, { cache: 'no-store', credentials: 'same-origin', ...init });
+  if (!response.ok) throw await problemOf(response);
+  return (await response.json()) as T;
+}
+
+const seg = encodeURIComponent;
+
+export const api = {
+  datasets: async (): Promise<DatasetSummary[]> => {
+    const answer = await call<DatasetSummary[] | { datasets: DatasetSummary[] }>('datasets');
+    return Array.isArray(answer) ? answer : answer.datasets;
+  },
+  dataset: (id: string) => call<DatasetInfo>(`datasets/${seg(id)}`),
+  histogram: (id: string, channel: number) =>
+    call<Histogram>(`datasets/${seg(id)}/histogram?channel=${channel}`),
+  createSession: (scene?: JsonObject) =>
+    call<SessionInfo>('sessions', {
+      method: 'POST',
+      headers: { 'content-type': 'application/json' },
+      body: JSON.stringify(scene ? { scene } : {}),
+    }),
+  session: (id: string) => call<unknown>(`sessions/${seg(id)}`),
+  scene: (id: string) => call<SceneAnswer>(`sessions/${seg(id)}/scene`),
+};
+
+/** The address of the newest picture as a lossless file. */
+export const pictureUrl = (id: string) => `api/v1/sessions/${seg(id)}/frame?format=png`;
+
+/** The session's stream, absolute because older browsers refuse relative WebSocket addresses. */
+export function streamUrl(id: string): string {
+  const url = new URL(`api/v1/sessions/${seg(id)}/stream`, document.baseURI);
+  url.protocol = url.protocol.replace('http', 'ws');
+  return url.href;
+}

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page: the picture, the panel beside it (below it on a narrow screen), the status along the edge.
+import { useState } from 'preact/hooks';
+import { CameraPanel } from './camera-panel';
+import { ChannelCard } from './channel-card';
+import { DatasetPanel } from './dataset-panel';
+import type { FrameView } from './frame-view';
+import { PictureView } from './picture-view';
+import { savePicture } from './save-picture';
+import { SettingsPanel } from './settings-panel';
+import { StatusBar } from './status-bar';
+import type { Store } from './store';
+import { Toasts } from './toasts';
+
+/** A few channels are shown opened; with more, the first one. */
+const kOpenChannels = 2;
+
+export function App({ store, attach }: { store: Store; attach(view: FrameView): void }) {
+  const [panel, setPanel] = useState(!window.matchMedia('(max-width: 760px)').matches);
+  const channels = store.scene.value?.channels ?? [];
+  const key = store.dataset.value?.id ?? '';
+  return (
+    <div class={`app ${panel ? 'with-panel' : ''}`}>
+      <main class="stage">
+        <h1 class="unseen">Scolopax</h1>
+        <PictureView store={store} attach={attach} />
+        <div class="tools">
+          <button type="button" title="Save the picture (PNG)" onClick={() => void savePicture(store)}>
+            <svg viewBox="0 0 16 16" aria-hidden="true">
+              <path d="M8 2v8m-3.5-3L8 10.5 11.5 7M2.5 13.5h11" />
+            </svg>
+            <span class="unseen">Save picture</span>
+          </button>
+          <button type="button" aria-expanded={panel} aria-controls="panel" title="Settings" onClick={() => setPanel(!panel)}>
+            <svg viewBox="0 0 16 16" aria-hidden="true">
+              <path d="M2 4.5h7m4 0h1M2 11.5h1m4 0h7M9 2.5v4M7 9.5v4" />
+            </svg>
+            <span class="unseen">Settings</span>
+          </button>
+        </div>
+        <Toasts store={store} />
+        <StatusBar store={store} />
+      </main>
+      <aside id="panel" class="panel" hidden={!panel} aria-label="Settings">
+        <DatasetPanel store={store} />
+        <section class="group" aria-labelledby="channels-title">
+          <h3 id="channels-title">Channels</h3>
+          {channels.map((_, index) => (
+            <ChannelCard
+              key={`${key} ${index}`}
+              store={store}
+              index={index}
+              open={channels.length <= kOpenChannels || index === 0}
+            />
+          ))}
+        </section>
+        <SettingsPanel store={store} />
+        <CameraPanel store={store} />
+      </aside>
+    </div>
+  );
+}

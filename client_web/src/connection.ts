@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+// Keeps one session's stream open: opens it, resumes it after a loss, makes a new session when the old one
+// is gone. Knows nothing of scenes and pictures beyond handing them on.
+import { ApiError, api, streamUrl, type Capabilities, type Problem, type SessionInfo } from './api';
+import { isObject, type Json, type JsonObject } from './merge-patch';
+
+export type ConnectionState =
+  | { kind: 'connecting' }
+  | { kind: 'connected' }
+  /** `gone`: the server did not answer at the last attempt. `retryAt` is in Date.now() milliseconds. */
+  | { kind: 'waiting'; gone: boolean; retryAt: number }
+  /** The token is not, or no longer, valid: trying again cannot help. */
+  | { kind: 'refused' };
+
+export interface ConnectionEvents {
+  onState(state: ConnectionState): void;
+  /** The stream is open. `fresh`: the session is a new one. */
+  onHello(session: SessionInfo, capabilities: Capabilities, fresh: boolean): void;
+  onFrame(message: ArrayBuffer): void;
+  /** Another viewer's edit. */
+  onScene(revision: number, patch: Json): void;
+  onProblem(problem: Problem, patch?: number): void;
+  onNotice(text: string): void;
+  /** The scene that a new session shall begin with; undefined for the server's default. */
+  currentScene(): JsonObject | undefined;
+}
+
+const kFirstDelayMs = 250;
+const kLongestDelayMs = 8000;
+
+export const retryDelay = (attempt: number) => Math.min(kLongestDelayMs, kFirstDelayMs * 2 ** attempt);
+
+export class Connection {
+  private socket: WebSocket | undefined;
+  private timer: ReturnType<typeof setTimeout> | undefined;
+  private attempt = 0;
+  private stopped = false;
+
+  constructor(
+    private readonly events: ConnectionEvents,
+    private session?: SessionInfo,
+  ) {}
+
+  /** Connects now, whatever was waited for. */
+  async open(): Promise<void> {
+    clearTimeout(this.timer);
+    this.close();
+    this.stopped = false;
+    this.events.onState({ kind: 'connecting' });
+    try {
+      const { session, fresh } = await this.findSession();
+      if (!this.stopped) this.openStream(session, fresh);
+    } catch (error) {
+      if (error instanceof ApiError && (error.status === 401 || error.status === 403)) {
+        this.events.onState({ kind: 'refused' });
+      } else {
+        if (error instanceof ApiError) this.events.onProblem({ ...error.problem, detail: error.message });
+        this.retryLater(!(error instanceof ApiError));
+      }
+    }
+  }
+
+  /** Ends the stream for good. */
+  stop(): void {
+    this.stopped = true;
+    clearTimeout(this.timer);
+    this.close();
+  }
+
+  /** False when the stream is not open; nothing is queued. */
+  send(message: JsonObject): boolean {
+    if (this.socket?.readyState !== 1) return false;
+    this.socket.send(JSON.stringify(message));
+    return true;
+  }
+
+  private close(): void {
+    const socket = this.socket;
+    this.socket = undefined; // first, so that its close event finds that it is no longer ours
+    socket?.close();
+  }
+
+  private async findSession(): Promise<{ session: SessionInfo; fresh: boolean }> {
+    if (this.session) {
+      try {
+        await api.session(this.session.id);
+        return { session: this.session, fresh: false };
+      } catch (error) {
+        if (!(error instanceof ApiError && error.status === 404)) throw error;
+        this.session = undefined;
+      }
+    }
+    this.session = await this.createSession();
+    return { session: this.session, fresh: true };
+  }
+
+  /** With the scene on screen, or without it where it no longer fits what the server has. */
+  private async createSession(): Promise<SessionInfo> {
+    const scene = this.events.currentScene();
+    if (scene) {
+      try {
+        return await api.createSession(scene);
+      } catch (error) {
+        if (!(error instanceof ApiError && [400, 404, 422].includes(error.status))) throw error;
+        this.events.onProblem({ ...error.problem, detail: `The scene was started anew: ${error.message}` });
+      }
+    }
+    return api.createSession();
+  }
+
+  private openStream(session: SessionInfo, fresh: boolean): void {
+    const socket = new WebSocket(streamUrl(session.id));
+    this.socket = socket;
+    socket.binaryType = 'arraybuffer';
+    socket.onopen = () => {
+      if (!fresh) this.send({ type: 'resume', token: session.token });
+    };
+    socket.onmessage = ({ data }) => {
+      if (socket !== this.socket) return;
+      if (data instanceof ArrayBuffer) this.events.onFrame(data);
+      else this.receive(String(data), fresh);
+    };
+    socket.onclose = () => {
+      if (socket !== this.socket) return;
+      this.socket = undefined;
+      this.retryLater(false);
+    };
+  }
+
+  private receive(text: string, fresh: boolean): void {
+    const message = JSON.parse(text) as JsonObject;
+    switch (message.type) {
+      case 'hello':
+        this.attempt = 0;
+        this.session = { id: this.session?.id ?? '', token: String(message.token ?? this.session?.token ?? '') };
+        this.events.onState({ kind: 'connected' });
+        this.events.onHello(this.session, (message.capabilities ?? {}) as Capabilities, fresh);
+        break;
+      case 'scene':
+        this.events.onScene(Number(message.revision), message.patch ?? {});
+        break;
+      case 'error': {
+        const problem = (isObject(message.problem) ? message.problem : message) as Problem;
+        this.events.onProblem(problem, typeof message.id === 'number' ? message.id : undefined);
+        break;
+      }
+      case 'notice':
+        this.events.onNotice(String(message.message ?? message.text ?? message.detail ?? ''));
+        break;
+      default: // a later server may say more than this page understands
+    }
+  }
+
+  private retryLater(gone: boolean): void {
+    if (this.stopped) return;
+    const delay = retryDelay(this.attempt++);
+    this.events.onState({ kind: 'waiting', gone, retryAt: Date.now() + delay });
+    this.timer = setTimeout(() => void this.open(), delay);
+  }
+}

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// The opacity curve over the part of the histogram within the range. Points are dragged, added by a double
+// click or Enter, removed by a double click or Delete, and moved by the arrow keys.
+import { useEffect, useRef } from 'preact/hooks';
+import { addPoint, evaluate, movePoint, pointAfter, removePoint, type Curve } from './curve';
+import { fractionIn, followPointer } from './drag';
+import { histogramPath, type Histogram } from './histogram';
+import { shortNumber } from './controls';
+
+interface Props {
+  curve: Curve;
+  range: readonly [number, number];
+  histogram: Histogram | undefined;
+  /** CSS background that shows the channel's colours from left to right. */
+  paint: string;
+  onChange(curve: Curve): void;
+}
+
+const kSteps: Record<string, readonly [number, number]> = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, 1],
+  ArrowDown: [0, -1],
+};
+
+export function CurveEditor({ curve, range, histogram, paint, onChange }: Props) {
+  const plot = useRef<HTMLDivElement>(null);
+  const handles = useRef<(HTMLDivElement | null)[]>([]);
+  const focusNext = useRef<number | undefined>(undefined);
+  const latest = useRef(curve); // a drag outlives the render it began in
+  latest.current = curve;
+  const change = (next: Curve) => {
+    latest.current = next;
+    onChange(next);
+  };
+
+  useEffect(() => {
+    if (focusNext.current === undefined) return;
+    handles.current[focusNext.current]?.focus();
+    focusNext.current = undefined;
+  });
+
+  const onKey = (event: KeyboardEvent, index: number) => {
+    const step = kSteps[event.key];
+    const point = curve[index];
+    if (!point) return;
+    if (step) {
+      const size = event.shiftKey ? 0.1 : 0.01;
+      change(movePoint(curve, index, [point[0] + step[0] * size, point[1] + step[1] * size]));
+    } else if (event.key === 'Delete' || event.key === 'Backspace') {
+      focusNext.current = Math.max(0, index - 1);
+      change(removePoint(curve, index));
+    } else if (event.key === 'Enter' || event.key === 'Insert') {
+      const added = addPoint(curve, pointAfter(curve, index));
+      focusNext.current = added.index;
+      change(added.curve);
+    } else {
+      return;
+    }
+    event.preventDefault();
+  };
+
+  const onDoubleClick = (event: MouseEvent) => {
+    const { x } = fractionIn(plot.current!, event);
+    const added = addPoint(curve, [x, evaluate(curve, x)]);
+    focusNext.current = added.index;
+    change(added.curve);
+  };
+
+  const line = [[0, evaluate(curve, 0)] as const, ...curve, [1, curve[curve.length - 1]?.[1] ?? 0] as const]
+    .map(([x, y]) => `${(x * 100).toFixed(2)},${((1 - y) * 100).toFixed(2)}`)
+    .join(' ');
+
+  return (
+    <div class="plot curve" ref={plot} onDblClick={onDoubleClick} title="Double-click adds a point">
+      <div class="plot-paint" style={{ background: paint }} />
+      <svg viewBox="0 0 100 100" preserveAspectRatio="none" aria-hidden="true">
+        {histogram && <path class="plot-bars" d={histogramPath(histogram, range[0], range[1], 100, 100)} />}
+        <polygon class="curve-area" points={`0,100 ${line} 100,100`} />
+        <polyline class="curve-line" points={line} />
+      </svg>
+      {curve.map(([x, y], index) => (
+        <div
+          key={index}
+          ref={(element) => void (handles.current[index] = element)}
+          class="handle"
+          role="slider"
+          tabIndex={0}
+          aria-label={`Opacity point ${index + 1} of ${curve.length}`}
+          aria-orientation="vertical"
+          aria-valuemin={0}
+          aria-valuemax={1}
+          aria-valuenow={y}
+          aria-valuetext={`opacity ${shortNumber(y)} at ${shortNumber(range[0] + x * (range[1] - range[0]))}`}
+          title={`opacity ${shortNumber(y)} at ${shortNumber(range[0] + x * (range[1] - range[0]))}`}
+          style={{ left: `${x * 100}%`, bottom: `${y * 100}%` }}
+          onPointerDown={(event) => {
+            event.stopPropagation();
+            followPointer(event, (next) => {
+              const to = fractionIn(plot.current!, next);
+              change(movePoint(latest.current, index, [to.x, to.y]));
+            });
+          }}
+          onDblClick={(event) => {
+            event.stopPropagation();
+            change(removePoint(curve, index));
+          }}
+          onKeyDown={(event) => onKey(event, index)}
+        />
+      ))}
+    </div>
+  );
+}

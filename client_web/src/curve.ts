@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// The opacity curve as a list of [position, value] points, both in [0, 1], positions never decreasing.
+
+export type Point = readonly [number, number];
+export type Curve = readonly Point[];
+
+const clamp = (x: number) => Math.max(0, Math.min(1, x));
+/** Four decimals: finer than a pixel of any editor, and short on the wire. */
+const round = (x: number) => Math.round(x * 1e4) / 1e4;
+
+/** The curve at a position: linear between points, constant outside; of two equal positions the later holds. */
+export function evaluate(curve: Curve, position: number): number {
+  const after = curve.findIndex((point) => point[0] > position);
+  const right = curve[after < 0 ? curve.length - 1 : after];
+  const left = curve[after < 0 ? curve.length - 1 : after - 1] ?? right;
+  if (!left || !right) return 0;
+  const width = right[0] - left[0];
+  return width > 0 ? left[1] + ((right[1] - left[1]) * (position - left[0])) / width : left[1];
+}
+
+/** The point moved, held between its neighbours, so that the order never changes under the hand. */
+export function movePoint(curve: Curve, index: number, to: Point): Curve {
+  const low = curve[index - 1]?.[0] ?? 0;
+  const high = curve[index + 1]?.[0] ?? 1;
+  const position = Math.max(low, Math.min(high, to[0]));
+  return curve.map((point, i) => (i === index ? ([round(clamp(position)), round(clamp(to[1]))] as const) : point));
+}
+
+/** The curve with one more point and that point's index. */
+export function addPoint(curve: Curve, point: Point): { curve: Curve; index: number } {
+  const at = curve.findIndex((other) => other[0] > point[0]);
+  const index = at < 0 ? curve.length : at;
+  const added = [round(clamp(point[0])), round(clamp(point[1]))] as const;
+  return { curve: [...curve.slice(0, index), added, ...curve.slice(index)], index };
+}
+
+/** The curve without a point; the last one stays, since an empty curve means nothing. */
+export function removePoint(curve: Curve, index: number): Curve {
+  return curve.length > 1 ? curve.filter((_, i) => i !== index) : curve;
+}
+
+/** The middle of the widest gap after `index` (or before the first): where a key press adds a point. */
+export function pointAfter(curve: Curve, index: number): Point {
+  const left = curve[index]?.[0] ?? 0;
+  const right = curve[index + 1]?.[0] ?? 1;
+  const position = (left + right) / 2;
+  return [position, evaluate(curve, position)];
+}

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// Joins the edits made between two animation frames into one patch, numbers the patches, measures how long
+// each takes to come back in a picture, and keeps them until then, so that a lost stream loses no edit.
+import { isObject, joinPatches, type Json, type JsonObject } from './merge-patch';
+
+/** The two projections exclude each other, so one patch cannot say first one and then the other. */
+function namesBothProjections(patch: Json): boolean {
+  const camera = isObject(patch) ? patch.camera : undefined;
+  return isObject(camera) && camera.fovY != null && camera.orthoHeight != null;
+}
+
+/** Adds a patch to a list, joined with the last one where that can be said in one. */
+function append(list: JsonObject[], patch: JsonObject): void {
+  const last = list[list.length - 1];
+  const joined = last && joinPatches(last, patch);
+  if (joined === undefined || namesBothProjections(joined)) list.push(patch);
+  else list[list.length - 1] = joined as JsonObject;
+}
+
+export class Edits {
+  private waiting: JsonObject[] = [];
+  private scheduled = false;
+  private lastId = 0;
+  private readonly inFlight = new Map<number, { patch: JsonObject; sentAt: number }>();
+
+  /** `send` answers false while there is no stream. */
+  constructor(
+    private readonly send: (id: number, patch: JsonObject) => boolean,
+    private readonly nextFrame: (run: () => void) => void = (run) => void requestAnimationFrame(run),
+    private readonly now: () => number = () => performance.now(),
+  ) {}
+
+  push(patch: JsonObject): void {
+    append(this.waiting, patch);
+    if (this.scheduled) return;
+    this.scheduled = true;
+    this.nextFrame(() => {
+      this.scheduled = false;
+      this.flush();
+    });
+  }
+
+  flush(): void {
+    while (this.waiting[0] && this.send(this.lastId + 1, this.waiting[0])) {
+      this.lastId += 1;
+      this.inFlight.set(this.lastId, { patch: this.waiting[0], sentAt: this.now() });
+      this.waiting.shift();
+    }
+  }
+
+  /** A picture that contains patches up to `id` has come; the age in milliseconds of that patch, if new. */
+  seen(id: number): number | undefined {
+    const sent = this.inFlight.get(id);
+    for (const known of this.inFlight.keys()) if (known <= id) this.inFlight.delete(known);
+    return sent && this.now() - sent.sentAt;
+  }
+
+  /** The patch was refused, so no picture will contain it. */
+  refused(id: number): void {
+    this.inFlight.delete(id);
+  }
+
+  /** Every edit has come back in a picture or was refused. */
+  get settled(): boolean {
+    return this.waiting.length === 0 && this.inFlight.size === 0;
+  }
+
+  /** Edits that the server may not have yet, oldest first: they stay on top of another viewer's. */
+  get unconfirmed(): JsonObject[] {
+    return [...[...this.inFlight.values()].map((sent) => sent.patch), ...this.waiting];
+  }
+
+  /** On a new stream to the same session: what may be lost is sent again, which does no harm if it was not. */
+  resend(): void {
+    this.waiting = this.unconfirmed;
+    this.inFlight.clear();
+    this.flush();
+  }
+
+  /** On a new session, which began with the scene that holds all edits. */
+  forget(): void {
+    this.waiting = [];
+    this.inFlight.clear();
+  }
+}

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// The control for any field of the scene, by its path: kind, bounds and text come from the schema, the
+// choices from the running server.
+import { valueAt, type Json } from './merge-patch';
+import {
+  ColorControl,
+  EnumControl,
+  NumberControl,
+  TextControl,
+  ToggleControl,
+  VectorControl,
+} from './controls';
+import { choicesOf, fieldAt, type Path } from './schema';
+import type { Store } from './store';
+
+export function FieldControl({ store, path }: { store: Store; path: Path }) {
+  const field = fieldAt(path);
+  const value = valueAt(store.scene.value as Json | undefined, path);
+  const props = { field, onChange: (next: Json) => store.set(path, next) };
+  switch (field.kind) {
+    case 'number':
+    case 'integer':
+      return <NumberControl {...props} value={value as number | undefined} />;
+    case 'toggle':
+      return <ToggleControl {...props} value={value as boolean | undefined} />;
+    case 'enum':
+      return <EnumControl {...props} value={value as string | undefined} choices={choicesOf(path, store.capabilities.value)} />;
+    case 'color':
+      return <ColorControl {...props} value={value as string | undefined} />;
+    case 'text':
+      return <TextControl {...props} value={value as string | undefined} />;
+    case 'vector':
+      return <VectorControl {...props} value={value as number[] | undefined} />;
+    default:
+      return null;
+  }
+}
+
+export function FieldControls({ store, paths }: { store: Store; paths: Path[] }) {
+  return (
+    <>
+      {paths.map((path) => (
+        <FieldControl key={path.join('.')} store={store} path={path} />
+      ))}
+    </>
+  );
+}

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Draws the stream's pictures on a canvas: decodes off the main thread, skips what a newer picture has
+// overtaken, and reports each as done, so that the server knows how far behind this viewer is.
+import { decodeFrameHeader, type FrameHeader } from './frame-header';
+
+export class FrameView {
+  private readonly context: CanvasRenderingContext2D;
+  private next: { header: FrameHeader; message: ArrayBuffer } | undefined;
+  private busy = false;
+
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    /** Called once for each frame that came: after it is drawn, or when it is skipped (`drawn` false). */
+    private readonly onDone: (header: FrameHeader, drawn: boolean) => void,
+  ) {
+    this.context = canvas.getContext('2d', { alpha: false })!;
+  }
+
+  /** Takes one binary message. Throws for one that is no frame. */
+  show(message: ArrayBuffer): void {
+    const header = decodeFrameHeader(message);
+    if (this.next) this.onDone(this.next.header, false);
+    this.next = { header, message };
+    if (!this.busy) void this.drawAll();
+  }
+
+  private async drawAll(): Promise<void> {
+    this.busy = true;
+    while (this.next) {
+      const { header, message } = this.next;
+      this.next = undefined;
+      this.onDone(header, await this.draw(header, message));
+    }
+    this.busy = false;
+  }
+
+  private async draw(header: FrameHeader, message: ArrayBuffer): Promise<boolean> {
+    try {
+      const bytes = new Uint8Array(message, header.headerBytes);
+      const picture = await createImageBitmap(new Blob([bytes], { type: header.mime }));
+      // Setting the size clears the canvas, so it happens only when the size changes and just before drawing.
+      if (this.canvas.width !== picture.width || this.canvas.height !== picture.height) {
+        this.canvas.width = picture.width;
+        this.canvas.height = picture.height;
+      }
+      this.context.drawImage(picture, 0, 0);
+      picture.close();
+      return true;
+    } catch {
+      return false; // a damaged picture is skipped: the next one replaces it
+    }
+  }
+}

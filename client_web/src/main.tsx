@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Starts the page: the store opens the stream, the picture view draws what comes.
+import { render } from 'preact';
+import { App } from './app';
+import type { FrameView } from './frame-view';
+import { Store } from './store';
+import './style.css';
+
+let view: FrameView | undefined;
+const store = new Store((message) => {
+  try {
+    view?.show(message);
+  } catch (error) {
+    store.say(String(error instanceof Error ? error.message : error));
+  }
+});
+
+// The token has become a cookie; it does not belong in the address bar, where it would be copied along.
+const address = new URL(location.href);
+if (address.searchParams.has('token')) {
+  address.searchParams.delete('token');
+  history.replaceState(null, '', address);
+}
+
+render(<App store={store} attach={(next) => (view = next)} />, document.getElementById('app')!);
+store.start();

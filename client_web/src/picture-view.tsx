@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// The live picture: a canvas that fills the window and takes the gestures that move the camera.
+import { useEffect, useRef } from 'preact/hooks';
+import { FrameView } from './frame-view';
+import { attachGestures } from './gestures';
+import { orbitControls } from './orbit-controls';
+import type { Store } from './store';
+
+/** More than two device pixels to a CSS pixel costs rays that nobody sees. */
+const kMostPixelRatio = 2;
+const kResizeRestMs = 120;
+
+export function PictureView({ store, attach }: { store: Store; attach(view: FrameView): void }) {
+  const box = useRef<HTMLDivElement>(null);
+  const canvas = useRef<HTMLCanvasElement>(null);
+
+  useEffect(() => {
+    const element = box.current!;
+    attach(new FrameView(canvas.current!, (header, drawn) => store.frameDone(header, drawn)));
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const measure = () => {
+      const ratio = Math.min(kMostPixelRatio, window.devicePixelRatio || 1);
+      store.setImageSize(Math.round(element.clientWidth * ratio), Math.round(element.clientHeight * ratio));
+    };
+    const observer = new ResizeObserver(() => {
+      clearTimeout(timer);
+      timer = setTimeout(measure, kResizeRestMs);
+    });
+    measure();
+    observer.observe(element);
+    const showHide = () => store.setVisible(document.visibilityState === 'visible');
+    document.addEventListener('visibilitychange', showHide);
+    const detach = attachGestures(element, orbitControls(store));
+    return () => {
+      detach();
+      clearTimeout(timer);
+      observer.disconnect();
+      document.removeEventListener('visibilitychange', showHide);
+    };
+  }, [store]);
+
+  return (
+    <div
+      ref={box}
+      class="picture"
+      tabIndex={0}
+      role="application"
+      aria-roledescription="volume view"
+      aria-label="Volume. Arrow keys turn, shift and arrow keys shift, plus and minus zoom, R resets the view."
+      style={{ background: store.scene.value?.image?.background ?? '#000' }}
+    >
+      <canvas ref={canvas} width={1} height={1} />
+      {!store.frame.value && <p class="picture-wait">Waiting for the first picture …</p>}
+    </div>
+  );
+}

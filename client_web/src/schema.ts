@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the scene's JSON Schema says of a field, in the form in which controls are built from it: a field
+// that is added to the schema gets its control without a change here.
+import document from '../../protocol/schema.json';
+import type { Capabilities, Named } from './api';
+
+export type Path = readonly (string | number)[];
+
+interface SchemaNode {
+  $ref?: string;
+  type?: string | string[];
+  title?: string;
+  description?: string;
+  properties?: Record<string, SchemaNode>;
+  items?: SchemaNode;
+  minItems?: number;
+  maxItems?: number;
+  minimum?: number;
+  maximum?: number;
+  exclusiveMinimum?: number;
+  exclusiveMaximum?: number;
+  pattern?: string;
+  enum?: unknown[];
+  anyOf?: SchemaNode[];
+  oneOf?: SchemaNode[];
+  default?: unknown;
+}
+
+export type Kind = 'number' | 'integer' | 'toggle' | 'enum' | 'color' | 'text' | 'vector' | 'object' | 'other';
+
+export interface Field {
+  /** The key, or '' for the whole scene. */
+  key: string;
+  /** The key in words: "orthoHeight" is "Ortho height". */
+  label: string;
+  kind: Kind;
+  /** What it is, with its unit. */
+  doc: string;
+  /** Bounds, and whether the bound itself is allowed. */
+  minimum?: number;
+  maximum?: number;
+  aboveMinimum: boolean;
+  /** null has the server choose. */
+  automatic: boolean;
+  default?: unknown;
+  /** Of a vector. */
+  length: number;
+  options: string[];
+  /** Keys of an object. */
+  members: string[];
+}
+
+const root = document as unknown as SchemaNode;
+
+function resolve(node: SchemaNode): SchemaNode {
+  if (!node.$ref) return node;
+  const target = node.$ref
+    .replace(/^#\//, '')
+    .split('/')
+    .reduce<Record<string, unknown>>((at, key) => at[key] as Record<string, unknown>, root as Record<string, unknown>);
+  return { ...resolve(target as SchemaNode), ...node, $ref: undefined };
+}
+
+/** The node without its null alternative, and whether it had one. */
+function withoutNull(outer: SchemaNode): { node: SchemaNode; automatic: boolean } {
+  const node = resolve(outer);
+  const { anyOf, oneOf, ...rest } = node;
+  const choices = anyOf ?? oneOf;
+  if (!choices) {
+    const nullable = Array.isArray(node.type) ? node.type.includes('null') : (node.enum?.includes(null) ?? false);
+    return { node, automatic: nullable };
+  }
+  const real = choices.map(resolve).filter((choice) => choice.type !== 'null');
+  const automatic = real.length < choices.length;
+  return { node: real.length === 1 ? { ...resolve(real[0]!), ...rest } : { ...node }, automatic };
+}
+
+function kindOf(node: SchemaNode): Kind {
+  const types = [node.type ?? []].flat().filter((type) => type !== 'null');
+  if (node.enum) return 'enum';
+  if (types.length !== 1) return 'other';
+  switch (types[0]) {
+    case 'boolean':
+      return 'toggle';
+    case 'integer':
+    case 'number':
+      return types[0];
+    case 'string':
+      return node.pattern?.startsWith('^#') ? 'color' : 'text';
+    case 'object':
+      return 'object';
+    case 'array':
+      return node.minItems === node.maxItems && node.items && kindOf(resolve(node.items)) === 'number'
+        ? 'vector'
+        : 'other';
+    default:
+      return 'other';
+  }
+}
+
+const inWords = (key: string) => {
+  const words = key.replace(/([a-z])([A-Z])/g, (_, a: string, b: string) => `${a} ${b.toLowerCase()}`);
+  return words.charAt(0).toUpperCase() + words.slice(1);
+};
+
+function describeNode(key: string, outer: SchemaNode): Field {
+  const { node, automatic } = withoutNull(outer);
+  return {
+    key,
+    label: inWords(key),
+    kind: kindOf(node),
+    doc: node.description ?? '',
+    minimum: node.minimum ?? node.exclusiveMinimum,
+    maximum: node.maximum ?? node.exclusiveMaximum,
+    aboveMinimum: node.exclusiveMinimum !== undefined,
+    automatic: automatic && node.default == null,
+    default: node.default ?? undefined,
+    length: node.minItems ?? 0,
+    options: (node.enum ?? []).filter((entry): entry is string => typeof entry === 'string'),
+    members: Object.keys(node.properties ?? {}),
+  };
+}
+
+/** The field at a path of the scene; numbers step into lists. Throws for a path the schema does not know. */
+export function fieldAt(path: Path): Field {
+  let node = root;
+  for (const key of path) {
+    const inner = withoutNull(node).node;
+    const next = typeof key === 'number' ? inner.items : inner.properties?.[key];
+    if (!next) throw new Error(`the schema has no ${path.join('.')}`);
+    node = next;
+  }
+  return describeNode(String(path[path.length - 1] ?? ''), node);
+}
+
+/** Paths of the single values below a path, objects opened, lists left out. */
+export function leavesBelow(path: Path): Path[] {
+  const field = fieldAt(path);
+  if (field.kind === 'object') return field.members.flatMap((member) => leavesBelow([...path, member]));
+  return field.kind === 'other' ? [] : [path];
+}
+
+/** Where the server lists what an enumerated field may be, with a line on each. */
+const listOf: Record<string, keyof Omit<Capabilities, 'limits'>> = {
+  'blend.mode': 'blendModes',
+  'integrator.method': 'methods',
+  'image.filter': 'filters',
+};
+
+/** The choices of an enumerated field: the running server's list where it has one, else the schema's. */
+export function choicesOf(path: Path, capabilities: Capabilities): Named[] {
+  const list = listOf[path.join('.')];
+  return (list && capabilities[list]) || fieldAt(path).options.map((name) => ({ name }));
+}
+
+/** "/channels/0/gamma" as a person would say it: "Channel 1, gamma". */
+export function sayPointer(pointer: string): string {
+  const keys = pointer.split('/').filter(Boolean);
+  if (keys[0] === 'channels' && keys[1] !== undefined)
+    return [`Channel ${Number(keys[1]) + 1}`, ...keys.slice(2)].join(', ');
+  return keys.join(', ');
+}

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// State of the connection and of the picture, along the lower edge.
+import { useEffect, useState } from 'preact/hooks';
+import type { ConnectionState } from './connection';
+import type { Store } from './store';
+
+/** What a screen reader is told when it changes: without the countdown. */
+export function stateWords(state: ConnectionState): string {
+  switch (state.kind) {
+    case 'connecting':
+      return 'Connecting';
+    case 'connected':
+      return 'Connected';
+    case 'waiting':
+      return state.gone ? 'Server gone' : 'Connection lost';
+    case 'refused':
+      return 'Not authorised: open the address that the server printed';
+  }
+}
+
+/** Seconds until the next attempt, counted down. */
+function useCountdown(state: ConnectionState): number | undefined {
+  const [now, setNow] = useState(Date.now());
+  useEffect(() => {
+    if (state.kind !== 'waiting') return undefined;
+    setNow(Date.now());
+    const timer = setInterval(() => setNow(Date.now()), 250);
+    return () => clearInterval(timer);
+  }, [state]);
+  return state.kind === 'waiting' ? Math.max(0, Math.ceil((state.retryAt - now) / 1000)) : undefined;
+}
+
+function Figure({ name, value, hint }: { name: string; value: string; hint: string }) {
+  return (
+    <span class="figure" title={hint}>
+      <b>{value}</b> {name}
+    </span>
+  );
+}
+
+export function StatusBar({ store }: { store: Store }) {
+  const state = store.connection.value;
+  const seconds = useCountdown(state);
+  const { meter } = store;
+  useEffect(() => {
+    const timer = setInterval(() => meter.update(), 500);
+    return () => clearInterval(timer);
+  }, [meter]);
+
+  const frame = store.frame.value;
+  const wanted = store.scene.value?.stop?.samples;
+  const latency = meter.latencyMs.value;
+  const rate = meter.framesPerSecond.value;
+  return (
+    <footer class="status">
+      <span class={`connection ${state.kind}`}>
+        <i aria-hidden="true" />
+        <span aria-hidden="true">
+          {stateWords(state)}
+          {seconds !== undefined && `, reconnecting in ${seconds} s`}
+        </span>
+        <span class="unseen" role="status" aria-live="polite">
+          {stateWords(state)}
+        </span>
+        {(state.kind === 'waiting' || state.kind === 'refused') && (
+          <button type="button" class="quiet" onClick={() => store.retryNow()}>
+            Retry now
+          </button>
+        )}
+      </span>
+      {frame && (
+        <>
+          <Figure
+            name={frame.samples === 1 ? 'sample' : 'samples'}
+            value={wanted && frame.samples < wanted ? `${frame.samples} / ${wanted}` : String(frame.samples)}
+            hint={frame.final ? 'Samples per pixel; finished' : 'Samples per pixel'}
+          />
+          <Figure
+            name="error"
+            value={Number.isFinite(frame.error) ? frame.error.toPrecision(2) : '–'}
+            hint="Estimated RMSE, linear premultiplied RGB"
+          />
+          <Figure
+            name="ms"
+            value={latency === undefined ? '–' : latency.toFixed(0)}
+            hint="Latency: from sending an edit to the first picture that contains it"
+          />
+          <Figure name="frames/s" value={rate.toFixed(1)} hint="Pictures drawn per second" />
+          <Figure name="" value={store.scene.value?.integrator?.method ?? ''} hint="Method" />
+          <Figure name="" value={`${frame.width} × ${frame.height}`} hint="Size of the picture received" />
+        </>
+      )}
+    </footer>
+  );
+}

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page's state as signals, and the one way to change the scene. Between the stream (connection.ts) and
+// the components, which read signals and call edit().
+import { batch, computed, signal } from '@preact/signals';
+import { ApiError, api, type Capabilities, type DatasetInfo, type DatasetSummary, type Problem, type SessionInfo } from './api';
+import { Connection, type ConnectionState } from './connection';
+import { Edits } from './edits';
+import type { FrameHeader } from './frame-header';
+import type { Histogram } from './histogram';
+import { applyPatch, isObject, patchAt, type Json, type JsonObject } from './merge-patch';
+import type { Camera } from './orbit-camera';
+import type { Scene } from './scene.generated';
+import { sayPointer, type Path } from './schema';
+import { FrameMeter } from './frame-meter';
+
+export interface Toast {
+  id: number;
+  /** The field at fault, in words; empty when it is none. */
+  field: string;
+  text: string;
+}
+
+const kSettleMs = 250;
+const kMemory = 'scolopax.session';
+
+/** The scene as it will be: camera projections exclude each other, the last one set wins. */
+function applyEdit(scene: Json | undefined, patch: JsonObject): Scene {
+  const next = applyPatch(scene ?? {}, patch) as JsonObject;
+  if (isObject(patch.camera) && isObject(next.camera)) {
+    if (patch.camera.fovY != null) delete next.camera.orthoHeight;
+    else if (patch.camera.orthoHeight != null) delete next.camera.fovY;
+  }
+  return next as Scene;
+}
+
+export class Store {
+  readonly connection = signal<ConnectionState>({ kind: 'connecting' });
+  readonly sessionId = signal<string | undefined>(undefined);
+  readonly scene = signal<Scene | undefined>(undefined);
+  readonly capabilities = signal<Capabilities>({});
+  readonly datasets = signal<DatasetSummary[]>([]);
+  readonly dataset = signal<DatasetInfo | undefined>(undefined);
+  readonly histograms = signal<(Histogram | undefined)[]>([]);
+  readonly frame = signal<FrameHeader | undefined>(undefined);
+  readonly toasts = signal<Toast[]>([]);
+  readonly meter = new FrameMeter();
+
+  /** Length of the volume's diagonal in world units: the scale of what is looked at. */
+  readonly worldSize = computed(() => this.dataset.value?.diagonal || 1);
+  /** Undefined until the server has resolved it. */
+  readonly camera = computed<Camera | undefined>(() => {
+    const { eye, target, up, fovY, orthoHeight } = this.scene.value?.camera ?? {};
+    if (!eye || !target || !up) return undefined;
+    return { eye, target, up, fovY: fovY ?? undefined, orthoHeight: orthoHeight ?? undefined };
+  });
+
+  private readonly edits = new Edits((id, patch) => this.link.send({ type: 'patch', id, patch }));
+  private readonly link: Connection;
+  private revision = 0;
+  private settleTimer: ReturnType<typeof setTimeout> | undefined;
+  private toastCount = 0;
+  private onRefreshed: (() => void) | undefined;
+  private wantedSize: { width: number; height: number } | undefined;
+
+  constructor(private readonly onFrame: (message: ArrayBuffer) => void) {
+    this.link = new Connection(
+      {
+        onState: (state) => (this.connection.value = state),
+        onHello: (session, capabilities, fresh) => void this.begin(session, capabilities, fresh),
+        onFrame: (message) => this.onFrame(message),
+        onScene: (revision, patch) => this.receiveScene(revision, patch),
+        onProblem: (problem, patch) => this.receiveProblem(problem, patch),
+        onNotice: (text) => this.say(text),
+        currentScene: () => this.scene.peek() as JsonObject | undefined,
+      },
+      this.remembered(),
+    );
+  }
+
+  start(): void {
+    void this.link.open();
+  }
+
+  /** Shows an edit at once and sends it with the others of this animation frame. */
+  edit(patch: JsonObject): void {
+    this.scene.value = applyEdit(this.scene.peek() as Json | undefined, patch);
+    this.edits.push(patch);
+    this.refreshLater();
+  }
+
+  set(path: Path, value: Json): void {
+    this.edit(patchAt(path, value));
+  }
+
+  setCamera(camera: Camera): void {
+    const { eye, target, up, orthoHeight } = camera;
+    this.edit({
+      camera: {
+        eye: [...eye],
+        target: [...target],
+        up: [...up],
+        // Either one removes the other, so the angle of view is said only when the projection changes.
+        ...(orthoHeight !== undefined
+          ? { orthoHeight }
+          : this.camera.peek()?.orthoHeight !== undefined && camera.fovY !== undefined
+            ? { fovY: camera.fovY }
+            : {}),
+      },
+    });
+  }
+
+  /** Has the server choose the view again; `then` runs when it is known. */
+  resetCamera(then?: () => void): void {
+    this.onRefreshed = then;
+    this.edit({ camera: null });
+  }
+
+  /** The size in device pixels that the picture should have. */
+  setImageSize(width: number, height: number): void {
+    const { maxWidth = 16384, maxHeight = 16384, maxPixels = 2 ** 24 } = this.capabilities.peek().limits ?? {};
+    const shrink = Math.min(1, maxWidth / width, maxHeight / height, Math.sqrt(maxPixels / (width * height)));
+    this.wantedSize = {
+      width: Math.max(1, Math.floor(width * shrink)),
+      height: Math.max(1, Math.floor(height * shrink)),
+    };
+    this.applySize();
+  }
+
+  setVisible(visible: boolean): void {
+    this.link.send({ type: 'view', visible });
+  }
+
+  /** Counts a picture that came, and tells the server that it did. */
+  frameDone(header: FrameHeader, drawn: boolean): void {
+    this.link.send({ type: 'ack', frame: header.frame });
+    if (!drawn) return;
+    this.revision = Math.max(this.revision, header.revision);
+    batch(() => {
+      this.frame.value = header;
+      this.meter.drawn(this.edits.seen(header.patch));
+    });
+  }
+
+  retryNow(): void {
+    void this.link.open();
+  }
+
+  say(text: string, field = ''): void {
+    const others = this.toasts.peek().filter((toast) => toast.text !== text);
+    this.toasts.value = [...others, { id: ++this.toastCount, field, text }].slice(-4);
+  }
+
+  dismiss(id: number): void {
+    this.toasts.value = this.toasts.peek().filter((toast) => toast.id !== id);
+  }
+
+  // --- the stream ---
+
+  private async begin(session: SessionInfo, capabilities: Capabilities, fresh: boolean): Promise<void> {
+    sessionStorage.setItem(kMemory, JSON.stringify(session));
+    this.sessionId.value = session.id;
+    this.capabilities.value = capabilities;
+    this.revision = 0;
+    if (fresh) this.edits.forget();
+    else this.edits.resend();
+    this.setVisible(document.visibilityState === 'visible');
+    this.datasets.value = await api.datasets().catch(() => []);
+    await this.refresh();
+    this.applySize();
+  }
+
+  private remembered(): SessionInfo | undefined {
+    const { id, token } = JSON.parse(sessionStorage.getItem(kMemory) ?? '{}') as Partial<SessionInfo>;
+    return id && token ? { id, token } : undefined;
+  }
+
+  private receiveScene(revision: number, patch: Json): void {
+    this.revision = Math.max(this.revision, revision);
+    if (isObject(patch)) this.showScene(applyEdit(this.scene.peek() as Json | undefined, patch));
+  }
+
+  private receiveProblem(problem: Problem, patch?: number): void {
+    if (patch) this.edits.refused(patch);
+    this.say(problem.detail ?? problem.title ?? 'The server reports an error.', sayPointer(problem.pointer ?? ''));
+    if (patch) void this.refresh();
+  }
+
+  /** The server's scene with the edits on top that it may not have yet. */
+  private showScene(scene: Scene): void {
+    this.scene.value = this.edits.unconfirmed.reduce((at, patch) => applyEdit(at as Json, patch), scene);
+  }
+
+  /** Fetches the scene with what the server chose for itself, such as a density. */
+  private async refresh(): Promise<void> {
+    const id = this.sessionId.peek();
+    if (!id) return;
+    try {
+      const { revision, scene } = await api.scene(id);
+      if (revision < this.revision) return this.refreshLater(); // an edit overtook the answer
+      this.revision = revision;
+      await this.showDataset(scene.dataset);
+      this.showScene(scene as Scene);
+      this.onRefreshed?.();
+      this.onRefreshed = undefined;
+    } catch (error) {
+      // A lost server is the connection's to report.
+      if (error instanceof ApiError) this.say(error.message);
+    }
+  }
+
+  private refreshLater(): void {
+    clearTimeout(this.settleTimer);
+    this.settleTimer = setTimeout(() => {
+      if (this.connection.peek().kind !== 'connected') return;
+      if (this.edits.settled) void this.refresh();
+      else this.refreshLater();
+    }, kSettleMs);
+  }
+
+  private async showDataset(id: Json | undefined): Promise<void> {
+    const wanted = typeof id === 'string' ? id : this.datasets.peek()[0]?.id;
+    if (wanted === undefined || this.dataset.peek()?.id === wanted) return;
+    const dataset = await api.dataset(wanted);
+    batch(() => {
+      this.dataset.value = dataset;
+      this.histograms.value = dataset.channels.map(() => undefined);
+    });
+    dataset.channels.forEach((_, channel) => {
+      api
+        .histogram(wanted, channel)
+        .then((histogram) => {
+          if (this.dataset.peek() !== dataset) return;
+          this.histograms.value = this.histograms.peek().map((old, i) => (i === channel ? histogram : old));
+        })
+        .catch(() => undefined); // the plot stays empty; everything else works
+    });
+  }
+
+  private applySize(): void {
+    const image = this.scene.peek()?.image;
+    const size = this.wantedSize;
+    if (!size || !image || (image.width === size.width && image.height === size.height)) return;
+    this.edit({ image: size });
+  }
+}

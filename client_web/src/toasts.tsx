@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Messages of the server that stay until they are dismissed.
+import type { Store } from './store';
+
+export function Toasts({ store }: { store: Store }) {
+  return (
+    <div class="toasts" role="alert">
+      {store.toasts.value.map(({ id, field, text }) => (
+        <div class="toast" key={id}>
+          <p>
+            {field && <b>{field}: </b>}
+            {text}
+          </p>
+          <button type="button" aria-label="Dismiss" onClick={() => store.dismiss(id)}>
+            ×
+          </button>
+        </div>
+      ))}
+    </div>
+  );
+}
