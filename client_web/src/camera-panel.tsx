@@ -8,8 +8,8 @@ import { fieldAt } from './schema';
 import type { Store } from './store';
 
 const kPlaces = fieldAt(['camera']).members.filter((key) => key !== 'fovY' && key !== 'orthoHeight');
-const kFovY = fieldAt(['camera', 'fovY']);
-const kOrthoHeight = fieldAt(['camera', 'orthoHeight']);
+const kFovY = { ...fieldAt(['camera', 'fovY']), label: 'Angle of view' };
+const kOrthoHeight = { ...fieldAt(['camera', 'orthoHeight']), label: 'View height' };
 
 export function CameraPanel({ store }: { store: Store }) {
   const camera = store.camera.value;

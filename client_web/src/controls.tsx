@@ -8,8 +8,8 @@ import type { Field } from './schema';
 const kLogDecades = 2; // a slider over a scale reaches this far to both sides of its first value
 const kSliderSteps = 400;
 
-/** Six significant digits: enough to recognise a value, short enough to read. */
-export const shortNumber = (value: number) => String(Number(value.toPrecision(6)));
+/** Five significant digits: enough to recognise a value, short enough to read. */
+export const shortNumber = (value: number) => String(Number(value.toPrecision(5)));
 
 interface RowProps {
   field: Field;
@@ -80,7 +80,7 @@ export function NumberInput({ field, value, onChange, id, label }: ControlProps<
       min={field.minimum}
       max={field.maximum}
       aria-label={label}
-      placeholder={field.automatic ? 'auto' : undefined}
+      placeholder={field.automatic ? '–' : undefined}
       value={value === undefined ? '' : shortNumber(value)}
       onChange={(event) => {
         const text = event.currentTarget.value;
@@ -97,7 +97,7 @@ export function NumberControl({ field, value, onChange }: ControlProps<number>) 
   first.current ??= typeof field.default === 'number' ? field.default : value;
   const scale = sliderScale(field, first.current);
   return (
-    <Row field={field} id={id} onAutomatic={field.automatic ? () => onChange(null) : undefined}>
+    <Row field={field} id={id} onAutomatic={field.automatic && value !== undefined ? () => onChange(null) : undefined}>
       {scale && (
         <input
           type="range"

@@ -67,16 +67,18 @@ export function CurveEditor({ curve, range, histogram, paint, onChange }: Props)
     change(added.curve);
   };
 
-  const line = [[0, evaluate(curve, 0)] as const, ...curve, [1, curve[curve.length - 1]?.[1] ?? 0] as const]
-    .map(([x, y]) => `${(x * 100).toFixed(2)},${((1 - y) * 100).toFixed(2)}`)
-    .join(' ');
+  const ends = [evaluate(curve, 0), curve[curve.length - 1]?.[1] ?? 0] as const;
+  const corners = [[0, ends[0]] as const, ...curve, [1, ends[1]] as const].map(
+    ([x, y]) => [(x * 100).toFixed(2), ((1 - y) * 100).toFixed(2)] as const,
+  );
+  const line = corners.map((corner) => corner.join(',')).join(' ');
+  const area = `polygon(0 100%, ${corners.map(([x, y]) => `${x}% ${y}%`).join(', ')}, 100% 100%)`;
 
   return (
     <div class="plot curve" ref={plot} onDblClick={onDoubleClick} title="Double-click adds a point">
-      <div class="plot-paint" style={{ background: paint }} />
+      <div class="plot-paint" style={{ background: paint, clipPath: area }} />
       <svg viewBox="0 0 100 100" preserveAspectRatio="none" aria-hidden="true">
         {histogram && <path class="plot-bars" d={histogramPath(histogram, range[0], range[1], 100, 100)} />}
-        <polygon class="curve-area" points={`0,100 ${line} 100,100`} />
         <polyline class="curve-line" points={line} />
       </svg>
       {curve.map(([x, y], index) => (

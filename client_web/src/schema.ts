@@ -109,7 +109,7 @@ function describeNode(key: string, outer: SchemaNode): Field {
     key,
     label: inWords(key),
     kind: kindOf(node),
-    doc: node.description ?? '',
+    doc: (node.description ?? '').split('\n')[0]!, // the lines below it are the choices'
     minimum: node.minimum ?? node.exclusiveMinimum,
     maximum: node.maximum ?? node.exclusiveMaximum,
     aboveMinimum: node.exclusiveMinimum !== undefined,

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+import { describe, expect, it } from 'vitest';
+import { sliderScale } from '../src/controls';
+import { choicesOf, fieldAt, leavesBelow, sayPointer } from '../src/schema';
+
+describe('the schema', () => {
+  it('says of each field what its control needs', () => {
+    expect(fieldAt(['channels', 3, 'visible']).kind).toBe('toggle');
+    expect(fieldAt(['channels', 0, 'color']).kind).toBe('color');
+    expect(fieldAt(['camera', 'eye'])).toMatchObject({ kind: 'vector', length: 3, automatic: true });
+    expect(fieldAt(['channels', 0, 'gamma'])).toMatchObject({ kind: 'number', minimum: 0, aboveMinimum: true, automatic: false });
+    expect(fieldAt(['channels', 0, 'density'])).toMatchObject({ kind: 'number', automatic: true });
+    expect(fieldAt(['integrator', 'seed']).kind).toBe('integer');
+    expect(fieldAt(['camera', 'orthoHeight']).label).toBe('Ortho height');
+    expect(fieldAt(['camera', 'eye']).doc.length).toBeGreaterThan(10);
+  });
+
+  it('knows every field of the scene, so that none is without a control by mistake', () => {
+    const names = leavesBelow([]).map((path) => path.join('.'));
+    expect(names).toContain('blend.mode');
+    expect(names).toContain('stop.seconds');
+    expect(leavesBelow(['channels', 0]).map((path) => path[2])).toContain('density');
+  });
+
+  it('refuses a path that it does not have', () => {
+    expect(() => fieldAt(['camera', 'roll'])).toThrow(/camera.roll/);
+  });
+
+  it('takes choices from the running server, else from itself', () => {
+    const blendModes = [{ name: 'only here', doc: 'x' }];
+    expect(choicesOf(['blend', 'mode'], { blendModes })).toEqual(blendModes);
+    expect(choicesOf(['blend', 'mode'], {}).map((choice) => choice.name)).toContain('density');
+  });
+
+  it('names the field of a problem in words', () => {
+    expect(sayPointer('/channels/0/gamma')).toBe('Channel 1, gamma');
+    expect(sayPointer('/camera/eye')).toBe('camera, eye');
+  });
+});
+
+describe('a slider', () => {
+  it('of a scale is logarithmic around its first value and stays within the bounds', () => {
+    const scale = sliderScale(fieldAt(['channels', 0, 'gamma']), 1)!;
+    expect(scale.toSlider(1)).toBeCloseTo(0.5, 12);
+    expect(scale.toValue(0)).toBeCloseTo(0.01, 12);
+    expect(scale.toValue(1)).toBeCloseTo(100, 9);
+  });
+  it('of an angle is linear and stays off bounds that are not allowed', () => {
+    const scale = sliderScale(fieldAt(['camera', 'fovY']), 35)!;
+    expect(scale.toValue(0)).toBeGreaterThan(0);
+    expect(scale.toValue(1)).toBeLessThan(180);
+    expect(scale.toValue(scale.toSlider(90))).toBeCloseTo(90, 6);
+  });
+  it('is not offered where no position could mean a value', () => {
+    expect(sliderScale(fieldAt(['integrator', 'seed']), 0)).toBeUndefined();
+    expect(sliderScale(fieldAt(['stop', 'seconds']), undefined)).toBeUndefined();
+  });
+});
