@@ -6,7 +6,12 @@
 namespace scolopax::protocol {
 namespace {
 
-std::string shortNumber(double value) { return nlohmann::json(value).dump(); }
+/// "0.5", "100", "1e+30".
+std::string shortNumber(double value) {
+  std::string text = nlohmann::json(value).dump();
+  if (text.ends_with(".0")) text.resize(text.size() - 2);
+  return text;
+}
 
 std::size_t codePoints(std::string_view utf8) {
   return std::size_t(std::count_if(utf8.begin(), utf8.end(), [](char c) { return (c & 0xC0) != 0x80; }));

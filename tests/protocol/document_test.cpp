@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// PROTOCOL.md: its section on fields is what the table says, and its examples are what they claim to be.
+#include <gtest/gtest.h>
+
+#include <sstream>
+#include <vector>
+
+#include "protocol/messages.h"
+#include "protocol/patch.h"
+#include "protocol/scene_json.h"
+#include "protocol/schema.h"
+#include "tests/protocol/fixtures.h"
+#include "tests/protocol/lists.h"
+
+namespace scolopax::protocol {
+namespace {
+
+using nlohmann::json;
+
+/// The contents of the fenced blocks that begin with this line.
+std::vector<std::string> blocks(const std::string& fence) {
+  std::istringstream lines(readText(protocolFile("PROTOCOL.md")));
+  std::vector<std::string> found;
+  bool inside = false;
+  for (std::string line; std::getline(lines, line);) {
+    line.erase(0, line.find_first_not_of(' '));  // a block within a list is indented
+    if (!inside && line == "```" + fence) {
+      inside = true;
+      found.emplace_back();
+    } else if (inside && line == "```") {
+      inside = false;
+    } else if (inside) {
+      found.back() += line + '\n';
+    }
+  }
+  return found;
+}
+
+TEST(ProtocolDocument, HoldsTheSectionOfTheTable) {
+  const std::string begin = "<!-- fields: generated, do not edit -->\n", end = "<!-- end of fields -->";
+  const std::string text = readText(protocolFile("PROTOCOL.md"));
+  const std::size_t from = text.find(begin), to = text.find(end);
+  ASSERT_NE(from, std::string::npos);
+  ASSERT_NE(to, std::string::npos);
+  expectFile(protocolFile("PROTOCOL.md"),
+             text.substr(0, from) + begin + '\n' + fieldsMarkdown(rendererLists()) + text.substr(to));
+}
+
+TEST(ProtocolDocument, ShowsScenesThatAreTaken) {
+  const auto scenes = blocks("json scene");
+  EXPECT_EQ(scenes.size(), 2U);
+  for (const std::string& text : scenes)
+    EXPECT_NO_THROW(parseScene(parseJson(text), rendererLists())) << text;
+}
+
+TEST(ProtocolDocument, ShowsPatchesThatAreTaken) {
+  const auto patches = blocks("json patch");
+  EXPECT_EQ(patches.size(), 5U);
+  const json scene = json::parse(R"({"channels": [{"opacity": [[0, 0], [1, 1]]}]})");
+  for (const std::string& text : patches) {
+    EXPECT_NO_THROW(parseScene(applyPatch(scene, parseJson(text), 4), rendererLists())) << text;
+  }
+}
+
+TEST(ProtocolDocument, ShowsMessagesThatAreTaken) {
+  const auto messages = blocks("json message");
+  EXPECT_EQ(messages.size(), std::variant_size_v<ClientMessage>);
+  for (const std::string& text : messages) EXPECT_NO_THROW(parseClientMessage(text)) << text;
+}
+
+TEST(ProtocolDocument, ShowsOnlyJsonWhereItSaysSo) {
+  for (const std::string& text : blocks("json")) EXPECT_NO_THROW(parseJson(text)) << text;
+}
+
+}  // namespace
+}  // namespace scolopax::protocol

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/messages.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/protocol/fixtures.h"
+
+namespace scolopax::protocol {
+namespace {
+
+using nlohmann::json;
+
+/// The message of that name among the server's fixtures.
+json serverFixture(const std::string& name) {
+  const json fixtures = readFixture("messages.json");
+  for (const json& fixture : fixtures["server"]) {
+    if (fixture["name"] == name) return fixture["message"];
+  }
+  ADD_FAILURE() << "no fixture " << name;
+  return {};
+}
+
+TEST(ParseClientMessage, TakesAndRefusesTheFixtures) {
+  const json fixtures = readFixture("messages.json");
+  EXPECT_GT(fixtures["client"].size(), 20U);
+  for (const json& fixture : fixtures["client"]) {
+    SCOPED_TRACE(fixture["name"].get<std::string>());
+    std::string refusedAt = "none";
+    try {
+      parseClientMessage(fixture["message"].dump());
+    } catch (const ProtocolError& error) {
+      EXPECT_EQ(error.status, 422);
+      refusedAt = error.pointer;
+    }
+    EXPECT_EQ(refusedAt, fixture.value("refusedAt", "none"));
+  }
+}
+
+TEST(ParseClientMessage, ReadsEveryField) {
+  const auto patch =
+      std::get<PatchMessage>(parseClientMessage(R"({"type": "patch", "id": 7, "patch": {"a": 1}})"));
+  EXPECT_EQ(patch.id, 7U);
+  EXPECT_EQ(patch.patch, json::parse(R"({"a": 1})"));
+  EXPECT_EQ(std::get<AckMessage>(parseClientMessage(R"({"type": "ack", "frame": 12})")).frame, 12U);
+  EXPECT_EQ(std::get<PingMessage>(parseClientMessage(R"({"type": "ping", "id": 3})")).id, 3U);
+  EXPECT_EQ(std::get<ResumeMessage>(parseClientMessage(R"({"type": "resume", "token": "abc"})")).token,
+            "abc");
+  const auto view = std::get<ViewMessage>(parseClientMessage(
+      R"({"type": "view", "visible": false, "maxWidth": 640, "maxHeight": 480, "maxFps": 7.5})"));
+  EXPECT_FALSE(view.visible);
+  EXPECT_EQ(view.maxWidth, 640U);
+  EXPECT_EQ(view.maxHeight, 480U);
+  EXPECT_EQ(view.maxFps, 7.5);
+  EXPECT_TRUE(std::get<ViewMessage>(parseClientMessage(R"({"type": "view"})")).visible);
+}
+
+TEST(ParseClientMessage, RefusesWhatIsNotJsonOrTooLarge) {
+  const auto statusOf = [](const std::string& text, const Limits& limits) {
+    try {
+      parseClientMessage(text, limits);
+    } catch (const ProtocolError& error) {
+      return error.status;
+    }
+    return 0;
+  };
+  EXPECT_EQ(statusOf("{", {}), 400);
+  EXPECT_EQ(statusOf(R"({"type": "ping"})", {.bytes = 10}), 413);
+  EXPECT_EQ(statusOf(R"({"type": "patch", "id": 1, "patch": {"a": [[]]}})", {.depth = 3}), 400);
+}
+
+TEST(ServerMessages, AreWrittenAsTheFixtures) {
+  EXPECT_EQ(json::parse(helloText({{"version", "0.1.0"}}, "k3", "3q2-7w")), serverFixture("hello"));
+  EXPECT_EQ(json::parse(sceneText(8, json::parse(R"({"channels": {"1": {"color": "#ff0000"}}})"))),
+            serverFixture("scene"));
+  EXPECT_EQ(
+      json::parse(errorText(
+          ProtocolError(422, "/camera/fovY", "/camera/fovY: expected a number > 0 and < 180, found 200"), 7)),
+      serverFixture("error of a patch"));
+  EXPECT_EQ(json::parse(errorText(ProtocolError(400, "", "not valid JSON at byte 1"))),
+            serverFixture("error of something else"));
+  EXPECT_EQ(json::parse(noticeText("The server is stopping.")), serverFixture("notice"));
+  EXPECT_EQ(json::parse(pongText(3)), serverFixture("pong"));
+}
+
+TEST(ServerMessages, AreUtf8WhateverTheyTell) {
+  EXPECT_EQ(json::parse(noticeText("\xff"))["text"], "\xef\xbf\xbd");
+  EXPECT_NO_THROW(json::parse(errorText(ProtocolError(400, "", "\xff"))));
+}
+
+}  // namespace
+}  // namespace scolopax::protocol

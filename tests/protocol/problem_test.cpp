@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "protocol/problem.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+namespace scolopax::protocol {
+namespace {
+
+using nlohmann::json;
+
+TEST(ProblemJson, HoldsTheMembersOfRfc9457AndThePointer) {
+  EXPECT_EQ(json::parse(problemJson(ProtocolError(422, "/image/width", "too wide"))),
+            json::parse(R"({"type": "about:blank", "title": "Unprocessable Content", "status": 422,
+                            "detail": "too wide", "pointer": "/image/width"})"));
+}
+
+TEST(ProblemJson, LeavesOutThePointerOfTheWholeDocument) {
+  EXPECT_FALSE(json::parse(problemJson(404, "no such session")).contains("pointer"));
+}
+
+TEST(ProblemJson, ReplacesBytesThatAreNotUtf8) {
+  EXPECT_EQ(json::parse(problemJson(400, "a\xff"))["detail"], "a\xef\xbf\xbd");
+}
+
+}  // namespace
+}  // namespace scolopax::protocol

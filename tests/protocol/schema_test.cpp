@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is generated from the table of fields stands in the repository as it is generated; and the schema's
+// own words agree with what reading takes. SCOLOPAX_UPDATE=1 rewrites the files.
+#include "protocol/schema.h"
+
+#include <gtest/gtest.h>
+
+#include "protocol/fields.h"
+#include "protocol/problem.h"
+#include "protocol/scene_json.h"
+#include "renderer/data/volume.h"
+#include "tests/protocol/fixtures.h"
+#include "tests/protocol/lists.h"
+
+namespace scolopax::protocol {
+namespace {
+
+using nlohmann::json;
+
+const json& schema() {
+  static const json parsed = json::parse(schemaText(rendererLists()));
+  return parsed;
+}
+
+/// Calls f(path of the field in a scene, its schema) for every field that is no object and no list of
+/// objects.
+template <class F>
+void forEachSchemaField(const json& object, const json::json_pointer& at, const F& f) {
+  for (const auto& [name, field] : object["properties"].items()) {
+    const json::json_pointer path = at / name;
+    const auto definition = [](const json& reference) {
+      return schema().at(json::json_pointer(reference["$ref"].get<std::string>().substr(1)));
+    };
+    if (field.contains("$ref"))
+      forEachSchemaField(definition(field), path, f);
+    else if (name == "channels")
+      forEachSchemaField(definition(field["items"]), path / 0, f);
+    else
+      f(path, field);
+  }
+}
+
+/// A scene with one value set.
+json sceneWith(const json::json_pointer& path, const json& value) {
+  json scene = json::object();
+  if (path.to_string().rfind("/channels", 0) == 0) scene["channels"] = json::array();
+  scene[path] = value;
+  return scene;
+}
+
+bool isTaken(const json::json_pointer& path, const json& value) {
+  try {
+    parseScene(sceneWith(path, value), rendererLists());
+  } catch (const ProtocolError& error) {
+    EXPECT_EQ(error.pointer, path.to_string());
+    return false;
+  }
+  return true;
+}
+
+TEST(Schema, IsTheOneInTheRepository) {
+  expectFile(protocolFile("schema.json"), schemaText(rendererLists()));
+}
+
+TEST(Schema, ListsAsManyChannelsAsAVolumeMayHave) { EXPECT_EQ(std::size_t{kMaxChannels}, kMaxChannelItems); }
+
+TEST(Schema, GivesEveryFieldADescriptionAndADefaultThatIsTaken) {
+  int fields = 0;
+  forEachSchemaField(schema(), json::json_pointer(), [&](const json::json_pointer& path, const json& field) {
+    SCOPED_TRACE(path.to_string());
+    EXPECT_FALSE(field.value("description", "").empty());
+    ASSERT_TRUE(field.contains("default"));
+    EXPECT_TRUE(isTaken(path, field["default"]));
+    ++fields;
+  });
+  EXPECT_EQ(fields, 25);
+}
+
+TEST(Schema, SaysTheSameOfBoundsAsReadingDoes) {
+  int bounds = 0;
+  forEachSchemaField(schema(), json::json_pointer(), [&](const json::json_pointer& path, const json& field) {
+    SCOPED_TRACE(path.to_string());
+    const auto check = [&](const char* keyword, bool takenAt, double beyond) {
+      if (!field.contains(keyword)) return;
+      const double bound = field[keyword];
+      EXPECT_EQ(isTaken(path, bound), takenAt) << keyword;
+      EXPECT_FALSE(isTaken(path, bound + beyond * std::max(1.0, std::abs(bound)))) << keyword;
+      ++bounds;
+    };
+    check("minimum", true, -1);
+    check("exclusiveMinimum", false, -1);
+    check("maximum", true, 1);
+    check("exclusiveMaximum", false, 1);
+  });
+  EXPECT_EQ(bounds, 19);
+}
+
+TEST(Schema, SaysTheSameOfNullAndNamesAsReadingDoes) {
+  forEachSchemaField(schema(), json::json_pointer(), [&](const json::json_pointer& path, const json& field) {
+    SCOPED_TRACE(path.to_string());
+    bool nullable = field.contains("type") && field["type"].is_array() && field["type"][1] == "null";
+    for (const json& choice : field.value("anyOf", json::array()))
+      nullable = nullable || choice["type"] == "null";
+    EXPECT_EQ(isTaken(path, nullptr), nullable);
+    for (const json& name : field.value("enum", json::array())) EXPECT_TRUE(isTaken(path, name)) << name;
+    EXPECT_FALSE(isTaken(path, json::object()));
+  });
+}
+
+}  // namespace
+}  // namespace scolopax::protocol
