@@ -69,11 +69,14 @@ Message readMessage(nlohmann::json json) {
   return message;
 }
 
-/// The first message of the variant whose type this is.
+/// The message of the variant whose type this is.
 template <class... Messages>
 ClientMessage readAny(const nlohmann::json& json, const std::string& type, std::variant<Messages...>*) {
   std::optional<ClientMessage> message;
-  ((type == Table<Messages>::type && (message = readMessage<Messages>(json), true)) || ...);
+  const auto tryOne = [&]<class Message>(std::optional<Message>) {
+    if (type == Table<Message>::type) message = readMessage<Message>(json);
+  };
+  (tryOne(std::optional<Messages>()), ...);
   if (message) return std::move(*message);
   std::string types;
   ((types += (types.empty() ? "\"" : ", \"") + std::string(Table<Messages>::type) + '"'), ...);

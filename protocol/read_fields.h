@@ -80,7 +80,8 @@ void readValue(const nlohmann::json& json, const Path& path, const Traits& trait
 /// Throws for a member of the object that the table does not have.
 template <Described T>
 void refuseUnknown(const nlohmann::json& object, const Path& path) {
-  for (const auto& [key, value] : object.items()) {
+  for (auto member = object.begin(); member != object.end(); ++member) {
+    const std::string& key = member.key();
     bool known = false;
     forEachField<T>([&](const auto& field) { known = known || field.name == key; });
     if (!known) {
