@@ -24,14 +24,11 @@ export interface ChannelInfo {
   unit?: string;
 }
 
-export interface DatasetSummary {
+export interface DatasetInfo {
   id: string;
   title: string;
   /** Voxels along x, y, z. */
   dims: [number, number, number];
-}
-
-export interface DatasetInfo extends DatasetSummary {
   /** World units between voxel centres. */
   spacing: [number, number, number];
   /** Of the box, world units. */
@@ -79,11 +76,7 @@ async function call<T>(path: string, init?: RequestInit): Promise<T> {
 const seg = encodeURIComponent;
 
 export const api = {
-  datasets: async (): Promise<DatasetSummary[]> => {
-    const answer = await call<DatasetSummary[] | { datasets: DatasetSummary[] }>('datasets');
-    return Array.isArray(answer) ? answer : answer.datasets;
-  },
-  dataset: (id: string) => call<DatasetInfo>(`datasets/${seg(id)}`),
+  datasets: async () => (await call<{ datasets: DatasetInfo[] }>('datasets')).datasets,
   histogram: (id: string, channel: number) =>
     call<Histogram>(`datasets/${seg(id)}/histogram?channel=${channel}`),
   createSession: (scene?: JsonObject) =>

@@ -18,7 +18,7 @@ const kOpenChannels = 2;
 export function App({ store, attach }: { store: Store; attach(view: FrameView): void }) {
   const [panel, setPanel] = useState(!window.matchMedia('(max-width: 760px)').matches);
   const channels = store.scene.value?.channels ?? [];
-  const key = store.dataset.value?.id ?? '';
+  const key = store.datasets.shown.value?.id ?? '';
   return (
     <div class={`app ${panel ? 'with-panel' : ''}`}>
       <main class="stage">

@@ -33,11 +33,11 @@ export function paintOf(color: string | null | undefined, colormap: Colormap, kn
 export function ChannelCard({ store, index, open: openAtFirst }: { store: Store; index: number; open: boolean }) {
   const [open, setOpen] = useState(openAtFirst);
   const channel = store.scene.value?.channels?.[index];
-  const histogram = store.histograms.value[index];
+  const histogram = store.datasets.histograms.value[index];
   const colormaps = store.capabilities.value.colormaps ?? [];
   if (!channel) return null;
   const at = (key: string): Path => ['channels', index, key];
-  const name = channel.name ?? store.dataset.value?.channels[index]?.name ?? `Channel ${index + 1}`;
+  const name = channel.name ?? store.datasets.shown.value?.channels[index]?.name ?? `Channel ${index + 1}`;
   const visible = channel.visible ?? true;
   const range = channel.range ?? ([histogram?.minimum ?? 0, histogram?.maximum ?? 1] as const);
   const paint = paintOf(channel.color, channel.colormap, colormaps);

@@ -2,7 +2,7 @@
 // Keeps one session's stream open: opens it, resumes it after a loss, makes a new session when the old one
 // is gone. Knows nothing of scenes and pictures beyond handing them on.
 import { ApiError, api, streamUrl, type Capabilities, type Problem, type SessionInfo } from './api';
-import { isObject, type Json, type JsonObject } from './merge-patch';
+import type { Json, JsonObject } from './merge-patch';
 
 export type ConnectionState =
   | { kind: 'connecting' }
@@ -21,18 +21,24 @@ export interface ConnectionEvents {
   onScene(revision: number, patch: Json): void;
   onProblem(problem: Problem, patch?: number): void;
   onNotice(text: string): void;
+  /** The server has dealt with all that was sent before the ping of this id. */
+  onPong(id: number): void;
   /** The scene that a new session shall begin with; undefined for the server's default. */
   currentScene(): JsonObject | undefined;
 }
 
 const kFirstDelayMs = 250;
 const kLongestDelayMs = 8000;
+const kPingMs = 5000;
+const kSilenceMs = 15_000; // three pings unanswered: the network is gone without saying so
 
 export const retryDelay = (attempt: number) => Math.min(kLongestDelayMs, kFirstDelayMs * 2 ** attempt);
 
 export class Connection {
   private socket: WebSocket | undefined;
   private timer: ReturnType<typeof setTimeout> | undefined;
+  private pulse: ReturnType<typeof setInterval> | undefined;
+  private lastHeard = 0;
   private attempt = 0;
   private stopped = false;
 
@@ -77,6 +83,7 @@ export class Connection {
   private close(): void {
     const socket = this.socket;
     this.socket = undefined; // first, so that its close event finds that it is no longer ours
+    clearInterval(this.pulse);
     socket?.close();
   }
 
@@ -115,16 +122,25 @@ export class Connection {
     socket.onopen = () => {
       if (!fresh) this.send({ type: 'resume', token: session.token });
     };
+    this.lastHeard = Date.now();
+    this.pulse = setInterval(() => this.beat(), kPingMs);
     socket.onmessage = ({ data }) => {
       if (socket !== this.socket) return;
+      this.lastHeard = Date.now();
       if (data instanceof ArrayBuffer) this.events.onFrame(data);
       else this.receive(String(data), fresh);
     };
     socket.onclose = () => {
       if (socket !== this.socket) return;
-      this.socket = undefined;
+      this.close();
       this.retryLater(false);
     };
+  }
+
+  private beat(): void {
+    if (Date.now() - this.lastHeard < kSilenceMs) return void this.send({ type: 'ping', id: 0 });
+    this.close();
+    this.retryLater(false);
   }
 
   private receive(text: string, fresh: boolean): void {
@@ -139,13 +155,14 @@ export class Connection {
       case 'scene':
         this.events.onScene(Number(message.revision), message.patch ?? {});
         break;
-      case 'error': {
-        const problem = (isObject(message.problem) ? message.problem : message) as Problem;
-        this.events.onProblem(problem, typeof message.id === 'number' ? message.id : undefined);
+      case 'error':
+        this.events.onProblem(message.problem as Problem, typeof message.id === 'number' ? message.id : undefined);
         break;
-      }
       case 'notice':
-        this.events.onNotice(String(message.message ?? message.text ?? message.detail ?? ''));
+        this.events.onNotice(String(message.text ?? ''));
+        break;
+      case 'pong':
+        this.events.onPong(Number(message.id));
         break;
       default: // a later server may say more than this page understands
     }

@@ -4,8 +4,8 @@ import { shortNumber } from './controls';
 import type { Store } from './store';
 
 export function DatasetPanel({ store }: { store: Store }) {
-  const dataset = store.dataset.value;
-  const datasets = store.datasets.value;
+  const dataset = store.datasets.shown.value;
+  const datasets = store.datasets.all.value;
   // Channels and camera belong to the volume they were set for.
   const choose = (id: string) => store.edit({ dataset: id, channels: null, camera: null });
   return (

@@ -21,7 +21,9 @@ export class Edits {
   private waiting: JsonObject[] = [];
   private scheduled = false;
   private lastId = 0;
-  private readonly inFlight = new Map<number, { patch: JsonObject; sentAt: number }>();
+  private readonly inFlight = new Map<number, JsonObject>();
+  /** When each patch was sent that no picture has shown yet. */
+  private readonly sentAt = new Map<number, number>();
 
   /** `send` answers false while there is no stream. */
   constructor(
@@ -43,37 +45,45 @@ export class Edits {
   flush(): void {
     while (this.waiting[0] && this.send(this.lastId + 1, this.waiting[0])) {
       this.lastId += 1;
-      this.inFlight.set(this.lastId, { patch: this.waiting[0], sentAt: this.now() });
+      this.inFlight.set(this.lastId, this.waiting[0]);
+      this.sentAt.set(this.lastId, this.now());
       this.waiting.shift();
     }
   }
 
+  /** The server has taken, or refused, all patches up to `id`. */
+  answered(id: number): void {
+    for (const known of this.inFlight.keys()) if (known <= id) this.inFlight.delete(known);
+  }
+
   /** A picture that contains patches up to `id` has come; the age in milliseconds of that patch, if new. */
   seen(id: number): number | undefined {
-    const sent = this.inFlight.get(id);
-    for (const known of this.inFlight.keys()) if (known <= id) this.inFlight.delete(known);
-    return sent && this.now() - sent.sentAt;
+    this.answered(id);
+    const sent = this.sentAt.get(id);
+    for (const known of this.sentAt.keys()) if (known <= id) this.sentAt.delete(known);
+    return sent === undefined ? undefined : this.now() - sent;
   }
 
-  /** The patch was refused, so no picture will contain it. */
-  refused(id: number): void {
-    this.inFlight.delete(id);
+  /** Id of the newest patch sent; 0 for none. */
+  get last(): number {
+    return this.lastId;
   }
 
-  /** Every edit has come back in a picture or was refused. */
+  /** The server has answered every edit. */
   get settled(): boolean {
     return this.waiting.length === 0 && this.inFlight.size === 0;
   }
 
   /** Edits that the server may not have yet, oldest first: they stay on top of another viewer's. */
   get unconfirmed(): JsonObject[] {
-    return [...[...this.inFlight.values()].map((sent) => sent.patch), ...this.waiting];
+    return [...this.inFlight.values(), ...this.waiting];
   }
 
   /** On a new stream to the same session: what may be lost is sent again, which does no harm if it was not. */
   resend(): void {
     this.waiting = this.unconfirmed;
     this.inFlight.clear();
+    this.sentAt.clear();
     this.flush();
   }
 
@@ -81,5 +91,6 @@ export class Edits {
   forget(): void {
     this.waiting = [];
     this.inFlight.clear();
+    this.sentAt.clear();
   }
 }

@@ -11,7 +11,7 @@ const store = new Store((message) => {
   try {
     view?.show(message);
   } catch (error) {
-    store.say(String(error instanceof Error ? error.message : error));
+    store.toasts.say(String(error instanceof Error ? error.message : error));
   }
 });
 

@@ -9,12 +9,13 @@ export async function savePicture(store: Store): Promise<void> {
   try {
     const response = await fetch(pictureUrl(id), { cache: 'no-store' });
     if (!response.ok) throw await problemOf(response);
+    if (response.status === 204) throw new Error('the server had none in time');
     const link = document.createElement('a');
     link.href = URL.createObjectURL(await response.blob());
-    link.download = `${store.dataset.peek()?.id ?? 'scolopax'}.png`;
+    link.download = `${store.datasets.shown.peek()?.id ?? 'scolopax'}.png`;
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
   } catch (error) {
-    store.say(`The picture was not saved: ${error instanceof Error ? error.message : String(error)}`);
+    store.toasts.say(`The picture was not saved: ${error instanceof Error ? error.message : String(error)}`);
   }
 }

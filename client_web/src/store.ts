@@ -2,23 +2,17 @@
 // The page's state as signals, and the one way to change the scene. Between the stream (connection.ts) and
 // the components, which read signals and call edit().
 import { batch, computed, signal } from '@preact/signals';
-import { ApiError, api, type Capabilities, type DatasetInfo, type DatasetSummary, type Problem, type SessionInfo } from './api';
+import { ApiError, api, type Capabilities, type Problem, type SessionInfo } from './api';
 import { Connection, type ConnectionState } from './connection';
+import { DatasetList } from './dataset-list';
 import { Edits } from './edits';
 import type { FrameHeader } from './frame-header';
-import type { Histogram } from './histogram';
+import { FrameMeter } from './frame-meter';
 import { applyPatch, isObject, patchAt, type Json, type JsonObject } from './merge-patch';
 import type { Camera } from './orbit-camera';
 import type { Scene } from './scene.generated';
 import { sayPointer, type Path } from './schema';
-import { FrameMeter } from './frame-meter';
-
-export interface Toast {
-  id: number;
-  /** The field at fault, in words; empty when it is none. */
-  field: string;
-  text: string;
-}
+import { ToastList } from './toast-list';
 
 const kSettleMs = 250;
 const kMemory = 'scolopax.session';
@@ -38,15 +32,13 @@ export class Store {
   readonly sessionId = signal<string | undefined>(undefined);
   readonly scene = signal<Scene | undefined>(undefined);
   readonly capabilities = signal<Capabilities>({});
-  readonly datasets = signal<DatasetSummary[]>([]);
-  readonly dataset = signal<DatasetInfo | undefined>(undefined);
-  readonly histograms = signal<(Histogram | undefined)[]>([]);
+  readonly datasets = new DatasetList();
   readonly frame = signal<FrameHeader | undefined>(undefined);
-  readonly toasts = signal<Toast[]>([]);
+  readonly toasts = new ToastList();
   readonly meter = new FrameMeter();
 
   /** Length of the volume's diagonal in world units: the scale of what is looked at. */
-  readonly worldSize = computed(() => this.dataset.value?.diagonal || 1);
+  readonly worldSize = computed(() => this.datasets.shown.value?.diagonal || 1);
   /** Undefined until the server has resolved it. */
   readonly camera = computed<Camera | undefined>(() => {
     const { eye, target, up, fovY, orthoHeight } = this.scene.value?.camera ?? {};
@@ -58,7 +50,6 @@ export class Store {
   private readonly link: Connection;
   private revision = 0;
   private settleTimer: ReturnType<typeof setTimeout> | undefined;
-  private toastCount = 0;
   private onRefreshed: (() => void) | undefined;
   private wantedSize: { width: number; height: number } | undefined;
 
@@ -70,7 +61,8 @@ export class Store {
         onFrame: (message) => this.onFrame(message),
         onScene: (revision, patch) => this.receiveScene(revision, patch),
         onProblem: (problem, patch) => this.receiveProblem(problem, patch),
-        onNotice: (text) => this.say(text),
+        onNotice: (text) => this.toasts.say(text),
+        onPong: (id) => this.receivePong(id),
         currentScene: () => this.scene.peek() as JsonObject | undefined,
       },
       this.remembered(),
@@ -145,15 +137,6 @@ export class Store {
     void this.link.open();
   }
 
-  say(text: string, field = ''): void {
-    const others = this.toasts.peek().filter((toast) => toast.text !== text);
-    this.toasts.value = [...others, { id: ++this.toastCount, field, text }].slice(-4);
-  }
-
-  dismiss(id: number): void {
-    this.toasts.value = this.toasts.peek().filter((toast) => toast.id !== id);
-  }
-
   // --- the stream ---
 
   private async begin(session: SessionInfo, capabilities: Capabilities, fresh: boolean): Promise<void> {
@@ -164,9 +147,13 @@ export class Store {
     if (fresh) this.edits.forget();
     else this.edits.resend();
     this.setVisible(document.visibilityState === 'visible');
-    this.datasets.value = await api.datasets().catch(() => []);
-    await this.refresh();
-    this.applySize();
+    try {
+      if (fresh || !this.datasets.shown.peek()) await this.datasets.load();
+      await this.refresh();
+      this.applySize();
+    } catch {
+      // The stream has gone again: that is the connection's to report.
+    }
   }
 
   private remembered(): SessionInfo | undefined {
@@ -180,8 +167,8 @@ export class Store {
   }
 
   private receiveProblem(problem: Problem, patch?: number): void {
-    if (patch) this.edits.refused(patch);
-    this.say(problem.detail ?? problem.title ?? 'The server reports an error.', sayPointer(problem.pointer ?? ''));
+    if (patch) this.edits.answered(patch);
+    this.toasts.say(problem.detail ?? problem.title ?? 'The server reports an error.', sayPointer(problem.pointer ?? ''));
     if (patch) void this.refresh();
   }
 
@@ -196,44 +183,28 @@ export class Store {
     if (!id) return;
     try {
       const { revision, scene } = await api.scene(id);
-      if (revision < this.revision) return this.refreshLater(); // an edit overtook the answer
+      if (revision < this.revision || !this.edits.settled) return this.refreshLater(); // an edit overtook the answer
       this.revision = revision;
-      await this.showDataset(scene.dataset);
+      this.datasets.show(scene.dataset);
       this.showScene(scene as Scene);
       this.onRefreshed?.();
       this.onRefreshed = undefined;
     } catch (error) {
       // A lost server is the connection's to report.
-      if (error instanceof ApiError) this.say(error.message);
+      if (error instanceof ApiError) this.toasts.say(error.message);
     }
   }
 
+  /** When edits rest, asks whether the server has dealt with them; the answer is receivePong(). */
   private refreshLater(): void {
     clearTimeout(this.settleTimer);
-    this.settleTimer = setTimeout(() => {
-      if (this.connection.peek().kind !== 'connected') return;
-      if (this.edits.settled) void this.refresh();
-      else this.refreshLater();
-    }, kSettleMs);
+    this.settleTimer = setTimeout(() => this.link.send({ type: 'ping', id: this.edits.last }), kSettleMs);
   }
 
-  private async showDataset(id: Json | undefined): Promise<void> {
-    const wanted = typeof id === 'string' ? id : this.datasets.peek()[0]?.id;
-    if (wanted === undefined || this.dataset.peek()?.id === wanted) return;
-    const dataset = await api.dataset(wanted);
-    batch(() => {
-      this.dataset.value = dataset;
-      this.histograms.value = dataset.channels.map(() => undefined);
-    });
-    dataset.channels.forEach((_, channel) => {
-      api
-        .histogram(wanted, channel)
-        .then((histogram) => {
-          if (this.dataset.peek() !== dataset) return;
-          this.histograms.value = this.histograms.peek().map((old, i) => (i === channel ? histogram : old));
-        })
-        .catch(() => undefined); // the plot stays empty; everything else works
-    });
+  private receivePong(id: number): void {
+    if (id === 0) return; // the connection's own, to see whether it lives
+    this.edits.answered(id);
+    if (this.edits.settled) void this.refresh();
   }
 
   private applySize(): void {

@@ -5,13 +5,13 @@ import type { Store } from './store';
 export function Toasts({ store }: { store: Store }) {
   return (
     <div class="toasts" role="alert">
-      {store.toasts.value.map(({ id, field, text }) => (
+      {store.toasts.all.value.map(({ id, field, text }) => (
         <div class="toast" key={id}>
           <p>
             {field && <b>{field}: </b>}
             {text}
           </p>
-          <button type="button" aria-label="Dismiss" onClick={() => store.dismiss(id)}>
+          <button type="button" aria-label="Dismiss" onClick={() => store.toasts.dismiss(id)}>
             ×
           </button>
         </div>

@@ -66,6 +66,7 @@ function connect(): Connection {
     onScene: () => undefined,
     onProblem: (problem) => void problems.push(problem.detail ?? ''),
     onNotice: () => undefined,
+    onPong: () => undefined,
     currentScene: () => scene,
   };
   return new Connection(events);
@@ -154,6 +155,20 @@ describe('the connection', () => {
     expect(lastState()).toEqual({ kind: 'connected' });
     FakeSocket.last.lose();
     expect(lastState()).toMatchObject({ gone: false, retryAt: Date.now() + retryDelay(0) });
+  });
+
+  it('pings, and takes a silent stream for a lost one', async () => {
+    void connect().open();
+    await settle();
+    FakeSocket.last.hello('s1');
+    await vi.advanceTimersByTimeAsync(10_000);
+    expect(FakeSocket.last.sent).toEqual([{ type: 'ping', id: 0 }, { type: 'ping', id: 0 }]);
+    FakeSocket.last.onmessage?.({ data: JSON.stringify({ type: 'pong', id: 0 }) });
+    await vi.advanceTimersByTimeAsync(14_000);
+    expect(lastState()).toEqual({ kind: 'connected' });
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(lastState()).toMatchObject({ kind: 'waiting' });
+    expect(FakeSocket.last.readyState).toBe(3);
   });
 
   it('does not try again with a token that is refused', async () => {

@@ -44,10 +44,10 @@ describe('edits', () => {
     animationFrame();
     state.now = 50;
     expect(edits.seen(0)).toBeUndefined();
-    expect(edits.settled).toBe(false);
+    edits.answered(2); // the server has them, no picture shows them yet
+    expect(edits.settled).toBe(true);
     expect(edits.seen(2)).toBe(20);
     expect(edits.seen(2)).toBeUndefined();
-    expect(edits.settled).toBe(true);
   });
 
   it('that may be lost with the stream are sent again, oldest first', () => {
@@ -82,11 +82,15 @@ describe('edits', () => {
     ]);
   });
 
-  it('that were refused are not waited for', () => {
-    const { edits, animationFrame } = setUp();
+  it('that the server has answered are not sent again', () => {
+    const { edits, sent, animationFrame } = setUp();
     edits.push({ a: 1 });
     animationFrame();
-    edits.refused(1);
-    expect(edits.settled).toBe(true);
+    edits.push({ b: 1 });
+    animationFrame();
+    edits.answered(1);
+    expect(edits.unconfirmed).toEqual([{ b: 1 }]);
+    edits.resend();
+    expect(sent[2]).toEqual({ id: 3, patch: { b: 1 } });
   });
 });

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// The server's data sets, and the histograms of the one that is shown.
+import { batch, signal } from '@preact/signals';
+import { api, type DatasetInfo } from './api';
+import type { Histogram } from './histogram';
+
+export class DatasetList {
+  readonly all = signal<DatasetInfo[]>([]);
+  readonly shown = signal<DatasetInfo | undefined>(undefined);
+  /** One for each channel of the shown data set, as they come. */
+  readonly histograms = signal<(Histogram | undefined)[]>([]);
+  private stale = true;
+
+  /** Asks what there is; the next show() fetches anew. */
+  async load(): Promise<void> {
+    this.all.value = await api.datasets();
+    this.stale = true;
+  }
+
+  /** The data set of a scene; without an id, the first. */
+  show(id: unknown): void {
+    const dataset = this.all.peek().find((one) => one.id === id) ?? this.all.peek()[0];
+    if (!dataset || (!this.stale && this.shown.peek()?.id === dataset.id)) return;
+    this.stale = false;
+    batch(() => {
+      this.shown.value = dataset;
+      this.histograms.value = dataset.channels.map(() => undefined);
+    });
+    dataset.channels.forEach((_, channel) => void this.loadHistogram(dataset, channel));
+  }
+
+  private async loadHistogram(dataset: DatasetInfo, channel: number): Promise<void> {
+    const histogram = await api.histogram(dataset.id, channel).catch(() => undefined); // without one, no plot
+    if (this.shown.peek() !== dataset) return;
+    this.histograms.value = this.histograms.peek().map((old, i) => (i === channel ? histogram : old));
+  }
+}

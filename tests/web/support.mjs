@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the browser tests share: a server on a free port, a browser, and ways to look at the picture.
+import { spawn, spawnSync } from 'node:child_process';
+import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+const root = path.resolve(path.dirname(fileURLToPath(import.meta.url)), '../..');
+const require = createRequire(path.join(root, 'client_web/package.json'));
+export const { chromium } = require('playwright-core');
+export const { AxeBuilder } = require('@axe-core/playwright');
+
+const program = process.env.SCOLOPAX ?? path.join(root, 'build/release/scolopax');
+export const dataDir = process.env.SCOLOPAX_DATA_DIR ?? path.resolve(root, '../shared/data');
+
+/** A folder of the test's own, removed when the test process ends. */
+export function scratchFolder() {
+  const folder = mkdtempSync(path.join(tmpdir(), 'scolopax-web-'));
+  process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
+  return folder;
+}
+
+export function generateOrbitals(folder) {
+  const file = path.join(folder, 'orbitals.nrrd');
+  const made = spawnSync(program, ['generate', 'orbitals', file, '--size', '48'], { encoding: 'utf8' });
+  if (made.status !== 0) throw new Error(`generate ended with ${made.status}: ${made.stderr}`);
+  return file;
+}
+
+/** Starts the server and waits for its ready line. `end(signal)` ends it and waits until it has. */
+export async function startServer(files, options = [], port = '0') {
+  if (!existsSync(path.join(root, 'client_web/dist/index.html')))
+    throw new Error('client_web/dist is missing: run `npm ci && npm run build` in client_web first');
+  const child = spawn(program, ['serve', ...files, '--port', port, ...options], { stdio: ['ignore', 'pipe', 'pipe'] });
+  process.on('exit', () => child.kill('SIGKILL'));
+  const ended = new Promise((resolve) => child.once('exit', resolve));
+  let output = '';
+  let errors = '';
+  child.stderr.on('data', (data) => (errors += data));
+  const url = await new Promise((resolve, reject) => {
+    const timer = setTimeout(() => reject(new Error(`no ready line within 60 s: ${output}${errors}`)), 60_000);
+    child.stdout.on('data', (data) => {
+      output += data;
+      const ready = output.match(/http:\/\/127\.0\.0\.1:\d+\/\?token=\S+/);
+      if (!ready) return;
+      clearTimeout(timer);
+      resolve(ready[0]);
+    });
+    child.once('exit', (status) => reject(new Error(`the server ended with ${status}: ${output}${errors}`)));
+  });
+  const end = async (signal = 'SIGTERM') => {
+    child.kill(signal);
+    await ended;
+  };
+  return { url, port: new URL(url).port, end };
+}
+
+export const launchBrowser = () =>
+  chromium.launch({
+    executablePath: '/usr/bin/chromium',
+    args: [
+      '--no-sandbox',
+      '--disable-gpu',
+      '--disable-quic',
+      '--no-first-run',
+      '--disable-background-networking',
+      '--disable-component-update',
+      '--disable-sync',
+    ],
+  });
+
+/** Opens the page; `faults` collects what goes wrong in it. */
+export async function openPage(browser, url, options = { viewport: { width: 900, height: 560 } }) {
+  const context = await browser.newContext(options);
+  const page = await context.newPage();
+  const faults = [];
+  page.on('pageerror', (error) => faults.push(String(error)));
+  await page.goto(url);
+  return { page, faults };
+}
+
+/** Asks again until the answer is truthy, and returns it; fails with the message after the time. */
+export async function eventually(ask, message, timeoutMs = 30_000) {
+  const end = Date.now() + timeoutMs;
+  for (;;) {
+    const answer = await ask();
+    if (answer) return answer;
+    if (Date.now() > end) throw new Error(message);
+    await new Promise((resolve) => setTimeout(resolve, 100));
+  }
+}
+
+/**
+ * What is on the canvas: mean red, green and blue, the share of pixels that are lit, and the mean brightness of
+ * 12 x 12 blocks, which noise hardly changes. Levels are 0..255.
+ */
+export function lookAt(page) {
+  return page.locator('canvas').evaluate((canvas) => {
+    const { width, height } = canvas;
+    const { data } = canvas.getContext('2d').getImageData(0, 0, width, height);
+    const mean = [0, 0, 0];
+    const blocks = new Array(144).fill(0);
+    let lit = 0;
+    for (let y = 0; y < height; ++y) {
+      for (let x = 0; x < width; ++x) {
+        const at = 4 * (y * width + x);
+        const sum = data[at] + data[at + 1] + data[at + 2];
+        for (let c = 0; c < 3; ++c) mean[c] += data[at + c];
+        if (sum > 48) lit += 1;
+        blocks[12 * Math.floor((12 * y) / height) + Math.floor((12 * x) / width)] += sum / 3;
+      }
+    }
+    const pixels = width * height;
+    return { mean: mean.map((m) => m / pixels), lit: lit / pixels, blocks: blocks.map((b) => (144 * b) / pixels) };
+  });
+}
+
+/** Largest difference between two pictures' blocks, in levels. */
+export const difference = (a, b) => Math.max(...a.blocks.map((block, i) => Math.abs(block - b.blocks[i])));
+
+/** Samples per pixel, as the status bar says. */
+export async function samplesShown(page) {
+  const text = (await page.locator('.status').textContent()) ?? '';
+  return Number(text.match(/(\d+)(?: \/ \d+)? samples?/)?.[1] ?? 0);
+}
+
+/** Waits for a picture of the newest scene with so many samples, and looks at it. */
+export async function steadyPicture(page, samples = 16) {
+  await page.waitForTimeout(400); // the page's own edits have been sent and a new film begun
+  await eventually(async () => (await samplesShown(page)) >= samples, `no picture with ${samples} samples`, 60_000);
+  return lookAt(page);
+}
