@@ -15,12 +15,5 @@ const store = new Store((message) => {
   }
 });
 
-// The token has become a cookie; it does not belong in the address bar, where it would be copied along.
-const address = new URL(location.href);
-if (address.searchParams.has('token')) {
-  address.searchParams.delete('token');
-  history.replaceState(null, '', address);
-}
-
 render(<App store={store} attach={(next) => (view = next)} />, document.getElementById('app')!);
 store.start();

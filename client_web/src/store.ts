@@ -109,8 +109,8 @@ export class Store {
 
   /** The size in device pixels that the picture should have. */
   setImageSize(width: number, height: number): void {
-    const { maxWidth = 16384, maxHeight = 16384, maxPixels = 2 ** 24 } = this.capabilities.peek().limits ?? {};
-    const shrink = Math.min(1, maxWidth / width, maxHeight / height, Math.sqrt(maxPixels / (width * height)));
+    const { imageWidth = Infinity, imageHeight = Infinity, maxPixels = Infinity } = this.capabilities.peek().limits ?? {};
+    const shrink = Math.min(1, imageWidth / width, imageHeight / height, Math.sqrt(maxPixels / (width * height)));
     this.wantedSize = {
       width: Math.max(1, Math.floor(width * shrink)),
       height: Math.max(1, Math.floor(height * shrink)),
@@ -168,7 +168,10 @@ export class Store {
 
   private receiveProblem(problem: Problem, patch?: number): void {
     if (patch) this.edits.answered(patch);
-    this.toasts.say(problem.detail ?? problem.title ?? 'The server reports an error.', sayPointer(problem.pointer ?? ''));
+    const { detail, title, pointer = '' } = problem;
+    const text = detail ?? title ?? 'The server reports an error.';
+    // The detail begins with the pointer, which is said in words instead.
+    this.toasts.say(text.replace(pointer && `${pointer}: `, ''), sayPointer(pointer));
     if (patch) void this.refresh();
   }
 

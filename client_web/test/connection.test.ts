@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+import { readFileSync } from 'node:fs';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { Connection, retryDelay, type ConnectionEvents, type ConnectionState } from '../src/connection';
 import type { JsonObject } from '../src/merge-patch';
@@ -58,7 +59,7 @@ const hellos: { id: string; fresh: boolean }[] = [];
 const problems: string[] = [];
 let scene: JsonObject | undefined;
 
-function connect(): Connection {
+function connect(more: Partial<ConnectionEvents> = {}): Connection {
   const events: ConnectionEvents = {
     onState: (state) => void states.push(state),
     onHello: (session, _, fresh) => void hellos.push({ id: session.id, fresh }),
@@ -68,6 +69,7 @@ function connect(): Connection {
     onNotice: () => undefined,
     onPong: () => undefined,
     currentScene: () => scene,
+    ...more,
   };
   return new Connection(events);
 }
@@ -169,6 +171,26 @@ describe('the connection', () => {
     await vi.advanceTimersByTimeAsync(1000);
     expect(lastState()).toMatchObject({ kind: 'waiting' });
     expect(FakeSocket.last.readyState).toBe(3);
+  });
+
+  it('understands every message of the server that the protocol shows', async () => {
+    const fixtures = JSON.parse(
+      readFileSync(new URL('../../protocol/fixtures/messages.json', import.meta.url), 'utf8'),
+    ) as { server: { name: string; message: JsonObject }[] };
+    const heard: unknown[] = [];
+    void connect({
+      onScene: (revision, patch) => heard.push({ revision, patch }),
+      onProblem: (problem, id) => heard.push(id === undefined ? { problem } : { problem, id }),
+      onNotice: (text) => heard.push({ text }),
+      onPong: (id) => heard.push({ id }),
+      onHello: (session) => heard.push({ token: session.token }),
+    }).open();
+    await settle();
+    for (const { name, message } of fixtures.server) {
+      FakeSocket.last.onmessage?.({ data: JSON.stringify(message) });
+      expect(message, name).toMatchObject(heard.pop() as object);
+    }
+    expect(heard).toEqual([]);
   });
 
   it('does not try again with a token that is refused', async () => {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import { decodeFrameHeader } from '../src/frame-header';
 
@@ -13,6 +14,35 @@ function headerBytes(): Uint8Array {
     2, 0, 0, 0, 3, 0, 0, 0, // render, encode
   ]);
 }
+
+interface Fixture {
+  name: string;
+  hex: string;
+  header: (Record<string, number> & { error: number | null }) | null;
+}
+const fixtures = JSON.parse(
+  readFileSync(new URL('../../protocol/fixtures/frame_headers.json', import.meta.url), 'utf8'),
+) as Fixture[];
+const bytesOf = (hex: string) => Uint8Array.from(hex.match(/../g) ?? [], (pair) => parseInt(pair, 16)).buffer as ArrayBuffer;
+
+describe('the frame headers that both languages check', () => {
+  it('are all of them', () => expect(fixtures.length).toBeGreaterThan(5));
+
+  it.each(fixtures)('$name', ({ hex, header }) => {
+    if (!header) {
+      expect(() => decodeFrameHeader(bytesOf(hex))).toThrow();
+      return;
+    }
+    const { codec, flags, error, ...fields } = header;
+    expect(decodeFrameHeader(bytesOf(hex))).toEqual({
+      ...fields,
+      mime: codec === 1 ? 'image/jpeg' : 'image/png',
+      interactive: (flags! & 1) !== 0,
+      final: (flags! & 2) !== 0,
+      error: error ?? NaN,
+    });
+  });
+});
 
 describe('the frame header', () => {
   it('is read as the specification lays it out', () => {
