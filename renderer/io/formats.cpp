@@ -18,6 +18,7 @@ namespace {
 constexpr std::array kFormats = {
     Format{"NIfTI", ".nii, .nii.gz, .hdr + .img", matchesNifti, loadNifti},
     Format{"NRRD", ".nrrd, .nhdr", matchesNrrd, loadNrrd},
+    Format{"TIFF", ".tif, .tiff", matchesTiff, loadTiff},
     Format{"raw", "name_XxYxZ_type.raw, .dat, .ivf", matchesRaw, loadRaw},
 };
 
