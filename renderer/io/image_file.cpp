@@ -104,7 +104,8 @@ Image readImage(const fs::path& path) {
   }
   const int channels = std::min(spec.nchannels, 4);
   std::vector<float> values(std::size_t(count) * std::size_t(channels));
-  if (!input->read_image(0, 0, 0, channels, OIIO::TypeFloat, values.data())) {
+  input->geterror();  // warnings of opening; some decoding errors are recorded without read_image failing
+  if (!input->read_image(0, 0, 0, channels, OIIO::TypeFloat, values.data()) || input->has_error()) {
     throw Error(ErrorCode::badInput, shown(path) + ": cannot be read: " + cleanText(input->geterror()));
   }
 

@@ -171,7 +171,9 @@ class PageReader {
       throw Error(ErrorCode::unsupported,
                   where + ": expected " + text(first_) + " as the first, found " + text(spec));
     }
-    if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::UNKNOWN, page.data())) {
+    // Some decoding errors are recorded without read_image failing; what open recorded are mere warnings.
+    input->geterror();
+    if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::UNKNOWN, page.data()) || input->has_error()) {
       throw Error(ErrorCode::badInput, where + ": cannot be decoded: " + cleanText(input->geterror()));
     }
   }
