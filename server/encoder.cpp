@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/encoder.h"
+
+#include <turbojpeg.h>
+
+#include <memory>
+#include <string>
+
+#include "renderer/core/error.h"
+
+namespace scolopax::server {
+namespace {
+
+constexpr int kMaxSide = 65500;  // of libjpeg's JPEG_MAX_DIMENSION
+
+struct DestroyHandle {
+  void operator()(void* handle) const { tjDestroy(handle); }
+};
+
+// A handle may be used by one thread at a time and is costly to make: one per thread.
+tjhandle threadCompressor() {
+  thread_local const std::unique_ptr<void, DestroyHandle> handle(tjInitCompress());
+  if (!handle) throw Error(ErrorCode::io, std::string("JPEG encoder: ") + tjGetErrorStr2(nullptr));
+  return handle.get();
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encodeJpeg(const Image8& image, int quality, ChromaSampling sampling) {
+  if (image.width < 1 || image.height < 1 ||
+      image.rgb.size() != std::size_t(image.width) * std::size_t(image.height) * 3)
+    throw Error(ErrorCode::badInput, "JPEG: expected width x height x 3 bytes, found an image of " +
+                                         std::to_string(image.width) + " x " + std::to_string(image.height) +
+                                         " with " + std::to_string(image.rgb.size()) + " bytes");
+  if (image.width > kMaxSide || image.height > kMaxSide)
+    throw Error(ErrorCode::tooLarge, "JPEG: at most 65500 pixels a side, found " + std::to_string(image.width) +
+                                         " x " + std::to_string(image.height));
+  const int subsampling = sampling == ChromaSampling::full444 ? TJSAMP_444 : TJSAMP_420;
+  std::vector<std::uint8_t> bytes(tjBufSize(image.width, image.height, subsampling));
+  unsigned char* begin = bytes.data();
+  auto size = static_cast<unsigned long>(bytes.size());
+  const tjhandle handle = threadCompressor();
+  // NOREALLOC: the buffer is the library's own upper bound, so it always fits and stays ours.
+  if (tjCompress2(handle, image.rgb.data(), image.width, 0, image.height, TJPF_RGB, &begin, &size, subsampling,
+                  quality, TJFLAG_NOREALLOC) != 0)
+    throw Error(ErrorCode::io, std::string("JPEG encoder: ") + tjGetErrorStr2(handle));
+  bytes.resize(size);
+  return bytes;
+}
+
+}  // namespace scolopax::server

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// A session's picture on its way out: rendered (float), then encoded (JPEG beside the float image).
+#pragma once
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <vector>
+
+#include "renderer/data/image.h"
+
+namespace scolopax::server {
+
+using TimePoint = std::chrono::steady_clock::time_point;
+/// The steady clock, or a test's own.
+using Now = std::function<TimePoint()>;
+
+/// What is known of a frame; the wire's header says the same.
+struct FrameInfo {
+  std::uint32_t number = 0;    ///< counts a session's encoded frames from 1; 0 until it is encoded
+  std::uint32_t revision = 0;  ///< of the scene it shows: one, never a mixture
+  std::uint32_t samples = 0;   ///< per pixel
+  float error = 0;             ///< estimated RMSE over linear premultiplied RGB; NaN below two samples
+  std::uint32_t rebuildUs = 0, renderUs = 0, encodeUs = 0;  ///< the last rebuild, the last pass, this encoding
+  bool interactive = false;    ///< made while edits arrive: maybe smaller, more compressed
+  bool final = false;          ///< the stop rule is met: nothing better follows at this revision
+};
+
+/// Linear picture of one film; from the render thread to the encoder thread.
+struct RenderedFrame {
+  FrameInfo info;
+  std::shared_ptr<const Image> image;
+  glm::vec3 background{0};
+};
+
+/// One encoding serves every viewer of a session.
+struct EncodedFrame {
+  FrameInfo info;
+  int width = 0, height = 0;
+  std::shared_ptr<const std::vector<unsigned char>> jpeg;
+  std::shared_ptr<const Image> image;  ///< for scripts that ask for png or exr
+  glm::vec3 background{0};
+};
+
+}  // namespace scolopax::server

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// A thread that repeats one step while there is work and sleeps until it is woken or its time comes.
+#pragma once
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "server/frame.h"
+
+namespace scolopax::server {
+
+class LoopThread {
+ public:
+  /// Returns when it wants to run again: a past time is at once, nothing is when it is woken.
+  using Step = std::function<std::optional<TimePoint>()>;
+
+  ~LoopThread() { stop(); }
+  void start(Step step);
+  /// From any thread; a call during a step makes it run once more.
+  void wake();
+  /// Ends after the step that runs. Safe to call twice.
+  void stop();
+
+ private:
+  void run(const Step& step);
+
+  std::mutex mutex_;
+  std::condition_variable wakeUp_;
+  bool woken_ = false, stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace scolopax::server

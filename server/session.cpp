@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/session.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "server/problems.h"
+
+namespace scolopax::server {
+namespace {
+
+// A viewer that gets no frames keeps at most so many of its patches' ids; beyond, the oldest are forgotten, which
+// only makes the header's patch id lag.
+constexpr std::size_t kMaxPendingPatches = 1024;
+
+}  // namespace
+
+Session::Session(std::string id, std::string token, std::shared_ptr<const SceneResolver> resolver,
+                 std::shared_ptr<const ResolvedScene> scene, SessionHooks hooks)
+    : id_(std::move(id)),
+      token_(std::move(token)),
+      resolver_(std::move(resolver)),
+      hooks_(std::move(hooks)),
+      scene_(std::move(scene)),
+      lastUsed_(hooks_.now()) {}
+
+Session::SceneState Session::scene() const {
+  const std::lock_guard lock(mutex_);
+  return {scene_, revision_};
+}
+
+Session::SceneState Session::patch(const nlohmann::json& patch, const EditOrigin& origin) {
+  const std::lock_guard lock(mutex_);
+  checkRevision(origin);
+  return edit(resolver_->patch(*scene_, patch), patch, origin);
+}
+
+Session::SceneState Session::replace(const nlohmann::json& scene, const EditOrigin& origin) {
+  const std::lock_guard lock(mutex_);
+  checkRevision(origin);
+  auto next = resolver_->resolve(scene);
+  const nlohmann::json patch = mergePatchBetween(scene_->sparse, next->sparse);
+  return edit(std::move(next), patch, origin);
+}
+
+void Session::checkRevision(const EditOrigin& origin) const {
+  if (closed_) throw notFound("the session has ended");
+  if (origin.ifRevision && *origin.ifRevision != revision_)
+    throw conflict("the scene is at revision " + std::to_string(revision_) + ", expected " +
+                   std::to_string(*origin.ifRevision));
+}
+
+Session::SceneState Session::edit(std::shared_ptr<const ResolvedScene> next, const nlohmann::json& patch,
+                                  const EditOrigin& origin) {
+  const bool pictureChanges = next->picture != scene_->picture;
+  scene_ = std::move(next);
+  ++revision_;
+  lastUsed_ = hooks_.now();
+  if (pictureChanges) {
+    lastEdit_ = lastUsed_;
+    if (cancellable_) cancel_ = true;
+  }
+  for (auto& [id, viewer] : viewers_) {
+    if (id != origin.viewer) {
+      viewer.sink->sceneChanged(revision_, patch);
+      continue;
+    }
+    viewer.pending.push_back({origin.patchId, revision_});
+    if (viewer.pending.size() > kMaxPendingPatches) viewer.pending.pop_front();
+  }
+  frameCame_.notify_all();
+  hooks_.wakeRender();
+  return {scene_, revision_};
+}
+
+ViewerId Session::addViewer(std::shared_ptr<ViewerSink> sink) {
+  const std::lock_guard lock(mutex_);
+  if (closed_) throw notFound("the session has ended");
+  const ViewerId id = nextViewer_++;
+  viewers_[id].sink = std::move(sink);
+  lastUsed_ = hooks_.now();
+  hooks_.wakeRender();
+  hooks_.wakeEncoder();
+  return id;
+}
+
+void Session::removeViewer(ViewerId id) {
+  const std::lock_guard lock(mutex_);
+  viewers_.erase(id);
+  lastUsed_ = hooks_.now();
+  hooks_.wakeRender();  // which also counts the time to the session's end
+}
+
+void Session::setView(ViewerId id, bool visible, double maxFps) {
+  const std::lock_guard lock(mutex_);
+  const auto viewer = viewers_.find(id);
+  if (viewer == viewers_.end()) return;
+  viewer->second.visible = visible;
+  viewer->second.maxFps = maxFps;
+  hooks_.wakeRender();
+  hooks_.wakeEncoder();
+}
+
+std::size_t Session::viewerCount() const {
+  const std::lock_guard lock(mutex_);
+  return viewers_.size();
+}
+
+std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& query,
+                                                          std::chrono::milliseconds timeout) {
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  std::unique_lock lock(mutex_);
+  const std::uint32_t revision = revision_;
+  const auto fits = [&] {
+    return frame_ && frame_->info.number > query.after && frame_->info.revision >= revision &&
+           !frame_->info.interactive && (frame_->info.samples >= query.minSamples || frame_->info.final);
+  };
+  const auto poll = pollSamples_.insert(query.minSamples);
+  hooks_.wakeRender();
+  frameCame_.wait_until(lock, deadline, [&] { return closed_ || fits() || failedRevision_ == revision_; });
+  pollSamples_.erase(poll);
+  lastUsed_ = hooks_.now();
+  hooks_.wakeRender();
+  if (closed_) return nullptr;
+  if (fits()) return frame_;
+  if (failedRevision_ == revision_) throw unprocessable("", failure_);
+  return nullptr;
+}
+
+std::shared_ptr<const EncodedFrame> Session::latestFrame() const {
+  const std::lock_guard lock(mutex_);
+  return frame_;
+}
+
+void Session::close(const std::string& reason) {
+  const std::lock_guard lock(mutex_);
+  if (std::exchange(closed_, true)) return;
+  cancel_ = true;
+  for (auto& [id, viewer] : viewers_) viewer.sink->sessionClosed(reason);
+  viewers_.clear();
+  frameCame_.notify_all();
+}
+
+TimePoint Session::lastUsed() const {
+  const std::lock_guard lock(mutex_);
+  return viewers_.empty() && pollSamples_.empty() ? lastUsed_ : hooks_.now();
+}
+
+RenderRequest Session::request() const {
+  const std::lock_guard lock(mutex_);
+  return requestLocked();
+}
+
+RenderRequest Session::requestLocked() const {
+  RenderRequest request;
+  request.scene = scene_;
+  request.revision = revision_;
+  request.pollSamples.assign(pollSamples_.begin(), pollSamples_.end());
+  const bool seen = std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.visible; });
+  request.wanted = !closed_ && failedRevision_ != revision_ && (seen || !pollSamples_.empty());
+  if (seen && lastEdit_) {
+    request.interactiveEnd = *lastEdit_ + kInteractiveTime;
+    request.interactive = hooks_.now() < request.interactiveEnd;
+  }
+  return request;
+}
+
+RenderRequest Session::startPass() {
+  const std::lock_guard lock(mutex_);
+  cancel_ = closed_;
+  RenderRequest request = requestLocked();
+  // A small pass is let through, and so is one that follows a cancelled one: however fast edits come, pictures
+  // are shown between them.
+  cancellable_ = !request.interactive && !lastPassCancelled_;
+  return request;
+}
+
+void Session::passEnded(bool cancelled) {
+  const std::lock_guard lock(mutex_);
+  cancellable_ = false;
+  lastPassCancelled_ = cancelled;
+}
+
+void Session::submit(RenderedFrame frame) {
+  const std::lock_guard lock(mutex_);
+  if (closed_) return;
+  rendered_ = std::move(frame);
+  hooks_.wakeEncoder();
+}
+
+void Session::fail(std::uint32_t revision, const std::string& message) {
+  const std::lock_guard lock(mutex_);
+  failedRevision_ = revision;
+  failure_ = message;
+  for (auto& [id, viewer] : viewers_) viewer.sink->renderFailed(message);
+  frameCame_.notify_all();
+}
+
+std::optional<RenderedFrame> Session::takeRendered() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(rendered_, std::nullopt);
+}
+
+void Session::publish(EncodedFrame frame) {
+  const std::lock_guard lock(mutex_);
+  frame.info.number = ++frameNumber_;
+  frame_ = std::make_shared<const EncodedFrame>(std::move(frame));
+  frameCame_.notify_all();
+}
+
+std::optional<TimePoint> Session::deliver() {
+  const std::lock_guard lock(mutex_);
+  std::optional<TimePoint> next;
+  if (!frame_) return next;
+  const TimePoint now = hooks_.now();
+  for (auto& [id, viewer] : viewers_) {
+    if (!viewer.visible || viewer.lastNumber == frame_->info.number) continue;
+    if (viewer.maxFps > 0 && viewer.lastNumber > 0) {
+      const auto turn = viewer.lastOffer + std::chrono::duration_cast<TimePoint::duration>(
+                                               std::chrono::duration<double>(1 / viewer.maxFps));
+      if (now < turn) {
+        next = next ? std::min(*next, turn) : turn;
+        continue;
+      }
+    }
+    while (!viewer.pending.empty() && viewer.pending.front().revision <= frame_->info.revision) {
+      viewer.containedPatch = viewer.pending.front().id;
+      viewer.pending.pop_front();
+    }
+    viewer.lastOffer = now;
+    viewer.lastNumber = frame_->info.number;
+    viewer.sink->offerFrame(*frame_, viewer.containedPatch);
+  }
+  return next;
+}
+
+}  // namespace scolopax::server

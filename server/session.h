@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+// One session: scene, revision, viewers and latest frame. Edits come in from network threads, the render
+// thread takes the newest scene and hands in pictures, the encoder thread hands the frames out.
+//
+// Threads and locks:
+//  1. Network threads edit, read, poll, join and leave; ONE render thread and ONE encoder thread serve all sessions.
+//  2. All that they share is in Session, behind its one mutex; each public function locks it once.
+//  3. The mutex is never held while rendering or encoding: both work on snapshots (shared_ptr to const).
+//  4. The renderer and its film belong to the render thread alone (ProgressiveRender); no lock guards them.
+//  5. Only the encoder thread offers frames to viewers, so an older frame can never replace a newer one.
+//  6. Viewers are called with the mutex held, so that they see edits in order: a ViewerSink only queues, it
+//     neither blocks nor calls back.
+//  7. An edit raises cancel() under the mutex; startPass() lowers it under the mutex while it takes the scene,
+//     so no edit is lost between the two.
+//  8. Waking a loop takes the loop's own, innermost mutex. The store's mutex is never held with a session's.
+#pragma once
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "server/frame.h"
+#include "server/scene_resolver.h"
+
+namespace scolopax::server {
+
+/// A client that sees the session's pictures. Calls queue and return; they come with the session's mutex held.
+class ViewerSink {
+ public:
+  virtual ~ViewerSink() = default;
+  /// `patch`: id of this viewer's last patch that the frame contains, 0 for none.
+  virtual void offerFrame(const EncodedFrame& frame, std::uint32_t patch) = 0;
+  /// Another client edited the scene: `patch` turns the scene before into the one of `revision`.
+  virtual void sceneChanged(std::uint32_t revision, const nlohmann::json& patch) = 0;
+  /// The scene cannot be rendered.
+  virtual void renderFailed(const std::string& message) = 0;
+  /// The session has ended.
+  virtual void sessionClosed(const std::string& reason) = 0;
+};
+
+using ViewerId = std::uint64_t;  ///< 0: nobody
+
+/// Who edits, and on which condition.
+struct EditOrigin {
+  ViewerId viewer = 0;
+  std::uint32_t patchId = 0;                  ///< the viewer's own number for the edit
+  std::optional<std::uint32_t> ifRevision;    ///< throws 409 when the scene is at another revision
+};
+
+/// What a script waits for.
+struct FrameQuery {
+  std::uint32_t after = 0;       ///< a frame with a larger number
+  std::uint32_t minSamples = 1;  ///< with so many samples at least, or the final one
+};
+
+/// What the render thread should do for a session; a snapshot.
+struct RenderRequest {
+  std::shared_ptr<const ResolvedScene> scene;
+  std::uint32_t revision = 0;
+  bool wanted = false;        ///< somebody looks on or waits, and the scene can be rendered
+  bool interactive = false;   ///< edits arrive
+  TimePoint interactiveEnd;   ///< when that ends, if no edit comes
+  std::vector<std::uint32_t> pollSamples;  ///< sample counts that scripts wait for
+};
+
+/// Functions that wake the loops; called with or without the session's mutex held.
+struct SessionHooks {
+  Now now;
+  std::function<void()> wakeRender;
+  std::function<void()> wakeEncoder;
+};
+
+class Session {
+ public:
+  /// The time after an edit during which speed counts more than quality.
+  static constexpr std::chrono::milliseconds kInteractiveTime{300};
+
+  Session(std::string id, std::string token, std::shared_ptr<const SceneResolver> resolver,
+          std::shared_ptr<const ResolvedScene> scene, SessionHooks hooks);
+
+  const std::string& id() const { return id_; }
+  const std::string& token() const { return token_; }  ///< secret: whoever has it may resume
+
+  // --- network threads ---------------------------------------------------------------------------------------
+  struct SceneState {
+    std::shared_ptr<const ResolvedScene> scene;
+    std::uint32_t revision;
+  };
+  SceneState scene() const;
+  /// Applies a patch (a whole scene) at once and returns the new revision. Throws Problem and leaves
+  /// the scene as it was when the result is not a scene.
+  SceneState patch(const nlohmann::json& patch, const EditOrigin& origin);
+  SceneState replace(const nlohmann::json& scene, const EditOrigin& origin);
+
+  /// The viewer gets the latest frame soon, then every new one.
+  ViewerId addViewer(std::shared_ptr<ViewerSink> sink);
+  void removeViewer(ViewerId id);
+  /// `maxFps` 0: as fast as they come.
+  void setView(ViewerId id, bool visible, double maxFps);
+  std::size_t viewerCount() const;
+
+  /// Waits for a full-resolution frame of the scene as it is now or newer; nullptr when none came in time or the
+  /// session was closed. Throws Problem when the scene cannot be rendered.
+  std::shared_ptr<const EncodedFrame> waitForFrame(const FrameQuery& query, std::chrono::milliseconds timeout);
+  std::shared_ptr<const EncodedFrame> latestFrame() const;
+  /// Ends waiting and viewing; nothing is rendered any more.
+  void close(const std::string& reason);
+  /// When somebody last looked, edited or asked; now while there is a viewer or a waiting script.
+  TimePoint lastUsed() const;
+
+  // --- render thread -----------------------------------------------------------------------------------------
+  RenderRequest request() const;
+  /// The same, and lowers cancel() for the pass that follows.
+  RenderRequest startPass();
+  /// Raised when the running pass is of no use any more.
+  const std::atomic<bool>& cancel() const { return cancel_; }
+  void passEnded(bool cancelled);
+  /// Takes the one waiting place of the encoder, replacing what is there.
+  void submit(RenderedFrame frame);
+  /// Nothing is rendered until the next edit.
+  void fail(std::uint32_t revision, const std::string& message);
+
+  // --- encoder thread ----------------------------------------------------------------------------------------
+  std::optional<RenderedFrame> takeRendered();
+  void publish(EncodedFrame frame);
+  /// Offers the latest frame to every viewer that has not had it and may have it now; returns when the next
+  /// viewer's turn comes.
+  std::optional<TimePoint> deliver();
+
+ private:
+  struct Viewer {
+    std::shared_ptr<ViewerSink> sink;
+    bool visible = true;
+    double maxFps = 0;
+    TimePoint lastOffer;
+    std::uint32_t lastNumber = 0;
+    std::uint32_t containedPatch = 0;
+    struct PendingPatch {
+      std::uint32_t id, revision;
+    };
+    std::deque<PendingPatch> pending;  ///< patches newer than the last frame offered
+  };
+
+  SceneState edit(std::shared_ptr<const ResolvedScene> next, const nlohmann::json& patch, const EditOrigin& origin);
+  void checkRevision(const EditOrigin& origin) const;
+  RenderRequest requestLocked() const;
+
+  const std::string id_, token_;
+  const std::shared_ptr<const SceneResolver> resolver_;
+  const SessionHooks hooks_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable frameCame_;  ///< a frame, a failure, an edit or the end
+  std::shared_ptr<const ResolvedScene> scene_;
+  std::uint32_t revision_ = 1;
+  std::optional<TimePoint> lastEdit_;  ///< that changed the picture
+  TimePoint lastUsed_;
+  bool closed_ = false;
+  std::uint32_t failedRevision_ = 0;
+  std::string failure_;
+  std::map<ViewerId, Viewer> viewers_;
+  ViewerId nextViewer_ = 1;
+  std::multiset<std::uint32_t> pollSamples_;  ///< one per waiting script
+  std::optional<RenderedFrame> rendered_;     ///< waits for the encoder
+  std::shared_ptr<const EncodedFrame> frame_;
+  std::uint32_t frameNumber_ = 0;
+
+  std::atomic<bool> cancel_{false};
+  bool cancellable_ = false;        ///< of the running pass
+  bool lastPassCancelled_ = false;
+};
+
+}  // namespace scolopax::server
