@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/problems.h"
+#include "protocol/patch.h"
+#include "protocol/problem.h"
 
 namespace scolopax::server {
 namespace {
@@ -32,27 +33,28 @@ Session::SceneState Session::scene() const {
 Session::SceneState Session::patch(const nlohmann::json& patch, const EditOrigin& origin) {
   const std::lock_guard lock(mutex_);
   checkRevision(origin);
-  return edit(resolver_->patch(*scene_, patch), patch, origin);
+  return edit(resolver_->patch(*scene_, patch), origin);
 }
 
 Session::SceneState Session::replace(const nlohmann::json& scene, const EditOrigin& origin) {
   const std::lock_guard lock(mutex_);
   checkRevision(origin);
-  auto next = resolver_->resolve(scene);
-  const nlohmann::json patch = mergePatchBetween(scene_->sparse, next->sparse);
-  return edit(std::move(next), patch, origin);
+  return edit(resolver_->replace(scene), origin);
 }
 
 void Session::checkRevision(const EditOrigin& origin) const {
-  if (closed_) throw notFound("the session has ended");
+  if (closed_) throw protocol::ProtocolError(404, "", "the session has ended");
   if (origin.ifRevision && *origin.ifRevision != revision_)
-    throw conflict("the scene is at revision " + std::to_string(revision_) + ", expected " +
-                   std::to_string(*origin.ifRevision));
+    throw protocol::ProtocolError(409, "",
+                                  "expected the scene at revision " + std::to_string(*origin.ifRevision) +
+                                      ", found revision " + std::to_string(revision_));
 }
 
-Session::SceneState Session::edit(std::shared_ptr<const ResolvedScene> next, const nlohmann::json& patch,
-                                  const EditOrigin& origin) {
+Session::SceneState Session::edit(std::shared_ptr<const ResolvedScene> next, const EditOrigin& origin) {
   const bool pictureChanges = next->picture != scene_->picture;
+  nlohmann::json change;  // for the others; most sessions have one viewer
+  if (viewers_.size() > viewers_.count(origin.viewer))
+    change = protocol::mergePatchBetween(scene_->resolved, next->resolved);
   scene_ = std::move(next);
   ++revision_;
   lastUsed_ = hooks_.now();
@@ -62,7 +64,7 @@ Session::SceneState Session::edit(std::shared_ptr<const ResolvedScene> next, con
   }
   for (auto& [id, viewer] : viewers_) {
     if (id != origin.viewer) {
-      viewer.sink->sceneChanged(revision_, patch);
+      viewer.sink->sceneChanged(revision_, change);
       continue;
     }
     viewer.pending.push_back({origin.patchId, revision_});
@@ -75,7 +77,7 @@ Session::SceneState Session::edit(std::shared_ptr<const ResolvedScene> next, con
 
 ViewerId Session::addViewer(std::shared_ptr<ViewerSink> sink) {
   const std::lock_guard lock(mutex_);
-  if (closed_) throw notFound("the session has ended");
+  if (closed_) throw protocol::ProtocolError(404, "", "the session has ended");
   const ViewerId id = nextViewer_++;
   viewers_[id].sink = std::move(sink);
   lastUsed_ = hooks_.now();
@@ -123,7 +125,7 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
   hooks_.wakeRender();
   if (closed_) return nullptr;
   if (fits()) return frame_;
-  if (failedRevision_ == revision_) throw unprocessable("", failure_);
+  if (failedRevision_ == revision_) throw protocol::ProtocolError(422, "", failure_);
   return nullptr;
 }
 

@@ -20,6 +20,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "server/frame.h"
@@ -33,7 +34,7 @@ class ViewerSink {
   virtual ~ViewerSink() = default;
   /// `patch`: id of this viewer's last patch that the frame contains, 0 for none.
   virtual void offerFrame(const EncodedFrame& frame, std::uint32_t patch) = 0;
-  /// Another client edited the scene: `patch` turns the scene before into the one of `revision`.
+  /// Another client edited the scene: `patch` turns the resolved scene before into that of `revision`.
   virtual void sceneChanged(std::uint32_t revision, const nlohmann::json& patch) = 0;
   /// The scene cannot be rendered.
   virtual void renderFailed(const std::string& message) = 0;
@@ -90,8 +91,8 @@ class Session {
     std::uint32_t revision;
   };
   SceneState scene() const;
-  /// Applies a patch (a whole scene) at once and returns the new revision. Throws Problem and leaves
-  /// the scene as it was when the result is not a scene.
+  /// Applies a patch (a whole scene) at once and returns the new revision. Throws ProtocolError and
+  /// leaves the scene as it was when the result is not a scene.
   SceneState patch(const nlohmann::json& patch, const EditOrigin& origin);
   SceneState replace(const nlohmann::json& scene, const EditOrigin& origin);
 
@@ -103,7 +104,7 @@ class Session {
   std::size_t viewerCount() const;
 
   /// Waits for a full-resolution frame of the scene as it is now or newer; nullptr when none came in time or the
-  /// session was closed. Throws Problem when the scene cannot be rendered.
+  /// session was closed. Throws ProtocolError when the scene cannot be rendered.
   std::shared_ptr<const EncodedFrame> waitForFrame(const FrameQuery& query, std::chrono::milliseconds timeout);
   std::shared_ptr<const EncodedFrame> latestFrame() const;
   /// Ends waiting and viewing; nothing is rendered any more.
@@ -144,7 +145,7 @@ class Session {
     std::deque<PendingPatch> pending;  ///< patches newer than the last frame offered
   };
 
-  SceneState edit(std::shared_ptr<const ResolvedScene> next, const nlohmann::json& patch, const EditOrigin& origin);
+  SceneState edit(std::shared_ptr<const ResolvedScene> next, const EditOrigin& origin);
   void checkRevision(const EditOrigin& origin) const;
   RenderRequest requestLocked() const;
 

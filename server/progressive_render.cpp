@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/progressive_render.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <exception>
+#include <utility>
+
+#include "renderer/core/error.h"
+
+namespace scolopax::server {
+namespace {
+
+constexpr int kDivisors[] = {1, 2, 3, 4, 6, 8, 12, 16};
+
+double secondsBetween(TimePoint from, TimePoint to) { return std::chrono::duration<double>(to - from).count(); }
+
+std::uint32_t microseconds(double seconds) { return std::uint32_t(std::clamp(seconds * 1e6, 0.0, 4e9)); }
+
+Scene atDivisor(Scene scene, int divisor) {
+  scene.width = (scene.width + divisor - 1) / divisor;
+  scene.height = (scene.height + divisor - 1) / divisor;
+  return scene;
+}
+
+}  // namespace
+
+int divisorForTarget(std::uint64_t pixels, double secondsPerPixel, double targetSeconds) {
+  for (const int divisor : kDivisors)
+    if (double(pixels) / (divisor * divisor) * secondsPerPixel <= targetSeconds) return divisor;
+  return kDivisors[std::size(kDivisors) - 1];
+}
+
+ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer, Options options,
+                                     Now now, Log log)
+    : session_(std::move(session)),
+      makeRenderer_(std::move(makeRenderer)),
+      options_(options),
+      now_(std::move(now)),
+      log_(std::move(log)) {}
+
+bool ProgressiveRender::sceneStale(const RenderRequest& request) const {
+  // Back to full resolution when edits have stopped; a film that already has it goes on.
+  return !scene_ || request.revision != revision_ || (!request.interactive && divisor_ != 1);
+}
+
+bool ProgressiveRender::finished(const RenderRequest& request) const {
+  const StopRule& stop = request.scene->stop;
+  const std::uint32_t samples = renderer_->samples();
+  return samples > 0 &&
+         ((stop.samples > 0 && samples >= stop.samples) || (stop.seconds > 0 && filmSeconds_ >= stop.seconds) ||
+          (stop.error > 0 && samples >= 2 && renderer_->estimatedError() <= stop.error));
+}
+
+/// Whether the film as it stands is worth a frame.
+bool ProgressiveRender::showDue(const RenderRequest& request) const {
+  const std::uint32_t samples = renderer_->samples();
+  if (samples == 0) return false;
+  if (shown_.revision != revision_ || shown_.interactive != request.interactive) return true;
+  if (!request.interactive && finished(request)) return !shown_.final;
+  if (samples == shown_.samples) return false;
+  if (std::any_of(request.pollSamples.begin(), request.pollSamples.end(),
+                  [&](std::uint32_t wanted) { return shown_.samples < wanted && wanted <= samples; }))
+    return true;
+  return std::has_single_bit(samples) ||
+         now_() - shownAt_ >= (request.interactive ? options_.interactiveInterval : options_.stillInterval);
+}
+
+bool ProgressiveRender::due() const {
+  const RenderRequest request = session_->request();
+  return request.wanted && (sceneStale(request) || !finished(request) || showDue(request));
+}
+
+std::optional<TimePoint> ProgressiveRender::dueAt() const {
+  const RenderRequest request = session_->request();
+  if (!request.wanted) return std::nullopt;
+  // Also when the end has just passed, between due() and here: then it is due at once.
+  if (request.interactive || shown_.interactive) return request.interactiveEnd;
+  return std::nullopt;
+}
+
+int ProgressiveRender::wantedDivisor(const RenderRequest& request) const {
+  if (!request.interactive) return 1;
+  const auto pixels = std::uint64_t(request.scene->render.width) * std::uint64_t(request.scene->render.height);
+  return divisorForTarget(pixels, secondsPerPixel_, std::chrono::duration<double>(options_.frameTarget).count());
+}
+
+void ProgressiveRender::takeScene(const RenderRequest& request, PassResult& result) {
+  const TimePoint begin = now_();
+  if (!renderer_ || volume_ != request.scene->dataset->volume) {
+    renderer_.reset();
+    volume_ = request.scene->dataset->volume;
+    renderer_ = makeRenderer_(volume_);
+    secondsPerPixel_ = 0;
+  }
+  const int divisor = wantedDivisor(request);
+  const RebuildStats stats = renderer_->setScene(atDivisor(request.scene->render, divisor));
+  if (stats.filmReset) filmSeconds_ = 0;
+  scene_ = request.scene;
+  revision_ = request.revision;
+  divisor_ = divisor;
+  result.rebuildSeconds = secondsBetween(begin, now_());
+  rebuildUs_ = microseconds(result.rebuildSeconds);
+}
+
+void ProgressiveRender::addSample(PassResult& result) {
+  const TimePoint begin = now_();
+  result.rendered = renderer_->renderSample(session_->cancel());
+  result.cancelled = !result.rendered;
+  if (result.cancelled) return;
+  result.renderSeconds = secondsBetween(begin, now_());
+  const Scene& scene = scene_->render;
+  result.pixels = std::uint64_t((scene.width + divisor_ - 1) / divisor_) *
+                  std::uint64_t((scene.height + divisor_ - 1) / divisor_);
+  filmSeconds_ += result.renderSeconds;
+  renderUs_ = microseconds(result.renderSeconds);
+  const double perPixel = result.renderSeconds / double(result.pixels);
+  secondsPerPixel_ = secondsPerPixel_ == 0 ? perPixel : 0.5 * (secondsPerPixel_ + perPixel);
+}
+
+void ProgressiveRender::show(const RenderRequest& request) {
+  FrameInfo info;
+  info.revision = revision_;
+  info.samples = renderer_->samples();
+  info.error = float(renderer_->estimatedError());
+  info.rebuildUs = rebuildUs_;
+  info.renderUs = renderUs_;
+  info.interactive = request.interactive;
+  info.final = !request.interactive && finished(request);
+  session_->submit({info, std::make_shared<const Image>(renderer_->image()), scene_->render.background});
+  shown_ = info;
+  shownAt_ = now_();
+}
+
+PassResult ProgressiveRender::run() {
+  PassResult result;
+  const RenderRequest request = session_->startPass();
+  if (!request.wanted) return result;
+  try {
+    if (sceneStale(request)) takeScene(request, result);
+    if (!finished(request)) addSample(result);
+    session_->passEnded(result.cancelled);
+    if (!result.cancelled && showDue(request)) show(request);
+    return result;
+  } catch (const Error& error) {
+    session_->fail(request.revision, error.what());
+  } catch (const std::bad_alloc&) {
+    session_->fail(request.revision, "not enough memory to render this scene");
+  } catch (const std::exception& error) {
+    log_(std::string("session ") + session_->id() + ": the renderer failed: " + error.what());
+    session_->fail(request.revision, "the renderer failed");  // the cause is not for a client
+  }
+  session_->passEnded(false);
+  // What an error has left behind is not worth keeping.
+  scene_.reset();
+  renderer_.reset();
+  return result;
+}
+
+}  // namespace scolopax::server

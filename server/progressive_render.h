@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// One session's renderer and film, and the policy of what to render and show next. Used by the render
+// thread alone; takes scenes from Session and hands pictures back to it.
+#pragma once
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "renderer/renderer.h"
+#include "server/session.h"
+
+namespace scolopax::server {
+
+using MakeRenderer = std::function<std::unique_ptr<Renderer>(std::shared_ptr<const Volume>)>;
+/// Takes one line that a client must not see.
+using Log = std::function<void(const std::string&)>;
+
+/// Filled by each pass, for the metrics.
+struct PassResult {
+  bool rendered = false;  ///< a sample was added to every pixel
+  bool cancelled = false;
+  std::uint64_t pixels = 0;
+  double renderSeconds = 0, rebuildSeconds = 0;
+};
+
+class ProgressiveRender {
+ public:
+  struct Options {
+    std::chrono::microseconds frameTarget{40'000};      ///< for one pass while edits arrive
+    std::chrono::milliseconds interactiveInterval{33};  ///< between frames while edits arrive
+    std::chrono::milliseconds stillInterval{500};       ///< between frames once samples are many
+  };
+  ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer, Options options, Now now, Log log);
+
+  const std::shared_ptr<Session>& session() const { return session_; }
+  /// Whether run() has something to do now.
+  bool due() const;
+  /// When due() may become true without being woken.
+  std::optional<TimePoint> dueAt() const;
+  /// One sample pass at most, with the rebuild before it and the submission after it. Never throws: what cannot be
+  /// rendered is told to the session.
+  PassResult run();
+
+ private:
+  bool sceneStale(const RenderRequest& request) const;
+  bool finished(const RenderRequest& request) const;
+  bool showDue(const RenderRequest& request) const;
+  int wantedDivisor(const RenderRequest& request) const;
+  void takeScene(const RenderRequest& request, PassResult& result);
+  void addSample(PassResult& result);
+  void show(const RenderRequest& request);
+
+  const std::shared_ptr<Session> session_;
+  const MakeRenderer makeRenderer_;
+  const Options options_;
+  const Now now_;
+  const Log log_;
+
+  std::shared_ptr<const Volume> volume_;
+  std::unique_ptr<Renderer> renderer_;
+  std::shared_ptr<const ResolvedScene> scene_;  ///< that the film shows; null before the first
+  std::uint32_t revision_ = 0;
+  int divisor_ = 1;                ///< of width and height
+  double filmSeconds_ = 0;         ///< spent on the film's samples
+  double secondsPerPixel_ = 0;     ///< of one sample, from earlier passes; 0 before the first
+  std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
+
+  FrameInfo shown_;                ///< the last frame handed in; revision 0 before the first
+  TimePoint shownAt_;
+};
+
+/// The smallest of 1, 2, 3, 4, 6, 8, ... by which width and height must be divided so that a pass fits the target.
+int divisorForTarget(std::uint64_t pixels, double secondsPerPixel, double targetSeconds);
+
+}  // namespace scolopax::server

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/render_loop.h"
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include "server/encoder.h"
+
+namespace scolopax::server {
+namespace {
+
+void keepEarlier(std::optional<TimePoint>& a, const std::optional<TimePoint>& b) {
+  if (b) a = a ? std::min(*a, *b) : *b;
+}
+
+}  // namespace
+
+RenderLoop::RenderLoop(SessionStore& store, MakeRenderer makeRenderer, ProgressiveRender::Options options, Now now,
+                       Log log, OnPass onPass)
+    : store_(store),
+      makeRenderer_(std::move(makeRenderer)),
+      options_(options),
+      now_(std::move(now)),
+      log_(std::move(log)),
+      onPass_(std::move(onPass)) {}
+
+void RenderLoop::followStore() {
+  const auto sessions = store_.all();
+  const auto known = [&](const std::shared_ptr<Session>& session) {
+    return std::any_of(renders_.begin(), renders_.end(), [&](const auto& r) { return r->session() == session; });
+  };
+  std::erase_if(renders_, [&](const auto& render) {
+    return std::find(sessions.begin(), sessions.end(), render->session()) == sessions.end();
+  });
+  for (const auto& session : sessions)
+    if (!known(session))
+      renders_.push_back(std::make_unique<ProgressiveRender>(session, makeRenderer_, options_, now_, log_));
+}
+
+std::optional<TimePoint> RenderLoop::step() {
+  std::optional<TimePoint> next = store_.expire();
+  followStore();
+  const auto turn = std::find_if(renders_.begin(), renders_.end(), [](const auto& r) { return r->due(); });
+  if (turn != renders_.end()) {
+    // Behind all others before it runs: a session of slow passes gets one turn in the round as well.
+    std::rotate(turn, turn + 1, renders_.end());
+    onPass_(renders_.back()->run());
+    return now_();
+  }
+  for (const auto& render : renders_) keepEarlier(next, render->dueAt());
+  return next;
+}
+
+EncodedFrame encodeFrame(const RenderedFrame& rendered, const Now& now) {
+  const TimePoint begin = now();
+  const Image& image = *rendered.image;
+  const bool quick = rendered.info.interactive;
+  EncodedFrame frame;
+  frame.info = rendered.info;
+  frame.width = image.width;
+  frame.height = image.height;
+  frame.background = rendered.background;
+  frame.jpeg = std::make_shared<const std::vector<unsigned char>>(
+      encodeJpeg(toSrgb8(image, rendered.background), quick ? 75 : 90,
+                 quick ? ChromaSampling::half420 : ChromaSampling::full444));
+  frame.image = rendered.image;
+  frame.info.encodeUs =
+      std::uint32_t(std::chrono::duration_cast<std::chrono::microseconds>(now() - begin).count());
+  return frame;
+}
+
+std::optional<TimePoint> EncodeLoop::step() {
+  std::optional<TimePoint> next;
+  for (const auto& session : store_.all()) {
+    if (const auto rendered = session->takeRendered()) {
+      try {
+        session->publish(encodeFrame(*rendered, now_));
+      } catch (const std::exception& error) {
+        log_("session " + session->id() + ": encoding failed: " + error.what());
+        session->fail(rendered->info.revision, "the picture could not be encoded");
+      }
+    }
+    keepEarlier(next, session->deliver());
+  }
+  return next;
+}
+
+}  // namespace scolopax::server

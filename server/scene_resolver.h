@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// The wire's sparse scene and a volume to a scene with every value: for the renderer and for the client.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "protocol/lists.h"
+#include "protocol/scene.h"
+#include "renderer/data/scene.h"
+#include "server/dataset_store.h"
+
+namespace scolopax::server {
+
+/// When rendering ends: at the first that is met; 0 means no such bound.
+struct StopRule {
+  std::uint32_t samples = 0;
+  double seconds = 0;
+  double error = 0;
+};
+
+/// A scene in the forms the server needs it in. Immutable once made.
+struct ResolvedScene {
+  nlohmann::json sparse;    ///< what the user set
+  nlohmann::json resolved;  ///< every value filled in
+  nlohmann::json picture;   ///< `resolved` without what leaves the picture as it is
+  Scene render;
+  StopRule stop;
+  std::shared_ptr<const Dataset> dataset;
+};
+
+/// The names the renderer knows, for validation, schema and capabilities.
+protocol::Lists rendererLists();
+
+class SceneResolver {
+ public:
+  struct Options {
+    std::uint32_t defaultSamples = 64;        ///< when the scene has no stop rule
+    std::uint64_t maxPixels = 16'777'216;     ///< width x height
+  };
+  SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options);
+
+  /// The scene of a document. Throws ProtocolError(422) with the pointer of the bad field.
+  std::shared_ptr<const ResolvedScene> replace(const nlohmann::json& scene) const;
+  /// `base` with a patch applied to its sparse form. Throws as above.
+  std::shared_ptr<const ResolvedScene> patch(const ResolvedScene& base, const nlohmann::json& patch) const;
+  const protocol::Lists& lists() const { return lists_; }
+
+ private:
+  std::shared_ptr<const ResolvedScene> resolve(nlohmann::json sparse) const;
+  std::shared_ptr<const Dataset> datasetOf(const nlohmann::json& scene) const;
+
+  std::shared_ptr<const DatasetStore> datasets_;
+  Options options_;
+  protocol::Lists lists_;
+};
+
+}  // namespace scolopax::server
