@@ -32,8 +32,7 @@ class DatasetStore {
 std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesystem::path>& paths,
                                                   const std::filesystem::path& root);
 
-/// What GET /datasets lists of one, and what GET /datasets/{id} says beyond it (channels).
-nlohmann::json summaryJson(const Dataset& dataset);
+/// Grid and channels of one data set, as GET /datasets/{id} answers.
 nlohmann::json describeJson(const Dataset& dataset);
 /// 256 bins over the finite values. Throws ProtocolError(422) when there is no such channel.
 nlohmann::json histogramJson(const Dataset& dataset, int channel);

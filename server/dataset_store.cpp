@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/dataset_store.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/matrix.hpp>
+#include <glm/vec4.hpp>
+#include <nlohmann/json.hpp>
+
+#include "protocol/problem.h"
+#include "renderer/core/error.h"
+
+namespace scolopax::server {
+namespace {
+
+using nlohmann::json;
+
+json list(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
+
+double voxelValue(const Channel& channel, std::size_t index) {
+  const double stored = visitScalarType(
+      channel.voxels.type(), [&](auto zero) { return double(channel.voxels.as<decltype(zero)>()[index]); });
+  return channel.slope * stored + channel.intercept;
+}
+
+/// Trilinear at a voxel position inside the outer voxel centres.
+double interpolate(const Channel& channel, const glm::ivec3& dims, const glm::dvec3& voxel) {
+  double sum = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    double weight = 1;
+    std::size_t index = 0, stride = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double low = std::floor(voxel[axis]);
+      const bool upper = corner >> axis & 1;
+      weight *= upper ? voxel[axis] - low : 1 - (voxel[axis] - low);
+      index += std::size_t(std::min(int(low) + upper, dims[axis] - 1)) * stride;
+      stride *= std::size_t(dims[axis]);
+    }
+    // Also with weight 0, as in the renderer: one corner that is not finite makes the sample so.
+    sum += weight * voxelValue(channel, index);
+  }
+  return sum;
+}
+
+}  // namespace
+
+DatasetStore::DatasetStore(std::vector<Dataset> datasets) {
+  for (Dataset& dataset : datasets) datasets_.push_back(std::make_shared<const Dataset>(std::move(dataset)));
+  if (datasets_.empty()) throw Error(ErrorCode::badInput, "expected at least one data set, found none");
+}
+
+std::shared_ptr<const Dataset> DatasetStore::find(std::string_view id) const {
+  const auto found = std::find_if(datasets_.begin(), datasets_.end(), [&](const auto& d) { return d->id == id; });
+  return found == datasets_.end() ? nullptr : *found;
+}
+
+std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesystem::path>& paths,
+                                                  const std::filesystem::path& root) {
+  if (root.empty()) return paths;
+  std::error_code error;
+  const auto base = std::filesystem::canonical(root, error);
+  if (error) throw Error(ErrorCode::notFound, "--data-root " + root.string() + ": " + error.message());
+  std::vector<std::filesystem::path> below;
+  for (const auto& path : paths) {
+    // Links are followed first, so that none leads out.
+    const auto whole = std::filesystem::weakly_canonical(base / path);
+    const auto relative = whole.lexically_relative(base);
+    if (relative.empty() || *relative.begin() == "..")
+      throw Error(ErrorCode::badInput,
+                  path.string() + ": expected a file below --data-root " + base.string() + ", found " + whole.string());
+    below.push_back(whole);
+  }
+  return below;
+}
+
+json describeJson(const Dataset& dataset) {
+  const Grid& grid = dataset.volume->grid();
+  json description = {{"id", dataset.id},
+                      {"title", dataset.title},
+                      {"dimensions", {grid.dims.x, grid.dims.y, grid.dims.z}}};
+  description["spacing"] = list(grid.spacing());
+  description["diagonal"] = grid.diagonal();
+  json matrix = json::array();  // row by row, as it is written on paper; glm keeps columns
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column) matrix.push_back(grid.worldFromVoxel[column][row]);
+  description["worldFromVoxel"] = std::move(matrix);
+  json& channels = description["channels"] = json::array();
+  for (const Channel& channel : dataset.volume->channels())
+    channels.push_back({{"name", channel.name},
+                        {"unit", channel.unit},
+                        {"type", nameOf(channel.voxels.type())},
+                        {"minimum", channel.histogram.minimum},
+                        {"maximum", channel.histogram.maximum},
+                        {"finiteCount", channel.histogram.finiteCount},
+                        {"nonFiniteCount", channel.histogram.nonFiniteCount}});
+  return description;
+}
+
+json histogramJson(const Dataset& dataset, int channel) {
+  const auto channels = dataset.volume->channels();
+  if (channel < 0 || std::size_t(channel) >= channels.size())
+    throw protocol::ProtocolError(422, "/channel",
+                                  "expected a channel from 0 to " + std::to_string(channels.size() - 1) + ", found " +
+                                      std::to_string(channel));
+  const Histogram& histogram = channels[std::size_t(channel)].histogram;
+  return {{"channel", channel},
+          {"minimum", histogram.minimum},
+          {"maximum", histogram.maximum},
+          {"finiteCount", histogram.finiteCount},
+          {"nonFiniteCount", histogram.nonFiniteCount},
+          {"bins", histogram.bins}};
+}
+
+json probeJson(const Dataset& dataset, double x, double y, double z) {
+  const Grid& grid = dataset.volume->grid();
+  const auto voxel = glm::dvec3(glm::inverse(grid.worldFromVoxel) * glm::dvec4(x, y, z, 1));
+  bool inside = true;
+  glm::dvec3 clamped;
+  for (int axis = 0; axis < 3; ++axis) {
+    inside = inside && voxel[axis] >= -0.5 && voxel[axis] <= grid.dims[axis] - 0.5;
+    clamped[axis] = std::clamp(voxel[axis], 0.0, double(grid.dims[axis] - 1));
+  }
+  json values = json::array();
+  for (const Channel& channel : dataset.volume->channels()) {
+    const double value = inside ? interpolate(channel, grid.dims, clamped) : NAN;
+    values.push_back(std::isfinite(value) ? json(value) : json(nullptr));
+  }
+  return {{"inside", inside}, {"voxel", list(voxel)}, {"values", std::move(values)}};
+}
+
+}  // namespace scolopax::server

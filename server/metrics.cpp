@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/metrics.h"
+
+#include <prometheus/counter.h>
+#include <prometheus/gauge.h>
+#include <prometheus/registry.h>
+#include <prometheus/text_serializer.h>
+
+namespace scolopax::server {
+namespace {
+
+using prometheus::Counter;
+using prometheus::Gauge;
+
+}  // namespace
+
+struct Metrics::Impl {
+  prometheus::Registry registry;
+
+  Counter& counter(const char* name, const char* help) {
+    return prometheus::BuildCounter().Name(name).Help(help).Register(registry).Add({});
+  }
+  Gauge& gauge(const char* name, const char* help) {
+    return prometheus::BuildGauge().Name(name).Help(help).Register(registry).Add({});
+  }
+
+  prometheus::Family<Counter>& requests = prometheus::BuildCounter()
+                                              .Name("scolopax_http_requests_total")
+                                              .Help("HTTP responses by status")
+                                              .Register(registry);
+  Counter& sent = counter("scolopax_frames_sent_total", "Frames sent to streams");
+  Counter& replaced = counter("scolopax_frames_dropped_total", "Frames replaced by a newer one before they were sent");
+  Counter& samples = counter("scolopax_samples_total", "Samples rendered, over all pixels");
+  Counter& passes = counter("scolopax_passes_total", "Sample passes that ended");
+  Counter& cancelled = counter("scolopax_passes_cancelled_total", "Sample passes ended early by an edit");
+  Counter& renderSeconds = counter("scolopax_render_seconds_total", "Time spent in sample passes");
+  Counter& rebuildSeconds = counter("scolopax_rebuild_seconds_total", "Time spent taking over edited scenes");
+  Gauge& sessions = gauge("scolopax_sessions", "Sessions");
+  Gauge& clients = gauge("scolopax_clients", "Open streams");
+};
+
+Metrics::Metrics() : impl_(std::make_unique<Impl>()) {}
+Metrics::~Metrics() = default;
+
+void Metrics::requestAnswered(int status) {
+  impl_->requests.Add({{"status", std::to_string(status)}}).Increment();
+}
+
+void Metrics::passEnded(const PassResult& pass) {
+  if (pass.rendered) {
+    impl_->passes.Increment();
+    impl_->samples.Increment(double(pass.pixels));
+    impl_->renderSeconds.Increment(pass.renderSeconds);
+  }
+  if (pass.cancelled) impl_->cancelled.Increment();
+  impl_->rebuildSeconds.Increment(pass.rebuildSeconds);
+}
+
+void Metrics::framesSent(std::uint64_t sent, std::uint64_t replaced) {
+  impl_->sent.Increment(double(sent));
+  impl_->replaced.Increment(double(replaced));
+}
+
+void Metrics::setSessions(std::size_t count) { impl_->sessions.Set(double(count)); }
+void Metrics::setClients(std::size_t count) { impl_->clients.Set(double(count)); }
+
+std::string Metrics::text() const { return prometheus::TextSerializer().Serialize(impl_->registry.Collect()); }
+
+}  // namespace scolopax::server

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Counts for GET /metrics, in Prometheus' text format. Every function may be called from any thread.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "server/progressive_render.h"
+
+namespace scolopax::server {
+
+class Metrics {
+ public:
+  Metrics();
+  ~Metrics();
+  void requestAnswered(int status);
+  void passEnded(const PassResult& pass);
+  /// A stream's own counts since it was asked last.
+  void framesSent(std::uint64_t sent, std::uint64_t replaced);
+  void setSessions(std::size_t count);
+  void setClients(std::size_t count);
+  std::string text() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace scolopax::server

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene_resolver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "protocol/patch.h"
+#include "protocol/problem.h"
+#include "protocol/scene_json.h"
+#include "renderer/core/error.h"
+#include "renderer/data/colormap.h"
+#include "renderer/data/defaults.h"
+#include "renderer/data/image.h"
+
+namespace scolopax::server {
+namespace {
+
+using nlohmann::json;
+using protocol::ProtocolError;
+
+constexpr std::string_view kAutoMethod = "auto";
+
+std::vector<protocol::EnumEntry> entries(std::span<const NamedValue> values) {
+  std::vector<protocol::EnumEntry> list;
+  for (const NamedValue& value : values) list.push_back({std::string(value.name), std::string(value.doc)});
+  return list;
+}
+
+/// The value of that wire name; parseScene has made sure that there is one.
+template <class Enum, std::size_t N>
+Enum valueOf(const NamedValue (&list)[N], std::string_view name) {
+  return Enum(std::find_if(list, list + N, [&](const NamedValue& value) { return value.name == name; }) - list);
+}
+
+glm::dvec3 vectorOf(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+std::array<double, 3> arrayOf(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
+
+/// "#rrggbb", checked before, to linear RGB.
+glm::dvec3 linearOf(const std::string& hex) {
+  const auto part = [&](std::size_t at) {
+    return double(linearFromSrgb(float(std::stoi(hex.substr(at, 2), nullptr, 16)) / 255.0f));
+  };
+  return {part(1), part(3), part(5)};
+}
+
+std::vector<ColorKnot> knotsOf(const protocol::Colormap& colormap) {
+  if (const auto* name = std::get_if<std::string>(&colormap)) return colormapKnots(*name);
+  std::vector<ColorKnot> knots;
+  for (const auto& point : std::get<std::vector<protocol::ColorPoint>>(colormap))
+    knots.push_back({point.position, linearOf(point.color)});
+  return knots;
+}
+
+void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume) {
+  const auto channels = volume.channels();
+  scene.channels.resize(channels.size());
+  const int visibleCount =
+      int(std::count_if(scene.channels.begin(), scene.channels.end(), [](const auto& c) { return c.visible; }));
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    protocol::Channel& wire = scene.channels[i];
+    ChannelAppearance& look = render.channels.emplace_back();
+    if (!wire.name) wire.name = channels[i].name;
+    if (!wire.range) {
+      double lo = 0, hi = 1;
+      defaultRange(channels[i], lo, hi);
+      wire.range = {lo, hi};
+    }
+    if (!wire.color && !wire.colormap) wire.color = defaultColor(int(i), int(channels.size()));
+    look.visible = wire.visible;
+    look.rangeLo = (*wire.range)[0];
+    look.rangeHi = (*wire.range)[1];
+    look.gamma = wire.gamma;
+    look.opacity.clear();
+    for (const auto& point : wire.opacity) look.opacity.push_back({point.position, point.value});
+    look.color = wire.color ? std::vector<ColorKnot>{{0, linearOf(*wire.color)}} : knotsOf(*wire.colormap);
+    // Last, since it depends on the curve; what others see of the channel does not change with it.
+    if (!wire.density) wire.density = defaultDensity(volume, int(i), look, visibleCount);
+    look.density = *wire.density;
+  }
+}
+
+void resolveCamera(protocol::Scene& scene, Scene& render, const Grid& grid) {
+  const double aspect = double(scene.image.width) / double(scene.image.height);
+  const Camera framing = framingCamera(grid, scene.camera.fovY, aspect);
+  protocol::Camera& wire = scene.camera;
+  if (!wire.eye) wire.eye = arrayOf(framing.eye);
+  if (!wire.target) wire.target = arrayOf(framing.target);
+  if (!wire.up) wire.up = arrayOf(framing.up);
+  render.camera = {vectorOf(*wire.eye), vectorOf(*wire.target), vectorOf(*wire.up), wire.fovY, wire.orthoHeight};
+  try {
+    makeCameraRays(render.camera, grid, 1, 1);
+  } catch (const Error& error) {
+    throw ProtocolError(422, "/camera", error.what());
+  }
+}
+
+/// What of the resolved scene decides the picture at a sample count.
+json pictureOf(json resolved) {
+  resolved.erase("stop");
+  for (json& channel : resolved["channels"]) channel.erase("name");
+  return resolved;
+}
+
+}  // namespace
+
+protocol::Lists rendererLists() {
+  protocol::Lists lists;
+  lists.blendModes = entries(kBlendModes);
+  lists.methods = entries(kMethods);
+  lists.methods.insert(lists.methods.begin(), {std::string(kAutoMethod), "chosen by the server"});
+  lists.filters = entries(kPixelFilters);
+  lists.colormaps = entries(kColormaps);
+  return lists;
+}
+
+SceneResolver::SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options)
+    : datasets_(std::move(datasets)), options_(options), lists_(rendererLists()) {}
+
+std::shared_ptr<const Dataset> SceneResolver::datasetOf(const json& scene) const {
+  const auto id = scene.is_object() ? scene.find("dataset") : scene.end();
+  // What is no name at all is refused by parseScene, which says it better.
+  if (id == scene.end() || !id->is_string()) return datasets_->first();
+  auto dataset = datasets_->find(id->get_ref<const std::string&>());
+  if (!dataset) {
+    std::string known;
+    for (const auto& one : datasets_->all()) known += (known.empty() ? "" : ", ") + one->id;
+    throw ProtocolError(422, "/dataset", "expected one of " + known + ", found " + id->dump());
+  }
+  return dataset;
+}
+
+std::shared_ptr<const ResolvedScene> SceneResolver::replace(const json& scene) const {
+  const auto count = datasetOf(scene)->volume->channels().size();
+  return resolve(protocol::applyPatch(json::object(), scene, count));
+}
+
+std::shared_ptr<const ResolvedScene> SceneResolver::patch(const ResolvedScene& base, const json& patch) const {
+  const bool namesDataset = patch.is_object() && patch.contains("dataset");
+  const auto count = datasetOf(namesDataset ? patch : base.sparse)->volume->channels().size();
+  return resolve(protocol::applyPatch(base.sparse, patch, count));
+}
+
+std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
+  protocol::Scene scene = protocol::parseScene(sparse, lists_);
+  auto result = std::make_shared<ResolvedScene>();
+  result->dataset = datasetOf(sparse);
+  const Volume& volume = *result->dataset->volume;
+  protocol::checkChannelCount(scene, volume.channels().size());
+  if (std::uint64_t(scene.image.width) * scene.image.height > options_.maxPixels)
+    throw ProtocolError(422, "/image", "expected at most " + std::to_string(options_.maxPixels) + " pixels, found " +
+                                           std::to_string(scene.image.width) + " x " +
+                                           std::to_string(scene.image.height));
+  Scene& render = result->render;
+  scene.dataset = result->dataset->id;
+  resolveChannels(scene, render, volume);
+  resolveCamera(scene, render, volume.grid());
+  render.blend = valueOf<BlendMode>(kBlendModes, scene.blend.mode);
+  if (scene.integrator.method == kAutoMethod) scene.integrator.method = nameOf(Method::superposed);
+  render.method = valueOf<Method>(kMethods, scene.integrator.method);
+  render.macrocell = int(scene.integrator.macrocell);
+  render.seed = scene.integrator.seed;
+  render.width = int(scene.image.width);
+  render.height = int(scene.image.height);
+  render.background = glm::vec3(linearOf(scene.image.background));
+  render.filter = valueOf<PixelFilter>(kPixelFilters, scene.image.filter);
+  if (!scene.stop.samples && !scene.stop.seconds && !scene.stop.error) scene.stop.samples = options_.defaultSamples;
+  result->stop = {scene.stop.samples.value_or(0), scene.stop.seconds.value_or(0), scene.stop.error.value_or(0)};
+  result->resolved = protocol::toJson(scene);
+  result->picture = pictureOf(result->resolved);
+  result->sparse = std::move(sparse);
+  return result;
+}
+
+}  // namespace scolopax::server

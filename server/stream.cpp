@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/stream.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "protocol/frame_header.h"
+#include "protocol/messages.h"
+#include "protocol/problem.h"
+
+namespace scolopax::server {
+
+using protocol::ProtocolError;
+
+/// Text messages come one at a time, on any thread; frames from the encoder thread alone.
+class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
+ public:
+  Stream(SessionStore& store, const protocol::Limits& limits, const nlohmann::json& capabilities,
+         const std::shared_ptr<net::WebSocket>& socket)
+      : store_(store), limits_(limits), capabilities_(capabilities), socket_(socket) {}
+
+  void join(std::shared_ptr<Session> session) {
+    sendText(protocol::helloText(capabilities_, session->id(), session->token()));
+    session_ = std::move(session);
+    viewer_ = session_->addViewer(shared_from_this());
+  }
+
+  void leave() {
+    if (session_) session_->removeViewer(viewer_);
+    session_.reset();
+  }
+
+  void receive(const std::string& text) {
+    try {
+      std::visit([this](const auto& message) { handle(message); }, protocol::parseClientMessage(text, limits_));
+    } catch (const ProtocolError& error) {
+      sendText(protocol::errorText(error, protocol::patchIdOf(text, limits_)));
+    }
+  }
+
+  /// Frames sent and replaced since the last call.
+  std::pair<std::uint64_t, std::uint64_t> newFrames() {
+    const auto socket = socket_.lock();
+    if (!socket) return {0, 0};
+    const net::WebSocketStats stats = socket->stats();
+    const std::lock_guard lock(countMutex_);
+    return {stats.framesSent - std::exchange(countedSent_, stats.framesSent),
+            stats.framesReplaced - std::exchange(countedReplaced_, stats.framesReplaced)};
+  }
+
+  void offerFrame(const EncodedFrame& frame, std::uint32_t patch) override {
+    protocol::FrameHeader header;
+    header.codec = protocol::Codec::jpeg;
+    header.flags = std::uint8_t((frame.info.interactive ? protocol::kFlagInteractive : 0) |
+                                (frame.info.final ? protocol::kFlagFinal : 0));
+    header.width = std::uint16_t(frame.width);
+    header.height = std::uint16_t(frame.height);
+    header.frame = ++frameNumber_;
+    header.revision = frame.info.revision;
+    header.patch = patch;
+    header.samples = frame.info.samples;
+    header.error = frame.info.error;
+    header.rebuildUs = frame.info.rebuildUs;
+    header.renderUs = frame.info.renderUs;
+    header.encodeUs = frame.info.encodeUs;
+    const auto bytes = protocol::encodeFrameHeader(header);
+    net::Frame out;
+    out.number = header.frame;
+    out.header.resize(bytes.size());
+    std::memcpy(out.header.data(), bytes.data(), bytes.size());
+    out.payload = frame.jpeg;
+    if (const auto socket = socket_.lock()) socket->offerFrame(std::move(out));
+  }
+  void sceneChanged(std::uint32_t revision, const nlohmann::json& patch) override {
+    sendText(protocol::sceneText(revision, patch));
+  }
+  void renderFailed(const std::string& message) override {
+    sendText(protocol::errorText(ProtocolError(422, "", message)));
+  }
+  void sessionClosed(const std::string& reason) override {
+    if (const auto socket = socket_.lock()) socket->close(1001, reason);
+  }
+
+ private:
+  void handle(const protocol::PatchMessage& message) {
+    try {
+      session_->patch(message.patch, {viewer_, message.id, std::nullopt});
+    } catch (const ProtocolError& error) {
+      sendText(protocol::errorText(error, message.id));
+    }
+  }
+  void handle(const protocol::AckMessage& message) {
+    if (const auto socket = socket_.lock()) socket->acknowledge(message.frame);
+  }
+  void handle(const protocol::PingMessage& message) { sendText(protocol::pongText(message.id)); }
+  void handle(const protocol::ViewMessage& message) {
+    session_->setView(viewer_, message.visible, message.maxFps.value_or(0));
+    if ((message.maxWidth || message.maxHeight) && !std::exchange(sizeNoticeSent_, true))
+      sendText(protocol::noticeText("maxWidth and maxHeight are not used; set image.width and image.height"));
+  }
+  void handle(const protocol::ResumeMessage& message) {
+    auto session = store_.findByToken(message.token);
+    if (!session) throw ProtocolError(404, "/token", "there is no session of this token; it may have ended");
+    if (session == session_) return;  // joined by the stream's address already
+    leave();
+    join(std::move(session));
+  }
+
+  void sendText(std::string text) {
+    if (const auto socket = socket_.lock()) socket->sendText(std::move(text));
+  }
+
+  SessionStore& store_;
+  const protocol::Limits& limits_;
+  const nlohmann::json& capabilities_;
+  const std::weak_ptr<net::WebSocket> socket_;
+  std::shared_ptr<Session> session_;
+  ViewerId viewer_ = 0;
+  bool sizeNoticeSent_ = false;
+  std::atomic<std::uint32_t> frameNumber_{0};
+
+  std::mutex countMutex_;
+  std::uint64_t countedSent_ = 0, countedReplaced_ = 0;
+};
+
+StreamHub::StreamHub(SessionStore& store, Metrics& metrics, Options options)
+    : store_(store), metrics_(metrics), options_(std::move(options)) {}
+
+StreamHub::~StreamHub() = default;
+
+net::WebSocketEvents StreamHub::join(const std::shared_ptr<Session>& session,
+                                     const std::shared_ptr<net::WebSocket>& socket) {
+  auto stream = std::make_shared<Stream>(store_, options_.limits, options_.capabilities, socket);
+  {
+    const std::lock_guard lock(mutex_);
+    if (streams_.size() >= options_.maxClients)
+      throw ProtocolError(503, "", "there are " + std::to_string(streams_.size()) +
+                                       " streams, as many as this server allows");
+    streams_.push_back(stream);
+  }
+  try {
+    stream->join(session);
+  } catch (...) {
+    left(stream.get());
+    throw;
+  }
+  return {[stream](const std::string& text) { stream->receive(text); },
+          [this, stream] {
+            stream->leave();
+            left(stream.get());
+          }};
+}
+
+void StreamHub::left(const Stream* stream) {
+  countFrames();
+  const std::lock_guard lock(mutex_);
+  std::erase_if(streams_, [&](const auto& one) { return one.get() == stream; });
+}
+
+void StreamHub::countFrames() {
+  const std::lock_guard lock(mutex_);
+  for (const auto& stream : streams_) {
+    const auto [sent, replaced] = stream->newFrames();
+    metrics_.framesSent(sent, replaced);
+  }
+}
+
+std::size_t StreamHub::count() const {
+  const std::lock_guard lock(mutex_);
+  return streams_.size();
+}
+
+}  // namespace scolopax::server

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// One client's WebSocket on a session: text messages in, frames and texts out. Between net/ and Session.
+#pragma once
+#include <memory>
+#include <mutex>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "protocol/json_text.h"
+#include "server/metrics.h"
+#include "server/net/web_socket.h"
+#include "server/session_store.h"
+
+namespace scolopax::server {
+
+class Stream;
+
+/// The streams that are open. Must outlive the connections.
+class StreamHub {
+ public:
+  struct Options {
+    std::size_t maxClients = 64;
+    protocol::Limits limits;
+    nlohmann::json capabilities;  ///< for hello
+  };
+  StreamHub(SessionStore& store, Metrics& metrics, Options options);
+  ~StreamHub();
+
+  /// Joins the socket to the session as a viewer and returns what its events do. Throws ProtocolError(503) when
+  /// there are as many streams as there may be.
+  net::WebSocketEvents join(const std::shared_ptr<Session>& session, const std::shared_ptr<net::WebSocket>& socket);
+  /// Brings the frame counts of the open streams into the metrics.
+  void countFrames();
+  std::size_t count() const;
+
+ private:
+  void left(const Stream* stream);
+
+  SessionStore& store_;
+  Metrics& metrics_;
+  const Options options_;
+  mutable std::mutex mutex_;
+  std::vector<std::shared_ptr<Stream>> streams_;
+};
+
+}  // namespace scolopax::server
