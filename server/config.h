@@ -25,7 +25,6 @@ struct Config {
   std::size_t maxBodyBytes = std::size_t{1} << 20;
   std::size_t maxMessageBytes = std::size_t{1} << 20;
   std::size_t maxJsonDepth = 32;
-  std::size_t maxPollsPerSession = 8;
   std::uint32_t sessionSamples = 4096;        ///< of a session without a stop rule
   std::uint32_t renderSamples = 64;           ///< of a POST /render without one
   std::chrono::milliseconds keepSession{300'000};

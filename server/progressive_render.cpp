@@ -32,6 +32,13 @@ int divisorForTarget(std::uint64_t pixels, double secondsPerPixel, double target
   return kDivisors[std::size(kDivisors) - 1];
 }
 
+bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
+  const std::uint32_t samples = renderer.samples();
+  return samples > 0 && ((stop.samples > 0 && samples >= stop.samples) ||
+                         (stop.seconds > 0 && seconds >= stop.seconds) ||
+                         (stop.error > 0 && samples >= 2 && renderer.estimatedError() <= stop.error));
+}
+
 ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer, Options options,
                                      Now now, Log log)
     : session_(std::move(session)),
@@ -46,11 +53,7 @@ bool ProgressiveRender::sceneStale(const RenderRequest& request) const {
 }
 
 bool ProgressiveRender::finished(const RenderRequest& request) const {
-  const StopRule& stop = request.scene->stop;
-  const std::uint32_t samples = renderer_->samples();
-  return samples > 0 &&
-         ((stop.samples > 0 && samples >= stop.samples) || (stop.seconds > 0 && filmSeconds_ >= stop.seconds) ||
-          (stop.error > 0 && samples >= 2 && renderer_->estimatedError() <= stop.error));
+  return stopMet(request.scene->stop, *renderer_, filmSeconds_);
 }
 
 /// Whether the film as it stands is worth a frame.

@@ -69,6 +69,9 @@ class ProgressiveRender {
   TimePoint shownAt_;
 };
 
+/// Whether rendering ends at what `renderer` has and the seconds it took.
+bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds);
+
 /// The smallest of 1, 2, 3, 4, 6, 8, ... by which width and height must be divided so that a pass fits the target.
 int divisorForTarget(std::uint64_t pixels, double secondsPerPixel, double targetSeconds);
 

@@ -2,7 +2,7 @@
 #include "server/scene_resolver.h"
 
 #include <algorithm>
-#include <cmath>
+#include <cstdio>
 #include <span>
 #include <string>
 #include <utility>
@@ -46,6 +46,12 @@ glm::dvec3 linearOf(const std::string& hex) {
   return {part(1), part(3), part(5)};
 }
 
+std::string hexOf(const std::array<std::uint8_t, 3>& color) {
+  std::array<char, 8> text{};
+  std::snprintf(text.data(), text.size(), "#%02x%02x%02x", color[0], color[1], color[2]);
+  return text.data();
+}
+
 std::vector<ColorKnot> knotsOf(const protocol::Colormap& colormap) {
   if (const auto* name = std::get_if<std::string>(&colormap)) return colormapKnots(*name);
   std::vector<ColorKnot> knots;
@@ -57,18 +63,21 @@ std::vector<ColorKnot> knotsOf(const protocol::Colormap& colormap) {
 void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume) {
   const auto channels = volume.channels();
   scene.channels.resize(channels.size());
-  const int visibleCount =
-      int(std::count_if(scene.channels.begin(), scene.channels.end(), [](const auto& c) { return c.visible; }));
   for (std::size_t i = 0; i < channels.size(); ++i) {
     protocol::Channel& wire = scene.channels[i];
     ChannelAppearance& look = render.channels.emplace_back();
     if (!wire.name) wire.name = channels[i].name;
     if (!wire.range) {
-      double lo = 0, hi = 1;
-      defaultRange(channels[i], lo, hi);
-      wire.range = {lo, hi};
+      const ValueRange range = defaultRange(channels[i]);
+      wire.range = {range.lo, range.hi};
     }
-    if (!wire.color && !wire.colormap) wire.color = defaultColor(int(i), int(channels.size()));
+    if (!wire.color && !wire.colormap) {
+      if (channels.size() == 1)
+        wire.colormap = std::string(kDefaultColormap);
+      else
+        wire.color = hexOf(defaultColor(int(i)));
+    }
+    if (!wire.density) wire.density = defaultDensity(volume, int(i));
     look.visible = wire.visible;
     look.rangeLo = (*wire.range)[0];
     look.rangeHi = (*wire.range)[1];
@@ -76,8 +85,6 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
     look.opacity.clear();
     for (const auto& point : wire.opacity) look.opacity.push_back({point.position, point.value});
     look.color = wire.color ? std::vector<ColorKnot>{{0, linearOf(*wire.color)}} : knotsOf(*wire.colormap);
-    // Last, since it depends on the curve; what others see of the channel does not change with it.
-    if (!wire.density) wire.density = defaultDensity(volume, int(i), look, visibleCount);
     look.density = *wire.density;
   }
 }
@@ -112,7 +119,7 @@ protocol::Lists rendererLists() {
   lists.methods = entries(kMethods);
   lists.methods.insert(lists.methods.begin(), {std::string(kAutoMethod), "chosen by the server"});
   lists.filters = entries(kPixelFilters);
-  lists.colormaps = entries(kColormaps);
+  lists.colormaps = entries(colormaps());
   return lists;
 }
 

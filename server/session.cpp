@@ -117,6 +117,9 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
     return frame_ && frame_->info.number > query.after && frame_->info.revision >= revision &&
            !frame_->info.interactive && (frame_->info.samples >= query.minSamples || frame_->info.final);
   };
+  if (pollSamples_.size() >= kMaxPolls)
+    throw protocol::ProtocolError(429, "", "expected at most " + std::to_string(kMaxPolls) +
+                                               " requests to wait for a session's frames, found another");
   const auto poll = pollSamples_.insert(query.minSamples);
   hooks_.wakeRender();
   frameCame_.wait_until(lock, deadline, [&] { return closed_ || fits() || failedRevision_ == revision_; });

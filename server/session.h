@@ -79,6 +79,9 @@ class Session {
   /// The time after an edit during which speed counts more than quality.
   static constexpr std::chrono::milliseconds kInteractiveTime{300};
 
+  /// Scripts that may wait at once.
+  static constexpr std::size_t kMaxPolls = 8;
+
   Session(std::string id, std::string token, std::shared_ptr<const SceneResolver> resolver,
           std::shared_ptr<const ResolvedScene> scene, SessionHooks hooks);
 
@@ -104,7 +107,8 @@ class Session {
   std::size_t viewerCount() const;
 
   /// Waits for a full-resolution frame of the scene as it is now or newer; nullptr when none came in time or the
-  /// session was closed. Throws ProtocolError when the scene cannot be rendered.
+  /// session was closed. Throws ProtocolError: 422 when the scene cannot be rendered, 429 when too many
+  /// wait already.
   std::shared_ptr<const EncodedFrame> waitForFrame(const FrameQuery& query, std::chrono::milliseconds timeout);
   std::shared_ptr<const EncodedFrame> latestFrame() const;
   /// Ends waiting and viewing; nothing is rendered any more.

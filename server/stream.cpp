@@ -38,7 +38,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
     try {
       std::visit([this](const auto& message) { handle(message); }, protocol::parseClientMessage(text, limits_));
     } catch (const ProtocolError& error) {
-      sendText(protocol::errorText(error, protocol::patchIdOf(text, limits_)));
+      sendText(protocol::errorText(error));
     }
   }
 

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api.h"
+
+#include <charconv>
+#include <cmath>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "protocol/problem.h"
+#include "renderer/core/error.h"
+#include "renderer/io/image_file.h"
+#include "server/encoder.h"
+
+namespace scolopax::server {
+namespace {
+
+using nlohmann::json;
+using protocol::ProtocolError;
+
+std::string_view trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
+}
+
+/// Calls f with each part between separators.
+template <class F>
+void forEachPart(std::string_view text, char separator, F&& f) {
+  for (;;) {
+    const auto end = text.find(separator);
+    f(trimmed(text.substr(0, end)));
+    if (end == std::string_view::npos) return;
+    text.remove_prefix(end + 1);
+  }
+}
+
+/// What Accept gives a media type, by the most specific range that holds it (RFC 9110, 12.5.1).
+double qualityOf(std::string_view accept, std::string_view mediaType) {
+  double quality = 0;
+  int bestSpecificity = -1;
+  forEachPart(accept, ',', [&](std::string_view range) {
+    const std::string_view name = trimmed(range.substr(0, range.find(';')));
+    const int specificity = name == mediaType ? 2 : name == "image/*" ? 1 : name == "*/*" ? 0 : -1;
+    if (specificity < 0 || specificity < bestSpecificity) return;
+    bestSpecificity = specificity;
+    quality = 1;
+    forEachPart(range, ';', [&](std::string_view part) {
+      if (part.substr(0, 2) == "q=") std::from_chars(part.data() + 2, part.data() + part.size(), quality);
+    });
+  });
+  return quality;
+}
+
+int statusOf(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::badInput:
+    case ErrorCode::unsupported: return 422;
+    case ErrorCode::notFound: return 404;
+    case ErrorCode::tooLarge: return 422;
+    case ErrorCode::io: return 500;
+  }
+  return 500;
+}
+
+/// Every handler runs in this: what it throws becomes a problem, and the cause of a 500 goes to the log alone.
+net::Handler guarded(const ApiContext& context, const net::Handler& handler) {
+  return [handler, &context](const net::Request& request) -> net::Response {
+    try {
+      return handler(request);
+    } catch (const ProtocolError& error) {
+      return errorResponse(error);
+    } catch (const Error& error) {
+      const int status = statusOf(error.code());
+      if (status < 500) return errorResponse(ProtocolError(status, "", error.what()));
+      context.log(request.method + " " + request.path + ": " + error.what());
+    } catch (const std::exception& error) {
+      context.log(request.method + " " + request.path + ": " + error.what());
+    }
+    return errorResponse(ProtocolError(500, "", "the server failed to answer this request"));
+  };
+}
+
+std::string regexOf(const std::string& path) {
+  std::string regex;
+  for (std::size_t at = 0; at < path.size(); ++at) {
+    if (path[at] == '{') {
+      regex += "([^/]+)";
+      at = path.find('}', at);
+    } else {
+      if (path[at] == '.') regex += '\\';
+      regex += path[at];
+    }
+  }
+  return regex;
+}
+
+}  // namespace
+
+net::Response jsonResponse(int status, const json& body) {
+  return {status, "application/json", body.dump(-1, ' ', false, json::error_handler_t::replace), {}};
+}
+
+net::Response errorResponse(const ProtocolError& error) {
+  net::Response response{error.status, std::string(protocol::kProblemType), protocol::problemJson(error), {}};
+  if (error.status == 503 || error.status == 429) response.headers.emplace_back("Retry-After", "1");
+  return response;
+}
+
+json jsonBody(const net::Request& request, const Config& config, std::string_view alsoType) {
+  const std::string* header = request.header("content-type");
+  const std::string_view type = header ? trimmed(std::string_view(*header).substr(0, header->find(';'))) : "";
+  if (type != "application/json" && (alsoType.empty() || type != alsoType))
+    throw ProtocolError(415, "",
+                        "expected Content-Type application/json" + (alsoType.empty() ? "" : " or " + std::string(alsoType)) +
+                            ", found " + (type.empty() ? "none" : std::string(type)));
+  return protocol::parseJson(request.body, {config.maxBodyBytes, config.maxJsonDepth});
+}
+
+std::uint32_t queryUnsigned(const net::Request& request, std::string_view name, std::uint32_t fallback) {
+  const std::string* text = request.queryValue(name);
+  if (!text) return fallback;
+  std::uint32_t value = 0;
+  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), value);
+  if (error != std::errc() || end != text->data() + text->size())
+    throw ProtocolError(422, "", "query parameter " + std::string(name) +
+                                     ": expected a whole number from 0 to 4294967295, found \"" + *text + '"');
+  return value;
+}
+
+double queryNumber(const net::Request& request, std::string_view name) {
+  const std::string* text = request.queryValue(name);
+  double value = 0;
+  if (text) {
+    const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), value);
+    if (error == std::errc() && end == text->data() + text->size() && std::isfinite(value)) return value;
+  }
+  throw ProtocolError(422, "", "query parameter " + std::string(name) + ": expected a number, found " +
+                                   (text ? '"' + *text + '"' : "none"));
+}
+
+const ImageType* acceptedImageType(const std::string* accept) {
+  if (!accept) return &kImageTypes[0];
+  const ImageType* best = nullptr;
+  double bestQuality = 0;
+  for (const ImageType& type : kImageTypes) {
+    const double quality = qualityOf(*accept, type.mediaType);
+    if (quality > bestQuality) {
+      best = &type;
+      bestQuality = quality;
+    }
+  }
+  return best;
+}
+
+std::string imageBytes(const Image& image, glm::vec3 background, std::string_view format) {
+  const auto bytes = format == "jpeg" ? encodeJpeg(toSrgb8(image, background), 95, ChromaSampling::full444)
+                                      : io::encodeImage(image, background, format);
+  return {bytes.begin(), bytes.end()};
+}
+
+json openApi(const std::vector<Route>& routes) {
+  json paths = json::object();
+  for (const Route& route : routes) {
+    json parameters = json::array();
+    for (const Parameter& p : route.parameters)
+      parameters.push_back({{"name", p.name},
+                            {"in", p.in},
+                            {"required", p.in == "path"},
+                            {"description", p.doc},
+                            {"schema", {{"type", p.type}}}});
+    json content = json::object();
+    for (const std::string& type : route.responseTypes) content[type] = json::object();
+    std::string method;
+    for (const char c : route.method) method += char(c - 'A' + 'a');
+    json operation = {{"summary", route.summary},
+                      {"parameters", std::move(parameters)},
+                      {"responses",
+                       {{route.responseTypes.empty() ? "204" : "200",
+                         {{"description", "Done"}, {"content", std::move(content)}}},
+                        {"default",
+                         {{"description", "What is wrong, with a pointer to the field (RFC 9457)"},
+                          {"content", {{std::string(protocol::kProblemType), json::object()}}}}}}}};
+    if (!route.requestType.empty()) operation["requestBody"] = {{"content", {{route.requestType, json::object()}}}};
+    paths[route.path][method] = std::move(operation);
+  }
+  return {{"openapi", "3.1.0"},
+          {"info", {{"title", "Scolopax"}, {"version", SCOLOPAX_VERSION}}},
+          {"components",
+           {{"securitySchemes", {{"token", {{"type", "http"}, {"scheme", "bearer"}}}}}}},
+          {"security", json::array({{{"token", json::array()}}})},
+          {"paths", std::move(paths)}};
+}
+
+void addApi(net::Server& server, ApiContext& context) {
+  std::vector<Route> routes;
+  for (auto family : {datasetRoutes, renderRoutes, sessionRoutes, operationRoutes})
+    for (Route& route : family(context)) routes.push_back(std::move(route));
+  routes.push_back({"GET", "/api/v1/openapi.json", "This description", {}, "", {"application/json"}, {}, {}});
+  routes.back().handler = [description = openApi(routes)](const net::Request&) {
+    return jsonResponse(200, description);
+  };
+  for (const Route& route : routes)
+    server.route(route.method, regexOf(route.path), guarded(context, route.handler), route.kind);
+
+  static constexpr std::string_view kPrefix = "/api/v1/sessions/", kSuffix = "/stream";
+  server.upgrade([&context](const net::Request& request, std::shared_ptr<net::WebSocket> socket)
+                     -> std::variant<net::WebSocketEvents, net::Response> {
+    try {
+      const std::string_view path = request.path;
+      if (path.size() <= kPrefix.size() + kSuffix.size() || !path.starts_with(kPrefix) || !path.ends_with(kSuffix))
+        throw ProtocolError(404, "", "expected the stream of a session, found " + request.path);
+      const auto id = path.substr(kPrefix.size(), path.size() - kPrefix.size() - kSuffix.size());
+      const auto session = context.sessions.find(id);
+      if (!session) throw ProtocolError(404, "", "there is no session " + std::string(id) + "; it may have ended");
+      return context.streams.join(session, socket);
+    } catch (const ProtocolError& error) {
+      return errorResponse(error);
+    }
+  });
+}
+
+}  // namespace scolopax::server

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// The HTTP interface: one table of routes, from which the server's routing and openapi.json are made.
+// Between net::Server and data sets, sessions, renderer.
+#pragma once
+#include <atomic>
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "protocol/problem.h"
+#include "server/config.h"
+#include "server/metrics.h"
+#include "server/net/server.h"
+#include "server/session_store.h"
+#include "server/stream.h"
+
+namespace scolopax::server {
+
+/// What the handlers work with. Outlives the server.
+struct ApiContext {
+  const Config& config;
+  const DatasetStore& datasets;
+  const SceneResolver& renderResolver;  ///< for POST /render, with its default sample count
+  SessionStore& sessions;
+  StreamHub& streams;
+  Metrics& metrics;
+  MakeRenderer makeRenderer;
+  Log log;
+  std::atomic<bool>& stopping;          ///< ends what waits or renders
+  std::function<nlohmann::json()> capabilities;
+};
+
+struct Parameter {
+  std::string name;
+  std::string in;    ///< "path", "query" or "header"
+  std::string type;  ///< of JSON Schema: "string", "integer", "number"
+  std::string doc;
+};
+
+struct Route {
+  std::string method;
+  std::string path;  ///< from the root; {name} stands for one segment and is a group of Request::matches
+  std::string summary;
+  std::vector<Parameter> parameters;
+  std::string requestType;                 ///< media type of the body; empty: none
+  std::vector<std::string> responseTypes;  ///< of the good answers; the first is the usual
+  net::RouteKind kind = net::RouteKind::quick;
+  net::Handler handler;
+};
+
+std::vector<Route> datasetRoutes(ApiContext& context);
+std::vector<Route> renderRoutes(ApiContext& context);
+std::vector<Route> sessionRoutes(ApiContext& context);
+std::vector<Route> operationRoutes(ApiContext& context);
+
+/// OpenAPI 3.1 description of the routes.
+nlohmann::json openApi(const std::vector<Route>& routes);
+
+/// Registers all routes and the stream's upgrade.
+void addApi(net::Server& server, ApiContext& context);
+
+// --- for the handlers ------------------------------------------------------------------------------------------
+
+net::Response jsonResponse(int status, const nlohmann::json& body);
+net::Response errorResponse(const protocol::ProtocolError& error);
+/// The body as JSON; throws ProtocolError, 415 unless Content-Type is application/json or `alsoType`.
+nlohmann::json jsonBody(const net::Request& request, const Config& config, std::string_view alsoType = "");
+/// A number from the query; `fallback` when absent; throws ProtocolError(422) for anything else.
+std::uint32_t queryUnsigned(const net::Request& request, std::string_view name, std::uint32_t fallback);
+/// Throws ProtocolError(422) also when absent.
+double queryNumber(const net::Request& request, std::string_view name);
+
+struct ImageType {
+  std::string_view format;     ///< "jpeg"
+  std::string_view mediaType;  ///< "image/jpeg"
+};
+inline constexpr ImageType kImageTypes[] = {
+    {"jpeg", "image/jpeg"}, {"png", "image/png"}, {"exr", "image/x-exr"}};
+/// The type of image that an Accept header likes best, the first of equals; nullptr: none.
+const ImageType* acceptedImageType(const std::string* accept);
+/// The bytes of a picture: jpeg at quality 95, 4:4:4; png; exr as float32 linear premultiplied RGBA.
+std::string imageBytes(const Image& image, glm::vec3 background, std::string_view format);
+
+}  // namespace scolopax::server

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// POST /render: scene in, picture out, nothing kept.
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "protocol/problem.h"
+#include "server/api.h"
+
+namespace scolopax::server {
+namespace {
+
+using protocol::ProtocolError;
+
+/// A place among the renders that may run at once.
+class RenderPlace {
+ public:
+  RenderPlace(std::atomic<int>& running, int limit) : running_(running) {
+    if (++running_ <= limit) return;
+    --running_;
+    throw ProtocolError(503, "", "expected at most " + std::to_string(limit) + " renders at once, found another");
+  }
+  ~RenderPlace() { --running_; }
+  RenderPlace(const RenderPlace&) = delete;
+  RenderPlace& operator=(const RenderPlace&) = delete;
+
+ private:
+  std::atomic<int>& running_;
+};
+
+/// FNV-1a, 64 bits, of the resolved scene's canonical text: equal pictures have equal hashes.
+std::string sceneHash(const ResolvedScene& scene) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const char c : scene.picture.dump()) hash = (hash ^ std::uint8_t(c)) * 0x100000001b3u;
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
+  return text;
+}
+
+net::Response render(ApiContext& context, std::atomic<int>& running, const net::Request& request) {
+  const ImageType* type = acceptedImageType(request.header("accept"));
+  if (!type) throw ProtocolError(406, "", "expected Accept to hold image/jpeg, image/png or image/x-exr, found " +
+                                              *request.header("accept"));
+  const double limit = context.config.maxRenderSeconds;
+  const auto scene = context.renderResolver.replace(jsonBody(request, context.config));
+  if (scene->stop.seconds > limit)
+    throw ProtocolError(422, "/stop/seconds", "expected at most " + std::to_string(limit) + ", found " +
+                                                  std::to_string(scene->stop.seconds));
+  const RenderPlace place(running, context.config.maxRenders);
+
+  const auto begin = std::chrono::steady_clock::now();
+  const auto seconds = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
+  const auto renderer = context.makeRenderer(scene->dataset->volume);
+  renderer->setScene(scene->render);
+  while (!stopMet(scene->stop, *renderer, seconds())) {
+    // A picture that depends on the machine's speed is only for those who asked for it.
+    if (seconds() > limit)
+      throw ProtocolError(422, "/stop", "expected to end within " + std::to_string(limit) + " seconds, found " +
+                                            std::to_string(renderer->samples()) +
+                                            " samples done by then; ask for less, or set stop.seconds");
+    if (!renderer->renderSample(context.stopping)) throw ProtocolError(503, "", "the server is stopping");
+  }
+  const auto milliseconds = std::int64_t(seconds() * 1000);
+  const std::string error = nlohmann::json(renderer->estimatedError()).dump();
+  net::Response response{200, std::string(type->mediaType),
+                         imageBytes(renderer->image(), scene->render.background, type->format), {}};
+  response.headers = {{"Scolopax-Samples", std::to_string(renderer->samples())},
+                      {"Scolopax-Error", error},
+                      {"Scolopax-Seed", std::to_string(scene->render.seed)},
+                      {"Scolopax-Method", std::string(nameOf(scene->render.method))},
+                      {"Scolopax-Scene-Hash", sceneHash(*scene)},
+                      {"Scolopax-Render-Ms", std::to_string(milliseconds)},
+                      {"Vary", "Accept"}};
+  return response;
+}
+
+}  // namespace
+
+std::vector<Route> renderRoutes(ApiContext& context) {
+  std::vector<std::string> types;
+  for (const ImageType& type : kImageTypes) types.emplace_back(type.mediaType);
+  auto running = std::make_shared<std::atomic<int>>(0);
+  return {{"POST", "/api/v1/render", "A picture of a scene; the same scene gives the same bytes",
+           {{"Accept", "header", "string", "image/jpeg, image/png or image/x-exr"}}, "application/json", types,
+           net::RouteKind::slow,
+           [&context, running](const net::Request& request) { return render(context, *running, request); }}};
+}
+
+}  // namespace scolopax::server

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// Routes of sessions: a script can do with them all that a stream can.
+#include <algorithm>
+#include <charconv>
+#include <nlohmann/json.hpp>
+
+#include "protocol/problem.h"
+#include "server/api.h"
+
+namespace scolopax::server {
+namespace {
+
+using nlohmann::json;
+using protocol::ProtocolError;
+
+constexpr std::string_view kMergePatch = "application/merge-patch+json";
+
+std::shared_ptr<Session> sessionOf(const ApiContext& context, const net::Request& request) {
+  auto session = context.sessions.find(request.matches.at(1));
+  if (!session)
+    throw ProtocolError(404, "", "there is no session " + request.matches.at(1) + "; it may have ended");
+  return session;
+}
+
+/// The revision in If-Match: a number, with or without quotes.
+EditOrigin originOf(const net::Request& request) {
+  EditOrigin origin;
+  const std::string* header = request.header("if-match");
+  if (!header || *header == "*") return origin;
+  std::string_view text = *header;
+  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  std::uint32_t revision = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), revision);
+  if (error != std::errc() || end != text.data() + text.size())
+    throw ProtocolError(400, "", "If-Match: expected a revision, found " + *header);
+  origin.ifRevision = revision;
+  return origin;
+}
+
+net::Response sceneResponse(const Session::SceneState& state) {
+  auto response = jsonResponse(200, {{"revision", state.revision}, {"scene", state.scene->resolved}});
+  response.headers.emplace_back("ETag", '"' + std::to_string(state.revision) + '"');
+  return response;
+}
+
+net::Response create(ApiContext& context, const net::Request& request) {
+  json scene = json::object();
+  if (!request.body.empty()) {
+    json body = jsonBody(request, context.config);
+    if (!body.is_object()) throw ProtocolError(422, "", "expected an object");
+    for (const auto& [key, value] : body.items())
+      if (key != "scene") throw ProtocolError(422, "/" + key, "unknown field; expected scene");
+    if (body.contains("scene")) scene = std::move(body["scene"]);
+  }
+  const auto session = context.sessions.create(scene);
+  const auto state = session->scene();
+  auto response = jsonResponse(201, {{"id", session->id()},
+                                     {"token", session->token()},
+                                     {"revision", state.revision},
+                                     {"scene", state.scene->resolved}});
+  response.headers.emplace_back("Location", "/api/v1/sessions/" + session->id());
+  return response;
+}
+
+net::Response describe(ApiContext& context, const net::Request& request) {
+  const auto session = sessionOf(context, request);
+  const auto state = session->scene();
+  json description = {{"id", session->id()},
+                      {"revision", state.revision},
+                      {"dataset", state.scene->dataset->id},
+                      {"viewers", session->viewerCount()}};
+  if (const auto frame = session->latestFrame())
+    description["frame"] = {{"frame", frame->info.number},
+                            {"revision", frame->info.revision},
+                            {"samples", frame->info.samples},
+                            {"error", frame->info.error},
+                            {"final", frame->info.final}};
+  return jsonResponse(200, description);
+}
+
+net::Response frame(ApiContext& context, const net::Request& request) {
+  const auto session = sessionOf(context, request);
+  const std::string* asked = request.queryValue("format");
+  const std::string_view format = asked ? std::string_view(*asked) : kImageTypes[0].format;
+  const auto type = std::find_if(std::begin(kImageTypes), std::end(kImageTypes),
+                                 [&](const ImageType& one) { return one.format == format; });
+  if (type == std::end(kImageTypes))
+    throw ProtocolError(422, "", "query parameter format: expected jpeg, png or exr, found \"" +
+                                     std::string(format) + '"');
+  const FrameQuery query{queryUnsigned(request, "after", 0), queryUnsigned(request, "minSamples", 1)};
+  const auto found = session->waitForFrame(query, context.config.pollTimeout);
+  if (!found && context.stopping) throw ProtocolError(503, "", "the server is stopping");
+  if (!found) return {204, "", "", {}};
+  net::Response response{200, std::string(type->mediaType), "", {}};
+  response.body = format == "jpeg" ? std::string(found->jpeg->begin(), found->jpeg->end())
+                                   : imageBytes(*found->image, found->background, format);
+  response.headers = {{"Scolopax-Frame", std::to_string(found->info.number)},
+                      {"Scolopax-Revision", std::to_string(found->info.revision)},
+                      {"Scolopax-Samples", std::to_string(found->info.samples)},
+                      {"Scolopax-Error", json(found->info.error).dump()},
+                      {"Scolopax-Final", found->info.final ? "1" : "0"},
+                      {"Cache-Control", "no-store"}};
+  return response;
+}
+
+}  // namespace
+
+std::vector<Route> sessionRoutes(ApiContext& context) {
+  const Parameter id{"id", "path", "string", "Id of the session"};
+  const Parameter ifMatch{"If-Match", "header", "string", "Revision that is edited; 409 when it is another"};
+  const std::vector<std::string> kJson{"application/json"};
+  const std::string scenePath = "/api/v1/sessions/{id}/scene";
+  std::vector<std::string> imageTypes;
+  for (const ImageType& type : kImageTypes) imageTypes.emplace_back(type.mediaType);
+
+  return {
+      {"POST", "/api/v1/sessions", "Begins a session with the scene of the body's field scene, or the default's", {},
+       "application/json", kJson, {}, [&context](const net::Request& request) { return create(context, request); }},
+      {"GET", "/api/v1/sessions/{id}", "Revision, data set, viewers and latest frame of a session", {id}, "", kJson, {},
+       [&context](const net::Request& request) { return describe(context, request); }},
+      {"DELETE", "/api/v1/sessions/{id}", "Ends a session and its streams", {id}, "", {}, {},
+       [&context](const net::Request& request) -> net::Response {
+         context.sessions.remove(sessionOf(context, request)->id());
+         return {204, "", "", {}};
+       }},
+      {"GET", scenePath, "The scene with every value resolved, and its revision", {id}, "", kJson, {},
+       [&context](const net::Request& request) { return sceneResponse(sessionOf(context, request)->scene()); }},
+      {"PATCH", scenePath, "Edits the scene by a merge patch (RFC 7396); decimal keys patch elements of lists",
+       {id, ifMatch}, std::string(kMergePatch), kJson, {},
+       [&context](const net::Request& request) {
+         const json patch = jsonBody(request, context.config, kMergePatch);
+         return sceneResponse(sessionOf(context, request)->patch(patch, originOf(request)));
+       }},
+      {"PUT", scenePath, "Replaces the scene", {id, ifMatch}, "application/json", kJson, {},
+       [&context](const net::Request& request) {
+         const json scene = jsonBody(request, context.config);
+         return sceneResponse(sessionOf(context, request)->replace(scene, originOf(request)));
+       }},
+      {"GET", "/api/v1/sessions/{id}/frame", "Waits for a picture of the scene as it is now; 204 when none came in time",
+       {id,
+        {"after", "query", "integer", "Number of the last frame seen; a newer one is waited for"},
+        {"minSamples", "query", "integer", "Samples per pixel that it has at least, unless it is final"},
+        {"format", "query", "string", "jpeg (default), png or exr"}},
+       "", imageTypes, net::RouteKind::slow,
+       [&context](const net::Request& request) { return frame(context, request); }},
+  };
+}
+
+}  // namespace scolopax::server

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/application.h"
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "protocol/frame_header.h"
+#include "protocol/problem.h"
+#include "renderer/data/colormap.h"
+#include "server/api.h"
+#include "server/auth.h"
+#include "server/loop_thread.h"
+#include "server/net/server.h"
+#include "server/render_loop.h"
+
+namespace scolopax::server {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::string_view kNoPage =
+    "Scolopax is running, but its page is not built.\n\n"
+    "Build it with:  cd client_web && npm ci && npm run build\n"
+    "and load this address again, or use the interface under api/v1/ (see api/v1/openapi.json).\n";
+
+json named(const std::vector<protocol::EnumEntry>& entries) {
+  json list = json::array();
+  for (const auto& entry : entries) list.push_back({{"name", entry.name}, {"doc", entry.doc}});
+  return list;
+}
+
+std::string hexOf(const glm::dvec3& linear) {
+  const auto byte = [](double v) { return int(std::lround(double(srgbFromLinear(float(v))) * 255)); };
+  char text[8];
+  std::snprintf(text, sizeof text, "#%02x%02x%02x", byte(linear.r) & 255, byte(linear.g) & 255,
+                byte(linear.b) & 255);
+  return text;
+}
+
+json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
+  json maps = json::array();
+  for (const auto& entry : lists.colormaps) {
+    json points = json::array();
+    for (const ColorKnot& knot : colormapKnots(entry.name)) points.push_back({knot.position, hexOf(knot.color)});
+    maps.push_back({{"name", entry.name}, {"doc", entry.doc}, {"points", std::move(points)}});
+  }
+  json formats = json::array();
+  for (const ImageType& type : kImageTypes) formats.push_back(type.mediaType);
+  return {{"version", SCOLOPAX_VERSION},
+          {"protocolVersion", protocol::kProtocolVersion},
+          {"backend", "cpu"},
+          {"blendModes", named(lists.blendModes)},
+          {"methods", named(lists.methods)},
+          {"filters", named(lists.filters)},
+          {"colormaps", std::move(maps)},
+          {"imageFormats", std::move(formats)},
+          {"limits",
+           {{"maxPixels", config.maxPixels},
+            {"maxSessions", config.maxSessions},
+            {"maxClients", config.maxClients},
+            {"maxRenderSeconds", config.maxRenderSeconds},
+            {"maxRenders", config.maxRenders},
+            {"maxBodyBytes", config.maxBodyBytes},
+            {"maxMessageBytes", config.maxMessageBytes},
+            {"maxJsonDepth", config.maxJsonDepth},
+            {"maxPolls", Session::kMaxPolls},
+            {"pollSeconds", std::chrono::duration<double>(config.pollTimeout).count()},
+            {"keepSessionSeconds", std::chrono::duration<double>(config.keepSession).count()}}}};
+}
+
+}  // namespace
+
+// The order of members is the order of life: what is used stands before what uses it.
+struct Application::Impl {
+  Config config;
+  Log log;
+  MakeRenderer makeRenderer;
+  std::atomic<bool> stopping{false};
+  const Now now = [] { return std::chrono::steady_clock::now(); };
+  LoopThread renderThread, encodeThread;
+  Metrics metrics;
+  std::shared_ptr<const DatasetStore> datasets;
+  std::shared_ptr<const SceneResolver> sessionResolver;
+  SceneResolver renderResolver;
+  SessionStore sessions;
+  RenderLoop renderLoop;
+  EncodeLoop encodeLoop;
+  json capabilities;
+  StreamHub streams;
+  ApiContext context;
+  Authorizer authorizer;
+  std::optional<net::Server> server;
+
+  Impl(Config given, std::vector<Dataset> loaded, MakeRenderer make, Log logLine)
+      : config(std::move(given)),
+        log(std::move(logLine)),
+        makeRenderer(std::move(make)),
+        datasets(std::make_shared<const DatasetStore>(std::move(loaded))),
+        sessionResolver(std::make_shared<const SceneResolver>(
+            datasets, SceneResolver::Options{config.sessionSamples, config.maxPixels})),
+        renderResolver(datasets, {config.renderSamples, config.maxPixels}),
+        sessions(sessionResolver, {config.maxSessions, config.keepSession},
+                 {now, [this] { renderThread.wake(); }, [this] { encodeThread.wake(); }}),
+        renderLoop(sessions, makeRenderer, {}, now, log, [this](const PassResult& pass) { metrics.passEnded(pass); }),
+        encodeLoop(sessions, now, log),
+        capabilities(capabilitiesJson(config, sessionResolver->lists())),
+        streams(sessions, metrics,
+                {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities}),
+        context{config,       *datasets, renderResolver, sessions, streams, metrics,
+                makeRenderer, log,       stopping,       [this] { return capabilities; }},
+        authorizer(config.token, isLoopback(config.host)) {
+    net::Options options;
+    options.host = config.host;
+    options.port = config.port;
+    options.bodyLimit = config.maxBodyBytes;
+    options.messageLimit = config.maxMessageBytes;
+    options.allowedOrigins = config.allowedOrigins;
+    if (std::filesystem::is_directory(config.webRoot)) options.staticRoot = config.webRoot;
+    options.authorize = [this](const net::Request& request) { return authorizer(request); };
+    options.problem = [](int status, const std::string& detail) {
+      return errorResponse(protocol::ProtocolError(status, "", detail));
+    };
+    options.decorate = [this](net::Response& response) {
+      metrics.requestAnswered(response.status);
+      response.headers.emplace_back("X-Content-Type-Options", "nosniff");
+      response.headers.emplace_back("Referrer-Policy", "no-referrer");
+    };
+    options.log = log;
+    const bool hasPage = !options.staticRoot.empty();
+    server.emplace(std::move(options));
+    if (!hasPage)
+      server->route("GET", "/", [](const net::Request&) {
+        return net::Response{200, "text/plain; charset=utf-8", std::string(kNoPage), {}};
+      });
+    addApi(*server, context);
+  }
+};
+
+Application::Application(Config config, std::vector<Dataset> datasets, MakeRenderer makeRenderer, Log log) {
+  if (config.token.empty()) config.token = createToken();
+  impl_ = std::make_unique<Impl>(std::move(config), std::move(datasets), std::move(makeRenderer), std::move(log));
+}
+
+Application::~Application() { stop(); }
+
+void Application::start() {
+  impl_->renderThread.start([this] { return impl_->renderLoop.step(); });
+  impl_->encodeThread.start([this] { return impl_->encodeLoop.step(); });
+  impl_->server->start();
+}
+
+std::uint16_t Application::port() const { return impl_->server->port(); }
+
+std::string Application::url() const {
+  const bool v6 = impl_->config.host.find(':') != std::string::npos;
+  return "http://" + (v6 ? "[" + impl_->config.host + "]" : impl_->config.host) + ":" + std::to_string(port()) +
+         "/?token=" + impl_->config.token;
+}
+
+void Application::stop() {
+  impl_->stopping = true;
+  // Waiting scripts and running renders end first: the network waits for its last handler.
+  impl_->sessions.closeAll("the server is stopping");
+  impl_->server->stop(impl_->config.stopGrace);
+  impl_->renderThread.stop();
+  impl_->encodeThread.stop();
+}
+
+}  // namespace scolopax::server

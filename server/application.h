@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The server as a whole: owns data sets, sessions, both loops and the network, and starts and stops them in order.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/config.h"
+#include "server/dataset_store.h"
+#include "server/progressive_render.h"
+
+namespace scolopax::server {
+
+class Application {
+ public:
+  /// An empty token in `config` is replaced by a new one.
+  Application(Config config, std::vector<Dataset> datasets, MakeRenderer makeRenderer, Log log);
+  ~Application();  ///< stops at once
+
+  /// Throws net::NetError when the port cannot be had.
+  void start();
+  std::uint16_t port() const;
+  /// Where the page is, with the token that opens it.
+  std::string url() const;
+  /// Takes no more, ends what waits and renders, closes streams, then returns. Safe to call twice.
+  void stop();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace scolopax::server

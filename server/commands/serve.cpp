@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/commands/serve.h"
+
+#include <fcntl.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "renderer/core/error.h"
+#include "renderer/renderer.h"
+#include "server/application.h"
+#include "server/auth.h"
+#include "server/command_config.h"
+
+namespace scolopax {
+namespace {
+
+struct ServeOptions {
+  server::Config config;
+  std::vector<std::filesystem::path> paths;
+  std::filesystem::path dataRoot;
+  std::string tokenFile;
+  std::string configFile;
+  std::string logLevel = "info";
+  double keepSeconds = 300;
+};
+
+/// The built page: where the build left it, or beside the folder of the program; empty when there is none.
+std::string findWebRoot() {
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  for (const std::filesystem::path& folder :
+       {std::filesystem::path(SCOLOPAX_WEB_ROOT), program.parent_path() / "../../client_web/dist"})
+    if (std::filesystem::is_directory(folder, error)) return std::filesystem::canonical(folder);
+  return "";
+}
+
+// A signal may come to any thread, so its handler only writes to a pipe that the main thread reads.
+int signalPipe[2] = {-1, -1};
+
+extern "C" void onSignal(int) {
+  const int before = errno;
+  const char byte = 0;
+  [[maybe_unused]] const auto written = write(signalPipe[1], &byte, 1);
+  errno = before;
+}
+
+void catchSignals() {
+  if (pipe2(signalPipe, O_CLOEXEC) != 0) throw Error(ErrorCode::io, "cannot make a pipe for signals");
+  struct sigaction action = {};
+  action.sa_handler = onSignal;
+  action.sa_flags = int(SA_RESETHAND | SA_RESTART);  // a second one ends the program at once
+  for (const int signal : {SIGTERM, SIGINT}) sigaction(signal, &action, nullptr);
+}
+
+void waitForSignal() {
+  char byte;
+  while (read(signalPipe[0], &byte, 1) < 0 && errno == EINTR) {
+  }
+}
+
+void serve(ServeOptions options) {
+  if (options.paths.empty())
+    throw CLI::ValidationError(
+        "serve", "expected at least one volume file. For a first picture: scolopax generate orbitals orbitals.nrrd, "
+                 "then scolopax serve orbitals.nrrd");
+  const auto log = std::make_shared<spdlog::logger>("scolopax", std::make_shared<spdlog::sinks::stderr_sink_mt>());
+  log->set_level(spdlog::level::from_str(options.logLevel));
+  log->flush_on(spdlog::level::info);
+  const auto warn = [log](const std::string& line) { log->warn(line); };
+
+  if (!options.tokenFile.empty()) options.config.token = readTokenFile(options.tokenFile);
+  options.config.keepSession = std::chrono::milliseconds((long long)(options.keepSeconds * 1000));
+  options.config.webRoot = findWebRoot();
+  if (!isLoopback(options.config.host))
+    log->warn("{} can be reached from other machines, and what is sent is not encrypted", options.config.host);
+
+  auto datasets = io::loadDatasets(server::pathsBelowRoot(options.paths, options.dataRoot),
+                                   io::defaultMemoryLimitBytes(), warn);
+  for (const auto& dataset : datasets) {
+    const auto& dims = dataset.volume->grid().dims;
+    log->info("data set {}: {} x {} x {}, {} channels", dataset.id, dims.x, dims.y, dims.z,
+              dataset.volume->channels().size());
+  }
+  const int threads = options.config.threads;
+  server::Application application(
+      options.config, std::move(datasets),
+      [threads](std::shared_ptr<const Volume> volume) { return makeCpuRenderer(std::move(volume), threads); }, warn);
+  catchSignals();
+  application.start();
+  std::printf("Scolopax is ready: %s\n", application.url().c_str());
+  std::fflush(stdout);
+  waitForSignal();
+  log->info("stopping");
+  application.stop();
+}
+
+}  // namespace
+
+CLI::App* addServeCommand(CLI::App& root) {
+  auto options = std::make_shared<ServeOptions>();
+  server::Config& config = options->config;
+  CLI::App* command = root.add_subcommand("serve", "Serves volumes to browsers and scripts until it is told to stop");
+  const auto add = [command](const std::string& name, auto& value, const std::string& doc) {
+    std::string variable = "SCOLOPAX_";
+    for (const char c : name) variable += c == '-' ? '_' : char(std::toupper(static_cast<unsigned char>(c)));
+    return command->add_option("--" + name, value, doc)->envname(variable)->capture_default_str();
+  };
+
+  command->add_option("PATH", options->paths,
+                      "Volume files. Files of one grid become the channels of one data set");
+  add("host", config.host, "Address to listen on; 0.0.0.0 is every one of this machine")->type_name("ADDRESS");
+  add("port", config.port, "Port to listen on; 0 takes any free one")->type_name("PORT");
+  add("token-file", options->tokenFile, "File with the token that opens the server; without it, a new one each start")
+      ->type_name("FILE");
+  add("data-root", options->dataRoot, "Folder that every PATH is below and relative to")->type_name("FOLDER");
+  add("threads", config.threads, "Threads that render; 0 is all there are")->check(CLI::Range(0, 1024))->type_name("N");
+  add("log-level", options->logLevel, "What goes to standard error")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "critical", "off"}));
+  add("allow-origin", config.allowedOrigins, "Another site whose pages may use this server; may be repeated")
+      ->type_name("https://HOST");
+
+  const std::string limits = "Limits";
+  const auto limit = [&](const std::string& name, auto& value, const std::string& doc) {
+    return add(name, value, doc)->group(limits)->type_name("N");
+  };
+  limit("max-sessions", config.maxSessions, "Sessions at once")->check(CLI::PositiveNumber);
+  limit("max-clients", config.maxClients, "Streams at once")->check(CLI::PositiveNumber);
+  limit("max-image", config.maxPixels, "Pixels of one picture")->check(CLI::PositiveNumber);
+  limit("max-render-seconds", config.maxRenderSeconds, "Seconds of one POST /render")->check(CLI::PositiveNumber);
+  limit("max-renders", config.maxRenders, "POST /render at once")->check(CLI::PositiveNumber);
+  limit("max-body", config.maxBodyBytes, "Bytes of one request's body")->check(CLI::PositiveNumber);
+  limit("max-message", config.maxMessageBytes, "Bytes of one WebSocket message")->check(CLI::PositiveNumber);
+  limit("max-json-depth", config.maxJsonDepth, "Lists and objects within each other")->check(CLI::PositiveNumber);
+  limit("keep-session", options->keepSeconds, "Seconds that a session outlives its last client")
+      ->check(CLI::NonNegativeNumber);
+
+  command->add_option("--config", options->configFile, "File with lines such as: port = 8081")
+      ->envname("SCOLOPAX_CONFIG")
+      ->type_name("FILE");
+  command->footer(
+      "Each option can also be set in the environment (--max-body as SCOLOPAX_MAX_BODY) or in the file of --config;\n"
+      "the command line wins over the environment, the environment over the file.\n"
+      "The ready line on standard output holds the address with the token that opens the page.\n"
+      "SIGTERM and Ctrl-C end the server in order.");
+  command->callback([options, command] {
+    if (!options->configFile.empty()) applyConfigFile(*command, options->configFile);
+    serve(*options);
+  });
+  return command;
+}
+
+}  // namespace scolopax

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// `scolopax serve`: the program's main business.
+#pragma once
+#include <CLI/App.hpp>
+
+namespace scolopax {
+
+/// Adds the subcommand; its callback serves until SIGTERM or SIGINT and throws scolopax::Error, or CLI::Error for
+/// bad usage.
+CLI::App* addServeCommand(CLI::App& root);
+
+}  // namespace scolopax

@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <thread>
+
+#include "protocol/problem.h"
+#include "tests/server/fakes.h"
+
+namespace scolopax::server {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+using protocol::ProtocolError;
+using testing::FakeRenderer;
+using testing::FakeViewer;
+
+/// The handlers without a network: what a server would call.
+struct Api {
+  Config config;
+  testing::Workshop workshop;
+  Metrics metrics;
+  std::shared_ptr<const DatasetStore> datasets = testing::smallStore();
+  SceneResolver resolver{datasets, {64, 1000}};
+  StreamHub streams{workshop.store, metrics, {}};
+  std::atomic<bool> stopping{false};
+  ApiContext context{config, *datasets, resolver, workshop.store, streams, metrics,
+                     [this](const std::shared_ptr<const Volume>&) {
+                       return std::make_unique<FakeRenderer>(workshop.control);
+                     },
+                     [](const std::string&) {}, stopping, [] { return json{{"backend", "fake"}}; }};
+  std::vector<Route> routes;
+
+  Api() {
+    config.pollTimeout = 0ms;
+    config.maxRenders = 1;
+    for (auto family : {datasetRoutes, renderRoutes, sessionRoutes, operationRoutes})
+      for (Route& route : family(context)) routes.push_back(std::move(route));
+  }
+
+  /// Throws what the handler throws. `target` may have a query.
+  net::Response call(const std::string& method, const std::string& target, const std::string& body = "",
+                     net::Headers headers = {{"Content-Type", "application/json"}}) {
+    net::Request request;
+    request.method = method;
+    request.path = target.substr(0, target.find('?'));
+    request.body = body;
+    request.headers = std::move(headers);
+    static const std::regex pair("[?&]([^=]+)=([^&]*)");
+    for (std::sregex_iterator at(target.begin(), target.end(), pair), end; at != end; ++at)
+      request.query.emplace((*at)[1], (*at)[2]);
+    for (const Route& route : routes) {
+      const std::regex pattern(std::regex_replace(route.path, std::regex("\\{[^}]*\\}"), "([^/]+)"));
+      std::smatch match;
+      if (route.method != method || !std::regex_match(request.path, match, pattern)) continue;
+      request.matches.assign(match.begin(), match.end());
+      return route.handler(request);
+    }
+    ADD_FAILURE() << "no route for " << method << " " << target;
+    return {};
+  }
+
+  std::pair<int, std::string> errorOf(const std::string& method, const std::string& target,
+                                      const std::string& body = "",
+                                      const net::Headers& headers = {{"Content-Type", "application/json"}}) {
+    try {
+      return {call(method, target, body, headers).status, "no error"};
+    } catch (const ProtocolError& error) {
+      return {error.status, error.pointer};
+    }
+  }
+};
+
+using Expected = std::pair<int, std::string>;
+
+std::string headerOf(const net::Response& response, std::string_view name) {
+  for (const auto& [key, value] : response.headers)
+    if (key == name) return value;
+  return "absent";
+}
+
+TEST(Api, ListsAndDescribesDatasets) {
+  Api api;
+  const json list = json::parse(api.call("GET", "/api/v1/datasets").body);
+  ASSERT_EQ(list["datasets"].size(), 2u);
+  EXPECT_EQ(json::parse(api.call("GET", "/api/v1/datasets/other").body), list["datasets"][1]);
+  EXPECT_EQ(api.errorOf("GET", "/api/v1/datasets/none").first, 404);
+  EXPECT_EQ(json::parse(api.call("GET", "/api/v1/datasets/small/histogram?channel=1").body)["maximum"], 230.0);
+  EXPECT_EQ(api.errorOf("GET", "/api/v1/datasets/small/histogram?channel=2").first, 422);
+  EXPECT_EQ(api.errorOf("GET", "/api/v1/datasets/small/histogram?channel=x").first, 422);
+  EXPECT_EQ(json::parse(api.call("GET", "/api/v1/datasets/small/probe?x=1&y=0&z=0").body)["values"][0], 1.0);
+  EXPECT_EQ(api.errorOf("GET", "/api/v1/datasets/small/probe?x=1&y=0").first, 422);
+  EXPECT_EQ(api.errorOf("GET", "/api/v1/datasets/small/probe?x=nan&y=0&z=0").first, 422);
+}
+
+constexpr const char* kSmallRender = R"({"image": {"width": 20, "height": 10}, "stop": {"samples": 3}})";
+
+TEST(Api, RendersToTheTypeThatIsAskedFor) {
+  Api api;
+  const auto jpeg = api.call("POST", "/api/v1/render", kSmallRender);
+  EXPECT_EQ(jpeg.status, 200);
+  EXPECT_EQ(jpeg.contentType, "image/jpeg");
+  EXPECT_EQ(headerOf(jpeg, "Scolopax-Samples"), "3");
+  EXPECT_EQ(jpeg.body.substr(0, 2), "\xFF\xD8");
+  const net::Headers png{{"Content-Type", "application/json"}, {"Accept", "image/png"}};
+  EXPECT_EQ(api.call("POST", "/api/v1/render", kSmallRender, png).body.substr(1, 3), "PNG");
+  const net::Headers text{{"Content-Type", "application/json"}, {"Accept", "text/html"}};
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/render", kSmallRender, text).first, 406);
+}
+
+TEST(Api, GivesTheSameBytesForTheSameRender) {
+  Api api;
+  const auto first = api.call("POST", "/api/v1/render", kSmallRender);
+  const auto second = api.call("POST", "/api/v1/render", kSmallRender);
+  EXPECT_EQ(first.body, second.body);
+  EXPECT_EQ(headerOf(first, "Scolopax-Scene-Hash"), headerOf(second, "Scolopax-Scene-Hash"));
+  const auto other = api.call("POST", "/api/v1/render",
+                              R"({"image": {"width": 20, "height": 10}, "integrator": {"seed": 1}})");
+  EXPECT_NE(headerOf(first, "Scolopax-Scene-Hash"), headerOf(other, "Scolopax-Scene-Hash"));
+}
+
+TEST(Api, HoldsARenderToTheLimits) {
+  Api api;
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/render", R"({"image": {"width": 50, "height": 21}})"), Expected(422, "/image"));
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/render", R"({"stop": {"seconds": 61}, "image": {"width": 9, "height": 9}})"),
+            Expected(422, "/stop/seconds"));
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/render", R"({"channels": [{}, {"density": "thick"}]})"),
+            Expected(422, "/channels/1/density"));
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/render", "{"), Expected(400, ""));
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/render", "{}", {{"Content-Type", "text/plain"}}).first, 415);
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/render", "{}", {}).first, 415);
+  api.config.maxBodyBytes = 10;
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/render", kSmallRender).first, 413);
+}
+
+TEST(Api, RefusesOneRenderTooManyWith503) {
+  Api api;
+  int nested = 0;
+  api.workshop.control->duringPass = [&] {
+    if (nested == 0) nested = api.errorOf("POST", "/api/v1/render", kSmallRender).first;
+  };
+  EXPECT_EQ(api.call("POST", "/api/v1/render", kSmallRender).status, 200);
+  EXPECT_EQ(nested, 503);
+  EXPECT_EQ(api.call("POST", "/api/v1/render", kSmallRender).status, 200);  // the place is free again
+  EXPECT_EQ(headerOf(errorResponse(ProtocolError(503, "", "busy")), "Retry-After"), "1");
+}
+
+TEST(Api, EndsARenderWhenTheServerStops) {
+  Api api;
+  api.workshop.control->duringPass = [&] { api.stopping = true; };
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/render", kSmallRender).first, 503);
+  EXPECT_EQ(api.errorOf("GET", "/readyz").first, 503);
+  EXPECT_EQ(api.call("GET", "/healthz").status, 200);
+}
+
+TEST(Api, EditsASessionsScene) {
+  Api api;
+  const auto created = api.call("POST", "/api/v1/sessions", R"({"scene": {"integrator": {"seed": 3}}})");
+  EXPECT_EQ(created.status, 201);
+  const json session = json::parse(created.body);
+  const std::string path = "/api/v1/sessions/" + session["id"].get<std::string>();
+  EXPECT_EQ(headerOf(created, "Location"), path);
+  EXPECT_EQ(session["revision"], 1);
+  EXPECT_EQ(session["scene"]["integrator"]["seed"], 3);
+
+  const json patched = json::parse(api.call("PATCH", path + "/scene", R"({"integrator": {"seed": 4}})",
+                                            {{"Content-Type", "application/merge-patch+json"}}).body);
+  EXPECT_EQ(patched["revision"], 2);
+  EXPECT_EQ(patched["scene"]["integrator"]["seed"], 4);
+  EXPECT_EQ(api.errorOf("PATCH", path + "/scene", R"({"integrator": {"sede": 4}})"),
+            Expected(422, "/integrator/sede"));
+  EXPECT_EQ(api.errorOf("PATCH", path + "/scene", "{}", {{"Content-Type", "application/json"}, {"If-Match", "\"1\""}}),
+            Expected(409, ""));
+  EXPECT_EQ(api.errorOf("PATCH", path + "/scene", "{}", {{"Content-Type", "application/json"}, {"If-Match", "x"}}).first,
+            400);
+  const json put = json::parse(api.call("PUT", path + "/scene", "{}",
+                                        {{"Content-Type", "application/json"}, {"If-Match", "\"2\""}}).body);
+  EXPECT_EQ(put["revision"], 3);
+  EXPECT_EQ(put["scene"]["integrator"]["seed"], 0);
+  EXPECT_EQ(json::parse(api.call("GET", path + "/scene").body), put);
+  EXPECT_EQ(json::parse(api.call("GET", path).body)["revision"], 3);
+  EXPECT_EQ(api.call("DELETE", path).status, 204);
+  EXPECT_EQ(api.errorOf("GET", path).first, 404);
+  EXPECT_EQ(api.errorOf("DELETE", path).first, 404);
+}
+
+TEST(Api, BeginsASessionWithoutABody) {
+  Api api;
+  EXPECT_EQ(api.call("POST", "/api/v1/sessions", "", {}).status, 201);
+  EXPECT_EQ(api.call("POST", "/api/v1/sessions", "{}").status, 201);
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/sessions", R"({"secne": {}})"), Expected(422, "/secne"));
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/sessions", "[]").first, 422);
+}
+
+TEST(Api, AnswersTheLongPollWithAFrameOrWithNothing) {
+  Api api;
+  const auto session = api.workshop.store.create({{"stop", {{"samples", 2}}}});
+  const std::string path = "/api/v1/sessions/" + session->id() + "/frame";
+  EXPECT_EQ(api.call("GET", path).status, 204);
+  session->addViewer(std::make_shared<FakeViewer>());
+  api.workshop.steps(4);
+  const auto frame = api.call("GET", path + "?minSamples=2");
+  EXPECT_EQ(frame.contentType, "image/jpeg");
+  EXPECT_EQ(headerOf(frame, "Scolopax-Samples"), "2");
+  EXPECT_EQ(headerOf(frame, "Scolopax-Final"), "1");
+  EXPECT_EQ(api.call("GET", path + "?format=png").body.substr(1, 3), "PNG");
+  EXPECT_EQ(api.call("GET", path + "?format=exr").body.substr(0, 4), "\x76\x2f\x31\x01");
+  EXPECT_EQ(api.call("GET", path + "?after=" + headerOf(frame, "Scolopax-Frame")).status, 204);
+  EXPECT_EQ(api.errorOf("GET", path + "?format=gif").first, 422);
+}
+
+TEST(Api, RefusesOneWaitingScriptTooManyWith429) {
+  Api api;
+  api.config.pollTimeout = 60s;
+  const auto session = api.workshop.store.create(json::object());
+  std::vector<std::thread> waiting;
+  for (std::size_t i = 0; i < Session::kMaxPolls; ++i)
+    waiting.emplace_back([&] { session->waitForFrame({}, 60s); });
+  // The render request lists who waits.
+  while (session->request().pollSamples.size() < Session::kMaxPolls) std::this_thread::yield();
+  EXPECT_EQ(api.errorOf("GET", "/api/v1/sessions/" + session->id() + "/frame").first, 429);
+  session->close("enough");
+  for (auto& thread : waiting) thread.join();
+}
+
+TEST(Api, WeighsTheAcceptHeader) {
+  const auto best = [](const std::string& accept) {
+    const ImageType* type = acceptedImageType(&accept);
+    return type ? type->format : "none";
+  };
+  EXPECT_EQ(acceptedImageType(nullptr)->format, "jpeg");
+  EXPECT_EQ(best("*/*"), "jpeg");
+  EXPECT_EQ(best("image/png"), "png");
+  EXPECT_EQ(best("image/x-exr, image/png;q=0.5"), "exr");
+  EXPECT_EQ(best("image/jpeg;q=0, image/*"), "png");
+  EXPECT_EQ(best("image/*;q=0.5, image/png;q=0.2"), "jpeg");
+  EXPECT_EQ(best("text/html"), "none");
+  EXPECT_EQ(best(""), "none");
+  EXPECT_EQ(best("image/png;q=0"), "none");
+}
+
+TEST(Api, DescribesEveryRouteInOpenApi) {
+  Api api;
+  const json description = openApi(api.routes);
+  std::size_t operations = 0;
+  for (const json& path : description["paths"]) operations += path.size();
+  EXPECT_EQ(operations, api.routes.size());
+  const json& histogram = description["paths"]["/api/v1/datasets/{id}/histogram"]["get"];
+  ASSERT_EQ(histogram["parameters"].size(), 2u);
+  EXPECT_EQ(histogram["parameters"][0]["required"], true);
+  EXPECT_EQ(histogram["parameters"][1]["name"], "channel");
+  EXPECT_TRUE(description["paths"]["/api/v1/render"]["post"].contains("requestBody"));
+}
+
+TEST(Api, CountsInTheMetrics) {
+  Api api;
+  api.workshop.store.create(json::object());
+  api.metrics.requestAnswered(200);
+  api.metrics.requestAnswered(404);
+  api.metrics.requestAnswered(404);
+  PassResult pass;
+  pass.rendered = true;
+  pass.pixels = 100;
+  pass.renderSeconds = 0.5;
+  api.metrics.passEnded(pass);
+  const std::string text = api.call("GET", "/metrics").body;
+  for (const char* line : {"scolopax_http_requests_total{status=\"404\"} 2", "scolopax_sessions 1",
+                           "scolopax_samples_total 100", "scolopax_render_seconds_total 0.5", "scolopax_clients 0"})
+    EXPECT_NE(text.find(line), std::string::npos) << line << " in\n" << text;
+}
+
+}  // namespace
+}  // namespace scolopax::server

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/dataset_store.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "protocol/problem.h"
+#include "renderer/core/error.h"
+#include "tests/server/fakes.h"
+
+namespace scolopax::server {
+namespace {
+
+using nlohmann::json;
+
+TEST(DatasetStore, DescribesGridAndChannels) {
+  const json description = describeJson(*testing::smallStore()->first());
+  EXPECT_EQ(description["id"], "small");
+  EXPECT_EQ(description["dimensions"], json({4, 3, 2}));
+  EXPECT_EQ(description["spacing"], json({1.0, 1.0, 1.0}));
+  ASSERT_EQ(description["channels"].size(), 2u);
+  EXPECT_EQ(description["channels"][1]["name"], "green");
+  EXPECT_EQ(description["channels"][1]["type"], "u8");
+  EXPECT_EQ(description["channels"][1]["minimum"], 0.0);
+  EXPECT_EQ(description["channels"][1]["maximum"], 230.0);
+}
+
+TEST(DatasetStore, FindsById) {
+  const auto store = testing::smallStore();
+  EXPECT_EQ(store->find("other")->id, "other");
+  EXPECT_EQ(store->find("nothing"), nullptr);
+}
+
+TEST(DatasetStore, RefusesToHoldNothing) { EXPECT_THROW(DatasetStore({}), Error); }
+
+TEST(DatasetStore, CountsEveryVoxelOfAChannelOnce) {
+  const json histogram = histogramJson(*testing::smallStore()->first(), 0);
+  std::uint64_t sum = 0;
+  for (const json& bin : histogram["bins"]) sum += bin.get<std::uint64_t>();
+  EXPECT_EQ(sum, 24u);
+  EXPECT_EQ(histogram["maximum"], 23.0);
+}
+
+TEST(DatasetStore, RefusesAChannelThatIsNotThere) {
+  EXPECT_THROW(histogramJson(*testing::smallStore()->first(), 2), protocol::ProtocolError);
+  EXPECT_THROW(histogramJson(*testing::smallStore()->first(), -1), protocol::ProtocolError);
+}
+
+TEST(DatasetStore, ProbesBetweenVoxelCentres) {
+  const auto dataset = testing::smallStore()->first();
+  // Values are the voxel's index, x + 4 y + 12 z: linear, so interpolation is exact.
+  const json inside = probeJson(*dataset, 1.5, 0.25, 0.5);
+  EXPECT_EQ(inside["inside"], true);
+  EXPECT_DOUBLE_EQ(inside["values"][0], 1.5 + 4 * 0.25 + 12 * 0.5);
+  EXPECT_DOUBLE_EQ(inside["values"][1], 10 * (1.5 + 4 * 0.25 + 12 * 0.5));
+}
+
+TEST(DatasetStore, ProbesTheOuterHalfVoxelWithTheEdgesValue) {
+  const auto dataset = testing::smallStore()->first();
+  EXPECT_DOUBLE_EQ(probeJson(*dataset, -0.4, 0, 0)["values"][0], 0.0);
+  EXPECT_DOUBLE_EQ(probeJson(*dataset, 3.5, 2.5, 1.5)["values"][0], 23.0);
+  const json outside = probeJson(*dataset, 3.6, 0, 0);
+  EXPECT_EQ(outside["inside"], false);
+  EXPECT_EQ(outside["values"], json({nullptr, nullptr}));
+}
+
+TEST(DatasetStore, ProbesInWorldUnitsAndDataUnits) {
+  Grid grid;
+  grid.dims = {2, 1, 1};
+  grid.worldFromVoxel[0][0] = 10;
+  grid.worldFromVoxel[3] = {100, 0, 0, 1};
+  std::vector<ChannelSource> channels(2);
+  for (auto& channel : channels) channel.voxels = VoxelBuffer(ScalarType::f32, 2);
+  channels[0].voxels.as<float>()[0] = 1;
+  channels[0].voxels.as<float>()[1] = 3;
+  channels[0].slope = 2;
+  channels[0].intercept = 5;
+  channels[1].voxels.as<float>()[0] = 1;
+  channels[1].voxels.as<float>()[1] = std::numeric_limits<float>::quiet_NaN();
+  const Dataset dataset{"d", "d", {}, std::make_shared<const Volume>(grid, std::move(channels))};
+  const json probe = probeJson(dataset, 105, 0, 0);
+  EXPECT_DOUBLE_EQ(probe["values"][0], 2 * 2 + 5);
+  EXPECT_EQ(probe["values"][1], nullptr);
+  EXPECT_EQ(probe["voxel"], json({0.5, 0.0, 0.0}));
+}
+
+TEST(DatasetStore, KeepsPathsBelowTheRoot) {
+  const auto root = std::filesystem::path(::testing::TempDir()) / "scolopax_root_test";
+  std::filesystem::remove_all(root);
+  std::filesystem::create_directories(root / "inside");
+  std::ofstream(root / "inside" / "a.nrrd") << "x";
+  std::filesystem::create_symlink("/etc", root / "link");
+  EXPECT_EQ(pathsBelowRoot({"inside/a.nrrd"}, root).front(), std::filesystem::canonical(root) / "inside/a.nrrd");
+  EXPECT_THROW(pathsBelowRoot({"../a.nrrd"}, root), Error);
+  EXPECT_THROW(pathsBelowRoot({"/etc/passwd"}, root), Error);
+  EXPECT_THROW(pathsBelowRoot({"link/passwd"}, root), Error);
+  EXPECT_THROW(pathsBelowRoot({"a"}, root / "missing"), Error);
+  EXPECT_EQ(pathsBelowRoot({"../a.nrrd"}, {}).front(), "../a.nrrd");
+  std::filesystem::remove_all(root);
+}
+
+}  // namespace
+}  // namespace scolopax::server

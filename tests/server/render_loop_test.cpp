@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/render_loop.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "server/loop_thread.h"
+#include "tests/server/fakes.h"
+
+namespace scolopax::server {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+using testing::FakeViewer;
+using testing::seedPatch;
+using testing::Workshop;
+
+std::vector<std::uint32_t> samplesOf(const FakeViewer& viewer) {
+  std::vector<std::uint32_t> samples;
+  for (const auto& frame : viewer.frames) samples.push_back(frame.info.samples);
+  return samples;
+}
+
+TEST(RenderLoop, ShowsDoublingSampleCountsThenAFrameEveryHalfSecond) {
+  Workshop workshop;
+  workshop.control->secondsPerPixel = 0.05 / (10 * 10);
+  const auto session = workshop.store.create({{"image", {{"width", 10}, {"height", 10}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.steps(40);
+  // 50 ms a pass: ten passes are half a second; powers of two come anyway and start the wait anew.
+  EXPECT_EQ(samplesOf(*viewer), (std::vector<std::uint32_t>{1, 2, 4, 8, 16, 26, 32}));
+}
+
+TEST(RenderLoop, StopsAtTheSampleCountAndFlagsTheLastFrame) {
+  Workshop workshop;
+  const auto session = workshop.store.create({{"stop", {{"samples", 3}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.steps(10);
+  EXPECT_EQ(samplesOf(*viewer), (std::vector<std::uint32_t>{1, 2, 3}));
+  EXPECT_FALSE(viewer->frames[1].info.final);
+  EXPECT_TRUE(viewer->frames[2].info.final);
+  // Nothing to do: no time to wake at except the session's end, which a viewer keeps away.
+  EXPECT_GE(*workshop.render.step(), workshop.hooks.now() + 300s);
+}
+
+TEST(RenderLoop, StopsAtTheEstimatedErrorAndAtTheTime) {
+  Workshop workshop;
+  workshop.control->error = [](std::uint32_t samples) { return 1.0 / samples; };
+  workshop.control->secondsPerPixel = 1.0;
+  const auto byError = workshop.store.create({{"image", {{"width", 1}, {"height", 1}}}, {"stop", {{"error", 0.2}}}});
+  const auto byTime = workshop.store.create({{"image", {{"width", 1}, {"height", 1}}}, {"stop", {{"seconds", 7}}}});
+  const auto first = std::make_shared<FakeViewer>(), second = std::make_shared<FakeViewer>();
+  byError->addViewer(first);
+  byTime->addViewer(second);
+  workshop.steps(40);
+  EXPECT_EQ(first->frames.back().info.samples, 5u);
+  EXPECT_TRUE(first->frames.back().info.final);
+  EXPECT_EQ(second->frames.back().info.samples, 7u);
+  EXPECT_TRUE(second->frames.back().info.final);
+}
+
+TEST(RenderLoop, GoesOnWithTheFilmWhenOnlyTheStopRuleChanges) {
+  Workshop workshop;
+  const auto session = workshop.store.create({{"stop", {{"samples", 2}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.steps(4);
+  session->patch({{"stop", {{"samples", 4}}}}, {});
+  workshop.steps(6);
+  EXPECT_EQ(viewer->frames.back().info.samples, 4u);
+  EXPECT_TRUE(viewer->frames.back().info.final);
+  EXPECT_EQ(workshop.control->passes.size(), 4u);
+}
+
+TEST(RenderLoop, ConfirmsAnEditThatChangesNothing) {
+  Workshop workshop;
+  const auto session = workshop.store.create({{"stop", {{"samples", 2}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  const ViewerId id = session->addViewer(viewer);
+  workshop.steps(4);
+  session->patch(seedPatch(0), {id, 3, {}});
+  workshop.steps(2);
+  EXPECT_EQ(viewer->frames.back().patch, 3u);
+  EXPECT_EQ(viewer->frames.back().info.revision, 2u);
+  EXPECT_EQ(viewer->frames.back().info.samples, 2u);
+  EXPECT_EQ(workshop.control->passes.size(), 2u);
+}
+
+TEST(RenderLoop, NeverMixesRevisionsInOnePicture) {
+  Workshop workshop;
+  const auto session = workshop.store.create(seedPatch(1));
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  std::uint32_t seed = 1;
+  int pass = 0;
+  workshop.control->duringPass = [&] {
+    if (++pass % 3 == 0) session->patch(seedPatch(++seed), {});
+  };
+  for (int i = 0; i < 60; ++i) {
+    workshop.step();
+    workshop.clock.advance(std::chrono::milliseconds(i % 7 * 60));
+  }
+  ASSERT_GT(viewer->frames.size(), 10u);
+  for (const auto& frame : viewer->frames) EXPECT_EQ(frame.red, float(frame.info.revision)) << frame.info.number;
+}
+
+TEST(RenderLoop, KeepsTheFilmOfACancelledPass) {
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.steps(2);
+  // The edit cancels the pass; undoing it within the pass leaves the scene the film is of.
+  workshop.control->duringPass = [&] {
+    workshop.control->duringPass = nullptr;
+    session->patch(seedPatch(5), {});
+    session->patch(seedPatch(0), {});
+  };
+  workshop.step();
+  EXPECT_EQ(workshop.control->passes.size(), 2u);
+  workshop.step();
+  EXPECT_EQ(viewer->frames.back().info.samples, 3u);
+  EXPECT_EQ(viewer->frames.back().info.revision, 3u);
+}
+
+TEST(RenderLoop, ShowsPicturesHoweverFastEditsCome) {
+  Workshop workshop;
+  workshop.control->secondsPerPixel = 1e-6;
+  const auto session = workshop.store.create(json::object());
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  std::uint32_t seed = 0;
+  workshop.control->duringPass = [&] { session->patch(seedPatch(++seed), {}); };
+  workshop.steps(20);
+  EXPECT_GE(viewer->frames.size(), 18u);
+}
+
+TEST(RenderLoop, RendersSmallWhileEditsArriveAndWholeWhenTheyStop) {
+  Workshop workshop;
+  workshop.control->secondsPerPixel = 1e-6;  // a pass of 400 x 300 takes 120 ms, three times the target
+  const auto session =
+      workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}, {"stop", {{"samples", 50}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.step();
+  ASSERT_EQ(viewer->frames.size(), 1u);
+  EXPECT_EQ(viewer->frames[0].width, 400);
+  EXPECT_FALSE(viewer->frames[0].info.interactive);
+  session->patch(seedPatch(1), {});
+  workshop.step();
+  ASSERT_EQ(viewer->frames.size(), 2u);
+  EXPECT_EQ(viewer->frames[1].width, 200);
+  EXPECT_EQ(viewer->frames[1].height, 150);
+  EXPECT_TRUE(viewer->frames[1].info.interactive);
+  EXPECT_FALSE(viewer->frames[1].info.final);
+  workshop.clock.advance(300ms);
+  workshop.step();
+  ASSERT_EQ(viewer->frames.size(), 3u);
+  EXPECT_EQ(viewer->frames[2].width, 400);
+  EXPECT_EQ(viewer->frames[2].info.samples, 1u);
+  EXPECT_FALSE(viewer->frames[2].info.interactive);
+}
+
+TEST(RenderLoop, SleepsUntilQualityIsDueWhenTheSmallPictureIsDone) {
+  Workshop workshop;
+  const auto session = workshop.store.create({{"stop", {{"samples", 2}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  session->patch(seedPatch(1), {});
+  workshop.steps(2);
+  const auto next = workshop.render.step();
+  ASSERT_TRUE(next);
+  EXPECT_EQ(*next, workshop.hooks.now() + Session::kInteractiveTime);
+  workshop.clock.advance(Session::kInteractiveTime);
+  workshop.step();
+  EXPECT_TRUE(viewer->frames.back().info.final);
+  EXPECT_FALSE(viewer->frames.back().info.interactive);
+  EXPECT_EQ(workshop.control->passes.size(), 2u);  // it was whole already: the film goes on
+}
+
+TEST(RenderLoop, ChoosesTheLargestResolutionThatFitsTheTarget) {
+  EXPECT_EQ(divisorForTarget(1000, 0, 0.04), 1);
+  EXPECT_EQ(divisorForTarget(1000, 1e-5, 0.04), 1);
+  EXPECT_EQ(divisorForTarget(1000, 1e-4, 0.04), 2);
+  EXPECT_EQ(divisorForTarget(1000, 3e-4, 0.04), 3);
+  EXPECT_EQ(divisorForTarget(1000, 1, 0.04), 16);
+}
+
+TEST(RenderLoop, LetsSessionsTakeTurns) {
+  Workshop workshop;
+  std::vector<std::shared_ptr<FakeViewer>> viewers;
+  for (std::uint32_t i = 1; i <= 3; ++i) {
+    viewers.push_back(std::make_shared<FakeViewer>());
+    workshop.store.create(seedPatch(i))->addViewer(viewers.back());
+  }
+  workshop.steps(30);
+  std::map<std::uint32_t, int> turns;
+  for (const std::uint32_t seed : workshop.control->passes) ++turns[seed];
+  EXPECT_EQ(turns, (std::map<std::uint32_t, int>{{1, 10}, {2, 10}, {3, 10}}));
+}
+
+TEST(RenderLoop, LetsAnEditedSessionStarveNobody) {
+  Workshop workshop;
+  const auto busy = workshop.store.create(seedPatch(1));
+  const auto calm = workshop.store.create(seedPatch(1000));
+  busy->addViewer(std::make_shared<FakeViewer>());
+  calm->addViewer(std::make_shared<FakeViewer>());
+  std::uint32_t seed = 1;
+  workshop.control->duringPass = [&] { busy->patch(seedPatch(++seed), {}); };
+  workshop.steps(40);
+  EXPECT_EQ(std::count(workshop.control->passes.begin(), workshop.control->passes.end(), 1000u), 20);
+}
+
+TEST(RenderLoop, MakesAnotherRendererForAnotherDataset) {
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
+  session->addViewer(std::make_shared<FakeViewer>());
+  workshop.steps(2);
+  session->patch(seedPatch(3), {});
+  workshop.steps(2);
+  EXPECT_EQ(workshop.control->renderersMade, 1);
+  session->patch({{"dataset", "other"}}, {});
+  workshop.steps(2);
+  EXPECT_EQ(workshop.control->renderersMade, 2);
+}
+
+TEST(RenderLoop, TakesAlmostForeverNoResourcesOfADeletedSession) {
+  Workshop workshop;
+  const auto viewer = std::make_shared<FakeViewer>();
+  std::weak_ptr<Session> session = workshop.store.create(json::object());
+  session.lock()->addViewer(viewer);
+  workshop.steps(2);
+  EXPECT_TRUE(workshop.store.remove(session.lock()->id()));
+  workshop.step();
+  EXPECT_TRUE(session.expired());
+  EXPECT_FALSE(viewer->closed.empty());
+}
+
+TEST(LoopThread, RunsOncePerWakeAndNotBetween) {
+  LoopThread loop;
+  std::mutex mutex;
+  std::condition_variable changed;
+  int steps = 0;
+  loop.start([&]() -> std::optional<TimePoint> {
+    const std::lock_guard lock(mutex);
+    ++steps;
+    changed.notify_all();
+    return std::nullopt;
+  });
+  const auto waitFor = [&](int count) {
+    std::unique_lock lock(mutex);
+    return changed.wait_for(lock, 60s, [&] { return steps == count; });
+  };
+  EXPECT_TRUE(waitFor(1));
+  loop.wake();
+  EXPECT_TRUE(waitFor(2));
+  loop.stop();
+  EXPECT_EQ(steps, 2);
+}
+
+}  // namespace
+}  // namespace scolopax::server

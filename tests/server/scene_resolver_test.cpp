@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene_resolver.h"
+
+#include <gtest/gtest.h>
+
+#include "protocol/problem.h"
+#include "tests/server/fakes.h"
+
+namespace scolopax::server {
+namespace {
+
+using nlohmann::json;
+using protocol::ProtocolError;
+
+SceneResolver resolver() { return {testing::smallStore(), {64, 1'000'000}}; }
+
+/// Status and pointer of the error that a scene gives.
+std::pair<int, std::string> errorOf(const json& scene) {
+  try {
+    resolver().replace(scene);
+  } catch (const ProtocolError& error) {
+    return {error.status, error.pointer};
+  }
+  return {0, ""};
+}
+
+TEST(SceneResolver, FillsEveryValueOfAnEmptyScene) {
+  const auto scene = resolver().replace(json::object());
+  EXPECT_EQ(scene->sparse, json::object());
+  EXPECT_EQ(scene->resolved["dataset"], "small");
+  ASSERT_EQ(scene->resolved["channels"].size(), 2u);
+  for (const json& channel : scene->resolved["channels"]) {
+    EXPECT_TRUE(channel.contains("name"));
+    EXPECT_EQ(channel["range"].size(), 2u);
+    EXPECT_GT(channel["density"], 0.0);
+    EXPECT_TRUE(channel.contains("color"));
+  }
+  EXPECT_EQ(scene->resolved["channels"][1]["name"], "green");
+  EXPECT_NE(scene->resolved["channels"][0]["color"], scene->resolved["channels"][1]["color"]);
+  EXPECT_EQ(scene->resolved["camera"]["eye"].size(), 3u);
+  EXPECT_EQ(scene->resolved["integrator"]["method"], "superposed");
+  EXPECT_EQ(scene->resolved["stop"], (json{{"samples", 64}}));
+  EXPECT_EQ(scene->stop.samples, 64u);
+}
+
+TEST(SceneResolver, ResolvesAResolvedSceneToItself) {
+  const auto first = resolver().replace({{"channels", {{{"gamma", 2}}}}, {"camera", {{"orthoHeight", 3}}}});
+  const auto second = resolver().replace(first->resolved);
+  EXPECT_EQ(second->resolved, first->resolved);
+}
+
+TEST(SceneResolver, HandsTheRendererWhatTheSceneSays) {
+  const json document = json::parse(R"({
+    "channels": [
+      {"range": [3, 7], "gamma": 2, "density": 5, "color": "#ff0080", "opacity": [[0, 0], [0.5, 1], [1, 0.25]]},
+      {"visible": false, "colormap": [[0, "#000000"], [1, "#ffffff"]]}],
+    "camera": {"eye": [1, 2, 30], "target": [0, 1, 0], "up": [0, 1, 0], "orthoHeight": 4},
+    "integrator": {"method": "sync-dda", "macrocell": 8, "seed": 9},
+    "image": {"width": 40, "height": 30, "background": "#ffffff", "filter": "point"},
+    "stop": {"seconds": 2.5}})");
+  const auto scene = resolver().replace(document);
+  const Scene& render = scene->render;
+  ASSERT_EQ(render.channels.size(), 2u);
+  const ChannelAppearance& first = render.channels[0];
+  EXPECT_EQ(first.rangeLo, 3);
+  EXPECT_EQ(first.rangeHi, 7);
+  EXPECT_EQ(first.gamma, 2);
+  EXPECT_EQ(first.density, 5);
+  ASSERT_EQ(first.opacity.size(), 3u);
+  EXPECT_EQ(first.opacity[1].position, 0.5);
+  EXPECT_EQ(first.opacity[2].value, 0.25);
+  ASSERT_EQ(first.color.size(), 1u);
+  EXPECT_FLOAT_EQ(float(first.color[0].color.r), 1);
+  EXPECT_EQ(first.color[0].color.g, 0);
+  EXPECT_NEAR(first.color[0].color.b, 0.215861, 1e-5);  // IEC 61966-2-1 of 128/255
+  EXPECT_FALSE(render.channels[1].visible);
+  EXPECT_EQ(render.channels[1].color.size(), 2u);
+  EXPECT_EQ(render.camera.eye, glm::dvec3(1, 2, 30));
+  EXPECT_EQ(render.camera.orthoHeight, 4);
+  EXPECT_EQ(render.method, Method::syncDda);
+  EXPECT_EQ(render.macrocell, 8);
+  EXPECT_EQ(render.seed, 9u);
+  EXPECT_EQ(render.width, 40);
+  EXPECT_EQ(render.height, 30);
+  EXPECT_EQ(render.background, glm::vec3(1));
+  EXPECT_EQ(render.filter, PixelFilter::point);
+  EXPECT_EQ(scene->stop.samples, 0u);
+  EXPECT_EQ(scene->stop.seconds, 2.5);
+}
+
+TEST(SceneResolver, TakesTheNamesOfTheRenderersLists) {
+  const auto lists = rendererLists();
+  ASSERT_EQ(lists.methods.size(), std::size(kMethods) + 1);
+  EXPECT_EQ(lists.methods[0].name, "auto");
+  EXPECT_EQ(lists.blendModes.size(), std::size(kBlendModes));
+  for (const auto& colormap : lists.colormaps)
+    EXPECT_GT(resolver().replace({{"channels", {{{"colormap", colormap.name}}}}})->render.channels[0].color.size(), 1u)
+        << colormap.name;
+}
+
+TEST(SceneResolver, NamesTheFieldThatIsWrong) {
+  using Expected = std::pair<int, std::string>;
+  EXPECT_EQ(errorOf({{"dataset", "unknown"}}), Expected(422, "/dataset"));
+  EXPECT_EQ(errorOf({{"dataset", 7}}), Expected(422, "/dataset"));
+  EXPECT_EQ(errorOf({{"channels", {json::object(), json::object(), json::object()}}}).first, 422);
+  EXPECT_EQ(errorOf({{"image", {{"width", 2000}, {"height", 2000}}}}), Expected(422, "/image"));
+  EXPECT_EQ(errorOf({{"camera", {{"eye", {1, 1, 1}}, {"target", {1, 1, 1}}}}}), Expected(422, "/camera"));
+  EXPECT_EQ(errorOf(json::array()).first, 422);
+  EXPECT_EQ(errorOf(nullptr).first, 422);
+}
+
+TEST(SceneResolver, ChecksAPatchAgainstTheDatasetThatItNames) {
+  const auto resolve = resolver();
+  const auto base = resolve.replace(json::object());
+  EXPECT_EQ(resolve.patch(*base, {{"dataset", "other"}})->dataset->id, "other");
+  EXPECT_EQ(resolve.patch(*resolve.patch(*base, {{"dataset", "other"}}), {{"dataset", nullptr}})->dataset->id, "small");
+  EXPECT_THROW(resolve.patch(*base, {{"dataset", "none"}}), ProtocolError);
+}
+
+TEST(SceneResolver, KnowsWhatLeavesThePictureAsItIs) {
+  const auto resolve = resolver();
+  const auto base = resolve.replace(json::object());
+  EXPECT_EQ(resolve.patch(*base, {{"stop", {{"samples", 9}}}})->picture, base->picture);
+  EXPECT_EQ(resolve.patch(*base, {{"channels", {{"0", {{"name", "nucleus"}}}}}})->picture, base->picture);
+  EXPECT_NE(resolve.patch(*base, {{"channels", {{"0", {{"gamma", 3}}}}}})->picture, base->picture);
+}
+
+}  // namespace
+}  // namespace scolopax::server

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/session_store.h"
+
+#include <gtest/gtest.h>
+
+#include "protocol/problem.h"
+#include "tests/server/fakes.h"
+
+namespace scolopax::server {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+using testing::FakeViewer;
+using testing::seedPatch;
+using testing::Workshop;
+
+TEST(SessionStore, EndsASessionSomeTimeAfterItsLastViewer) {
+  Workshop workshop({32, 5min});
+  const auto session = workshop.store.create(json::object());
+  const auto viewer = std::make_shared<FakeViewer>();
+  const ViewerId id = session->addViewer(viewer);
+  workshop.clock.advance(1h);
+  workshop.store.expire();
+  EXPECT_NE(workshop.store.find(session->id()), nullptr);
+  session->removeViewer(id);
+  workshop.clock.advance(5min - 1ms);
+  EXPECT_EQ(workshop.store.expire(), workshop.hooks.now() + 1ms);
+  EXPECT_NE(workshop.store.find(session->id()), nullptr);
+  workshop.clock.advance(1ms);
+  EXPECT_EQ(workshop.store.expire(), std::nullopt);
+  EXPECT_EQ(workshop.store.find(session->id()), nullptr);
+  EXPECT_EQ(workshop.store.findByToken(session->token()), nullptr);
+}
+
+TEST(SessionStore, KeepsTheFilmBetweenTwoViewers) {
+  Workshop workshop({32, 5min});
+  const auto session = workshop.store.create({{"stop", {{"samples", 100}}}});
+  const ViewerId id = session->addViewer(std::make_shared<FakeViewer>());
+  workshop.steps(10);
+  session->removeViewer(id);
+  workshop.steps(10);
+  workshop.clock.advance(4min);
+  const auto resumed = workshop.store.findByToken(session->token());
+  ASSERT_EQ(resumed, session);
+  const auto viewer = std::make_shared<FakeViewer>();
+  resumed->addViewer(viewer);
+  workshop.encode.step();
+  workshop.steps(100);
+  EXPECT_EQ(viewer->frames.front().info.samples, 8u);  // the last that had been shown
+  EXPECT_EQ(viewer->frames.back().info.samples, 100u);
+  EXPECT_EQ(workshop.control->passes.size(), 100u);    // none of them twice
+}
+
+TEST(SessionStore, RefusesOneSessionTooManyWith503) {
+  Workshop workshop({2, 5min});
+  workshop.store.create(json::object());
+  const auto second = workshop.store.create(json::object());
+  try {
+    workshop.store.create(json::object());
+    FAIL() << "no error";
+  } catch (const protocol::ProtocolError& error) {
+    EXPECT_EQ(error.status, 503);
+  }
+  EXPECT_TRUE(workshop.store.remove(second->id()));
+  EXPECT_FALSE(workshop.store.remove(second->id()));
+  EXPECT_NE(workshop.store.create(json::object()), nullptr);
+}
+
+TEST(SessionStore, RefusesASceneThatIsNone) {
+  Workshop workshop;
+  EXPECT_THROW(workshop.store.create({{"nonsense", 1}}), protocol::ProtocolError);
+  EXPECT_TRUE(workshop.store.all().empty());
+}
+
+TEST(SessionStore, GivesEverySessionItsOwnSecret) {
+  Workshop workshop;
+  const auto a = workshop.store.create(json::object()), b = workshop.store.create(json::object());
+  EXPECT_NE(a->id(), b->id());
+  EXPECT_NE(a->token(), b->token());
+  EXPECT_NE(a->token(), a->id());
+  EXPECT_EQ(workshop.store.findByToken(a->id()), nullptr);
+}
+
+}  // namespace
+}  // namespace scolopax::server
