@@ -58,7 +58,8 @@ class FakeRenderer : public Renderer {
     const auto pixels = double(scene_.width) * scene_.height;
     if (control_->clock)
       control_->clock->advance(std::chrono::microseconds((long long)(pixels * control_->secondsPerPixel * 1e6)));
-    if (control_->duringPass) control_->duringPass();
+    // A copy: it may replace itself.
+    if (const auto during = control_->duringPass) during();
     if (cancel) return false;
     seen_ = samples_ == 0 || seen_ == double(scene_.seed) ? double(scene_.seed) : -1;
     ++samples_;
