@@ -55,15 +55,20 @@ double qualityOf(std::string_view accept, std::string_view mediaType) {
 int statusOf(ErrorCode code) {
   switch (code) {
     case ErrorCode::badInput:
-    case ErrorCode::unsupported: return 422;
-    case ErrorCode::notFound: return 404;
-    case ErrorCode::tooLarge: return 422;
-    case ErrorCode::io: return 500;
+    case ErrorCode::unsupported:
+      return 422;
+    case ErrorCode::notFound:
+      return 404;
+    case ErrorCode::tooLarge:
+      return 422;
+    case ErrorCode::io:
+      return 500;
   }
   return 500;
 }
 
-/// Every handler runs in this: what it throws becomes a problem, and the cause of a 500 goes to the log alone.
+/// Every handler runs in this: what it throws becomes a problem, and the cause of a 500 goes to the log
+/// alone.
 net::Handler guarded(const ApiContext& context, const net::Handler& handler) {
   return [handler, &context](const net::Request& request) -> net::Response {
     try {
@@ -112,8 +117,9 @@ json jsonBody(const net::Request& request, const Config& config, std::string_vie
   const std::string_view type = header ? trimmed(std::string_view(*header).substr(0, header->find(';'))) : "";
   if (type != "application/json" && (alsoType.empty() || type != alsoType))
     throw ProtocolError(415, "",
-                        "expected Content-Type application/json" + (alsoType.empty() ? "" : " or " + std::string(alsoType)) +
-                            ", found " + (type.empty() ? "none" : std::string(type)));
+                        "expected Content-Type application/json" +
+                            (alsoType.empty() ? "" : " or " + std::string(alsoType)) + ", found " +
+                            (type.empty() ? "none" : std::string(type)));
   return protocol::parseJson(request.body, {config.maxBodyBytes, config.maxJsonDepth});
 }
 
@@ -123,8 +129,9 @@ std::uint32_t queryUnsigned(const net::Request& request, std::string_view name, 
   std::uint32_t value = 0;
   const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), value);
   if (error != std::errc() || end != text->data() + text->size())
-    throw ProtocolError(422, "", "query parameter " + std::string(name) +
-                                     ": expected a whole number from 0 to 4294967295, found \"" + *text + '"');
+    throw ProtocolError(422, "",
+                        "query parameter " + std::string(name) +
+                            ": expected a whole number from 0 to 4294967295, found \"" + *text + '"');
   return value;
 }
 
@@ -135,8 +142,9 @@ double queryNumber(const net::Request& request, std::string_view name) {
     const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), value);
     if (error == std::errc() && end == text->data() + text->size() && std::isfinite(value)) return value;
   }
-  throw ProtocolError(422, "", "query parameter " + std::string(name) + ": expected a number, found " +
-                                   (text ? '"' + *text + '"' : "none"));
+  throw ProtocolError(422, "",
+                      "query parameter " + std::string(name) + ": expected a number, found " +
+                          (text ? '"' + *text + '"' : "none"));
 }
 
 const ImageType* acceptedImageType(const std::string* accept) {
@@ -181,13 +189,13 @@ json openApi(const std::vector<Route>& routes) {
                         {"default",
                          {{"description", "What is wrong, with a pointer to the field (RFC 9457)"},
                           {"content", {{std::string(protocol::kProblemType), json::object()}}}}}}}};
-    if (!route.requestType.empty()) operation["requestBody"] = {{"content", {{route.requestType, json::object()}}}};
+    if (!route.requestType.empty())
+      operation["requestBody"] = {{"content", {{route.requestType, json::object()}}}};
     paths[route.path][method] = std::move(operation);
   }
   return {{"openapi", "3.1.0"},
           {"info", {{"title", "Scolopax"}, {"version", SCOLOPAX_VERSION}}},
-          {"components",
-           {{"securitySchemes", {{"token", {{"type", "http"}, {"scheme", "bearer"}}}}}}},
+          {"components", {{"securitySchemes", {{"token", {{"type", "http"}, {"scheme", "bearer"}}}}}}},
           {"security", json::array({{{"token", json::array()}}})},
           {"paths", std::move(paths)}};
 }
@@ -208,11 +216,13 @@ void addApi(net::Server& server, ApiContext& context) {
                      -> std::variant<net::WebSocketEvents, net::Response> {
     try {
       const std::string_view path = request.path;
-      if (path.size() <= kPrefix.size() + kSuffix.size() || !path.starts_with(kPrefix) || !path.ends_with(kSuffix))
+      if (path.size() <= kPrefix.size() + kSuffix.size() || !path.starts_with(kPrefix) ||
+          !path.ends_with(kSuffix))
         throw ProtocolError(404, "", "expected the stream of a session, found " + request.path);
       const auto id = path.substr(kPrefix.size(), path.size() - kPrefix.size() - kSuffix.size());
       const auto session = context.sessions.find(id);
-      if (!session) throw ProtocolError(404, "", "there is no session " + std::string(id) + "; it may have ended");
+      if (!session)
+        throw ProtocolError(404, "", "there is no session " + std::string(id) + "; it may have ended");
       return context.streams.join(session, socket);
     } catch (const ProtocolError& error) {
       return errorResponse(error);

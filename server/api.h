@@ -27,7 +27,7 @@ struct ApiContext {
   Metrics& metrics;
   MakeRenderer makeRenderer;
   Log log;
-  std::atomic<bool>& stopping;          ///< ends what waits or renders
+  std::atomic<bool>& stopping;  ///< ends what waits or renders
   std::function<nlohmann::json()> capabilities;
 };
 
@@ -60,7 +60,8 @@ nlohmann::json openApi(const std::vector<Route>& routes);
 /// Registers all routes and the stream's upgrade.
 void addApi(net::Server& server, ApiContext& context);
 
-// --- for the handlers ------------------------------------------------------------------------------------------
+// --- for the handlers
+// ------------------------------------------------------------------------------------------
 
 net::Response jsonResponse(int status, const nlohmann::json& body);
 net::Response errorResponse(const protocol::ProtocolError& error);

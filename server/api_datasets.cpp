@@ -18,28 +18,49 @@ std::vector<Route> datasetRoutes(ApiContext& context) {
   const std::vector<std::string> kJson{"application/json"};
 
   return {
-      {"GET", "/api/v1/datasets", "All data sets: dimensions, spacing, channels", {}, "", kJson, {},
+      {"GET",
+       "/api/v1/datasets",
+       "All data sets: dimensions, spacing, channels",
+       {},
+       "",
+       kJson,
+       {},
        [&context](const net::Request&) {
          json list = json::array();
          for (const auto& one : context.datasets.all()) list.push_back(describeJson(*one));
          return jsonResponse(200, {{"datasets", std::move(list)}});
        }},
-      {"GET", "/api/v1/datasets/{id}", "One data set", {id}, "", kJson, {},
+      {"GET",
+       "/api/v1/datasets/{id}",
+       "One data set",
+       {id},
+       "",
+       kJson,
+       {},
        [dataset](const net::Request& request) { return jsonResponse(200, describeJson(*dataset(request))); }},
-      {"GET", "/api/v1/datasets/{id}/histogram", "Histogram of one channel's values",
-       {id, {"channel", "query", "integer", "Index of the channel, from 0 (default)"}}, "", kJson, {},
+      {"GET",
+       "/api/v1/datasets/{id}/histogram",
+       "Histogram of one channel's values",
+       {id, {"channel", "query", "integer", "Index of the channel, from 0 (default)"}},
+       "",
+       kJson,
+       {},
        [dataset](const net::Request& request) {
          return jsonResponse(200, histogramJson(*dataset(request), queryUnsigned(request, "channel", 0)));
        }},
-      {"GET", "/api/v1/datasets/{id}/probe", "The channels' values at a point",
+      {"GET",
+       "/api/v1/datasets/{id}/probe",
+       "The channels' values at a point",
        {id,
         {"x", "query", "number", "World coordinate"},
         {"y", "query", "number", "World coordinate"},
         {"z", "query", "number", "World coordinate"}},
-       "", kJson, {},
+       "",
+       kJson,
+       {},
        [dataset](const net::Request& request) {
-         return jsonResponse(200, probeJson(*dataset(request), queryNumber(request, "x"), queryNumber(request, "y"),
-                                            queryNumber(request, "z")));
+         return jsonResponse(200, probeJson(*dataset(request), queryNumber(request, "x"),
+                                            queryNumber(request, "y"), queryNumber(request, "z")));
        }},
   };
 }

@@ -10,27 +10,60 @@ namespace scolopax::server {
 
 std::vector<Route> operationRoutes(ApiContext& context) {
   const std::vector<std::string> kJson{"application/json"}, kText{"text/plain; charset=utf-8"};
-  const auto text = [](std::string body) { return net::Response{200, "text/plain; charset=utf-8", std::move(body), {}}; };
+  const auto text = [](std::string body) {
+    return net::Response{200, "text/plain; charset=utf-8", std::move(body), {}};
+  };
   return {
-      {"GET", "/healthz", "Whether the process lives", {}, "", kText, {},
+      {"GET",
+       "/healthz",
+       "Whether the process lives",
+       {},
+       "",
+       kText,
+       {},
        [text](const net::Request&) { return text("ok\n"); }},
-      {"GET", "/readyz", "Whether it takes requests; 503 while it stops", {}, "", kText, {},
+      {"GET",
+       "/readyz",
+       "Whether it takes requests; 503 while it stops",
+       {},
+       "",
+       kText,
+       {},
        [text, &context](const net::Request&) {
          if (context.stopping) throw protocol::ProtocolError(503, "", "the server is stopping");
          return text("ready\n");
        }},
-      {"GET", "/metrics", "Counts and times in Prometheus' text format", {}, "", kText, {},
+      {"GET",
+       "/metrics",
+       "Counts and times in Prometheus' text format",
+       {},
+       "",
+       kText,
+       {},
        [&context](const net::Request&) {
          context.streams.countFrames();
          context.metrics.setSessions(context.sessions.all().size());
          context.metrics.setClients(context.streams.count());
          return net::Response{200, "text/plain; version=0.0.4; charset=utf-8", context.metrics.text(), {}};
        }},
-      {"GET", "/api/v1/capabilities", "Blend modes, methods, colour maps, formats, limits, backend", {}, "", kJson, {},
+      {"GET",
+       "/api/v1/capabilities",
+       "Blend modes, methods, colour maps, formats, limits, backend",
+       {},
+       "",
+       kJson,
+       {},
        [&context](const net::Request&) { return jsonResponse(200, context.capabilities()); }},
-      {"GET", "/api/v1/schema.json", "JSON Schema of the scene", {}, "", {"application/schema+json"}, {},
+      {"GET",
+       "/api/v1/schema.json",
+       "JSON Schema of the scene",
+       {},
+       "",
+       {"application/schema+json"},
+       {},
        [&context](const net::Request&) {
-         return net::Response{200, "application/schema+json", protocol::schemaText(context.renderResolver.lists()), {}};
+         return net::Response{
+             200, "application/schema+json", protocol::schemaText(context.renderResolver.lists()), {}};
        }},
   };
 }

@@ -17,7 +17,8 @@ class RenderPlace {
   RenderPlace(std::atomic<int>& running, int limit) : running_(running) {
     if (++running_ <= limit) return;
     --running_;
-    throw ProtocolError(503, "", "expected at most " + std::to_string(limit) + " renders at once, found another");
+    throw ProtocolError(503, "",
+                        "expected at most " + std::to_string(limit) + " renders at once, found another");
   }
   ~RenderPlace() { --running_; }
   RenderPlace(const RenderPlace&) = delete;
@@ -38,13 +39,16 @@ std::string sceneHash(const ResolvedScene& scene) {
 
 net::Response render(ApiContext& context, std::atomic<int>& running, const net::Request& request) {
   const ImageType* type = acceptedImageType(request.header("accept"));
-  if (!type) throw ProtocolError(406, "", "expected Accept to hold image/jpeg, image/png or image/x-exr, found " +
-                                              *request.header("accept"));
+  if (!type)
+    throw ProtocolError(
+        406, "",
+        "expected Accept to hold image/jpeg, image/png or image/x-exr, found " + *request.header("accept"));
   const double limit = context.config.maxRenderSeconds;
   const auto scene = context.renderResolver.replace(jsonBody(request, context.config));
   if (scene->stop.seconds > limit)
-    throw ProtocolError(422, "/stop/seconds", "expected at most " + std::to_string(limit) + ", found " +
-                                                  std::to_string(scene->stop.seconds));
+    throw ProtocolError(
+        422, "/stop/seconds",
+        "expected at most " + std::to_string(limit) + ", found " + std::to_string(scene->stop.seconds));
   const RenderPlace place(running, context.config.maxRenders);
 
   const auto begin = std::chrono::steady_clock::now();
@@ -56,15 +60,18 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
   while (!stopMet(scene->stop, *renderer, seconds())) {
     // A picture that depends on the machine's speed is only for those who asked for it.
     if (seconds() > limit)
-      throw ProtocolError(422, "/stop", "expected to end within " + std::to_string(limit) + " seconds, found " +
-                                            std::to_string(renderer->samples()) +
-                                            " samples done by then; ask for less, or set stop.seconds");
+      throw ProtocolError(422, "/stop",
+                          "expected to end within " + std::to_string(limit) + " seconds, found " +
+                              std::to_string(renderer->samples()) +
+                              " samples done by then; ask for less, or set stop.seconds");
     if (!renderer->renderSample(context.stopping)) throw ProtocolError(503, "", "the server is stopping");
   }
   const auto milliseconds = std::int64_t(seconds() * 1000);
   const std::string error = nlohmann::json(renderer->estimatedError()).dump();
-  net::Response response{200, std::string(type->mediaType),
-                         imageBytes(renderer->image(), scene->render.background, type->format), {}};
+  net::Response response{200,
+                         std::string(type->mediaType),
+                         imageBytes(renderer->image(), scene->render.background, type->format),
+                         {}};
   response.headers = {{"Scolopax-Samples", std::to_string(renderer->samples())},
                       {"Scolopax-Error", error},
                       {"Scolopax-Seed", std::to_string(scene->render.seed)},
@@ -81,8 +88,12 @@ std::vector<Route> renderRoutes(ApiContext& context) {
   std::vector<std::string> types;
   for (const ImageType& type : kImageTypes) types.emplace_back(type.mediaType);
   auto running = std::make_shared<std::atomic<int>>(0);
-  return {{"POST", "/api/v1/render", "A picture of a scene; the same scene gives the same bytes",
-           {{"Accept", "header", "string", "image/jpeg, image/png or image/x-exr"}}, "application/json", types,
+  return {{"POST",
+           "/api/v1/render",
+           "A picture of a scene; the same scene gives the same bytes",
+           {{"Accept", "header", "string", "image/jpeg, image/png or image/x-exr"}},
+           "application/json",
+           types,
            net::RouteKind::slow,
            [&context, running](const net::Request& request) { return render(context, *running, request); }}};
 }

@@ -85,8 +85,8 @@ net::Response frame(ApiContext& context, const net::Request& request) {
   const auto type = std::find_if(std::begin(kImageTypes), std::end(kImageTypes),
                                  [&](const ImageType& one) { return one.format == format; });
   if (type == std::end(kImageTypes))
-    throw ProtocolError(422, "", "query parameter format: expected jpeg, png or exr, found \"" +
-                                     std::string(format) + '"');
+    throw ProtocolError(
+        422, "", "query parameter format: expected jpeg, png or exr, found \"" + std::string(format) + '"');
   const FrameQuery query{queryUnsigned(request, "after", 0), queryUnsigned(request, "minSamples", 1)};
   const auto found = session->waitForFrame(query, context.config.pollTimeout);
   if (!found && context.stopping) throw ProtocolError(503, "", "the server is stopping");
@@ -114,34 +114,75 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
   for (const ImageType& type : kImageTypes) imageTypes.emplace_back(type.mediaType);
 
   return {
-      {"POST", "/api/v1/sessions", "Begins a session with the scene of the body's field scene, or the default's", {},
-       "application/json", kJson, {}, [&context](const net::Request& request) { return create(context, request); }},
-      {"GET", "/api/v1/sessions/{id}", "Revision, data set, viewers and latest frame of a session", {id}, "", kJson, {},
+      {"POST",
+       "/api/v1/sessions",
+       "Begins a session with the scene of the body's field scene, or the default's",
+       {},
+       "application/json",
+       kJson,
+       {},
+       [&context](const net::Request& request) { return create(context, request); }},
+      {"GET",
+       "/api/v1/sessions/{id}",
+       "Revision, data set, viewers and latest frame of a session",
+       {id},
+       "",
+       kJson,
+       {},
        [&context](const net::Request& request) { return describe(context, request); }},
-      {"DELETE", "/api/v1/sessions/{id}", "Ends a session and its streams", {id}, "", {}, {},
+      {"DELETE",
+       "/api/v1/sessions/{id}",
+       "Ends a session and its streams",
+       {id},
+       "",
+       {},
+       {},
        [&context](const net::Request& request) -> net::Response {
          context.sessions.remove(sessionOf(context, request)->id());
          return {204, "", "", {}};
        }},
-      {"GET", scenePath, "The scene with every value resolved, and its revision", {id}, "", kJson, {},
-       [&context](const net::Request& request) { return sceneResponse(sessionOf(context, request)->scene()); }},
-      {"PATCH", scenePath, "Edits the scene by a merge patch (RFC 7396); decimal keys patch elements of lists",
-       {id, ifMatch}, std::string(kMergePatch), kJson, {},
+      {"GET",
+       scenePath,
+       "The scene with every value resolved, and its revision",
+       {id},
+       "",
+       kJson,
+       {},
+       [&context](const net::Request& request) {
+         return sceneResponse(sessionOf(context, request)->scene());
+       }},
+      {"PATCH",
+       scenePath,
+       "Edits the scene by a merge patch (RFC 7396); decimal keys patch elements of lists",
+       {id, ifMatch},
+       std::string(kMergePatch),
+       kJson,
+       {},
        [&context](const net::Request& request) {
          const json patch = jsonBody(request, context.config, kMergePatch);
          return sceneResponse(sessionOf(context, request)->patch(patch, originOf(request)));
        }},
-      {"PUT", scenePath, "Replaces the scene", {id, ifMatch}, "application/json", kJson, {},
+      {"PUT",
+       scenePath,
+       "Replaces the scene",
+       {id, ifMatch},
+       "application/json",
+       kJson,
+       {},
        [&context](const net::Request& request) {
          const json scene = jsonBody(request, context.config);
          return sceneResponse(sessionOf(context, request)->replace(scene, originOf(request)));
        }},
-      {"GET", "/api/v1/sessions/{id}/frame", "Waits for a picture of the scene as it is now; 204 when none came in time",
+      {"GET",
+       "/api/v1/sessions/{id}/frame",
+       "Waits for a picture of the scene as it is now; 204 when none came in time",
        {id,
         {"after", "query", "integer", "Number of the last frame seen; a newer one is waited for"},
         {"minSamples", "query", "integer", "Samples per pixel that it has at least, unless it is final"},
         {"format", "query", "string", "jpeg (default), png or exr"}},
-       "", imageTypes, net::RouteKind::slow,
+       "",
+       imageTypes,
+       net::RouteKind::slow,
        [&context](const net::Request& request) { return frame(context, request); }},
   };
 }

@@ -45,7 +45,8 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
   json maps = json::array();
   for (const auto& entry : lists.colormaps) {
     json points = json::array();
-    for (const ColorKnot& knot : colormapKnots(entry.name)) points.push_back({knot.position, hexOf(knot.color)});
+    for (const ColorKnot& knot : colormapKnots(entry.name))
+      points.push_back({knot.position, hexOf(knot.color)});
     maps.push_back({{"name", entry.name}, {"doc", entry.doc}, {"points", std::move(points)}});
   }
   json formats = json::array();
@@ -105,13 +106,17 @@ struct Application::Impl {
         renderResolver(datasets, {config.renderSamples, config.maxPixels}),
         sessions(sessionResolver, {config.maxSessions, config.keepSession},
                  {now, [this] { renderThread.wake(); }, [this] { encodeThread.wake(); }}),
-        renderLoop(sessions, makeRenderer, {}, now, log, [this](const PassResult& pass) { metrics.passEnded(pass); }),
+        renderLoop(sessions, makeRenderer, {}, now, log,
+                   [this](const PassResult& pass) { metrics.passEnded(pass); }),
         encodeLoop(sessions, now, log),
         capabilities(capabilitiesJson(config, sessionResolver->lists())),
         streams(sessions, metrics,
                 {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities}),
-        context{config,       *datasets, renderResolver, sessions, streams, metrics,
-                makeRenderer, log,       stopping,       [this] { return capabilities; }},
+        context{config,         *datasets,
+                renderResolver, sessions,
+                streams,        metrics,
+                makeRenderer,   log,
+                stopping,       [this] { return capabilities; }},
         authorizer(config.token, isLoopback(config.host)) {
     net::Options options;
     options.host = config.host;
@@ -142,7 +147,8 @@ struct Application::Impl {
 
 Application::Application(Config config, std::vector<Dataset> datasets, MakeRenderer makeRenderer, Log log) {
   if (config.token.empty()) config.token = createToken();
-  impl_ = std::make_unique<Impl>(std::move(config), std::move(datasets), std::move(makeRenderer), std::move(log));
+  impl_ =
+      std::make_unique<Impl>(std::move(config), std::move(datasets), std::move(makeRenderer), std::move(log));
 }
 
 Application::~Application() { stop(); }
@@ -157,8 +163,8 @@ std::uint16_t Application::port() const { return impl_->server->port(); }
 
 std::string Application::url() const {
   const bool v6 = impl_->config.host.find(':') != std::string::npos;
-  return "http://" + (v6 ? "[" + impl_->config.host + "]" : impl_->config.host) + ":" + std::to_string(port()) +
-         "/?token=" + impl_->config.token;
+  return "http://" + (v6 ? "[" + impl_->config.host + "]" : impl_->config.host) + ":" +
+         std::to_string(port()) + "/?token=" + impl_->config.token;
 }
 
 void Application::stop() {

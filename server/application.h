@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The server as a whole: owns data sets, sessions, both loops and the network, and starts and stops them in order.
+// The server as a whole: owns data sets, sessions, both loops and the network, and starts and stops them in
+// order.
 #pragma once
 #include <cstdint>
 #include <memory>

@@ -51,7 +51,8 @@ DatasetStore::DatasetStore(std::vector<Dataset> datasets) {
 }
 
 std::shared_ptr<const Dataset> DatasetStore::find(std::string_view id) const {
-  const auto found = std::find_if(datasets_.begin(), datasets_.end(), [&](const auto& d) { return d->id == id; });
+  const auto found =
+      std::find_if(datasets_.begin(), datasets_.end(), [&](const auto& d) { return d->id == id; });
   return found == datasets_.end() ? nullptr : *found;
 }
 
@@ -67,8 +68,8 @@ std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesys
     const auto whole = std::filesystem::weakly_canonical(base / path);
     const auto relative = whole.lexically_relative(base);
     if (relative.empty() || *relative.begin() == "..")
-      throw Error(ErrorCode::badInput,
-                  path.string() + ": expected a file below --data-root " + base.string() + ", found " + whole.string());
+      throw Error(ErrorCode::badInput, path.string() + ": expected a file below --data-root " +
+                                           base.string() + ", found " + whole.string());
     below.push_back(whole);
   }
   return below;
@@ -76,9 +77,8 @@ std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesys
 
 json describeJson(const Dataset& dataset) {
   const Grid& grid = dataset.volume->grid();
-  json description = {{"id", dataset.id},
-                      {"title", dataset.title},
-                      {"dimensions", {grid.dims.x, grid.dims.y, grid.dims.z}}};
+  json description = {
+      {"id", dataset.id}, {"title", dataset.title}, {"dimensions", {grid.dims.x, grid.dims.y, grid.dims.z}}};
   description["spacing"] = list(grid.spacing());
   description["diagonal"] = grid.diagonal();
   json matrix = json::array();  // row by row, as it is written on paper; glm keeps columns
@@ -101,8 +101,8 @@ json histogramJson(const Dataset& dataset, int channel) {
   const auto channels = dataset.volume->channels();
   if (channel < 0 || std::size_t(channel) >= channels.size())
     throw protocol::ProtocolError(422, "/channel",
-                                  "expected a channel from 0 to " + std::to_string(channels.size() - 1) + ", found " +
-                                      std::to_string(channel));
+                                  "expected a channel from 0 to " + std::to_string(channels.size() - 1) +
+                                      ", found " + std::to_string(channel));
   const Histogram& histogram = channels[std::size_t(channel)].histogram;
   return {{"channel", channel},
           {"minimum", histogram.minimum},

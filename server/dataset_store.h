@@ -28,7 +28,8 @@ class DatasetStore {
   std::vector<std::shared_ptr<const Dataset>> datasets_;
 };
 
-/// The files to load: each path as it is, or, with a data root, below it. Throws Error when one leaves the root.
+/// The files to load: each path as it is, or, with a data root, below it. Throws Error when one leaves the
+/// root.
 std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesystem::path>& paths,
                                                   const std::filesystem::path& root);
 
@@ -36,8 +37,8 @@ std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesys
 nlohmann::json describeJson(const Dataset& dataset);
 /// 256 bins over the finite values. Throws ProtocolError(422) when there is no such channel.
 nlohmann::json histogramJson(const Dataset& dataset, int channel);
-/// Data values at a world point, trilinear between voxel centres as the renderer interpolates; a channel is null
-/// outside the box and where a corner is not finite.
+/// Data values at a world point, trilinear between voxel centres as the renderer interpolates; a channel is
+/// null outside the box and where a corner is not finite.
 nlohmann::json probeJson(const Dataset& dataset, double x, double y, double z);
 
 }  // namespace scolopax::server

@@ -33,16 +33,16 @@ std::vector<std::uint8_t> encodeJpeg(const Image8& image, int quality, ChromaSam
                                          std::to_string(image.width) + " x " + std::to_string(image.height) +
                                          " with " + std::to_string(image.rgb.size()) + " bytes");
   if (image.width > kMaxSide || image.height > kMaxSide)
-    throw Error(ErrorCode::tooLarge, "JPEG: at most 65500 pixels a side, found " + std::to_string(image.width) +
-                                         " x " + std::to_string(image.height));
+    throw Error(ErrorCode::tooLarge, "JPEG: at most 65500 pixels a side, found " +
+                                         std::to_string(image.width) + " x " + std::to_string(image.height));
   const int subsampling = sampling == ChromaSampling::full444 ? TJSAMP_444 : TJSAMP_420;
   std::vector<std::uint8_t> bytes(tjBufSize(image.width, image.height, subsampling));
   unsigned char* begin = bytes.data();
   auto size = static_cast<unsigned long>(bytes.size());
   const tjhandle handle = threadCompressor();
   // NOREALLOC: the buffer is the library's own upper bound, so it always fits and stays ours.
-  if (tjCompress2(handle, image.rgb.data(), image.width, 0, image.height, TJPF_RGB, &begin, &size, subsampling,
-                  quality, TJFLAG_NOREALLOC) != 0)
+  if (tjCompress2(handle, image.rgb.data(), image.width, 0, image.height, TJPF_RGB, &begin, &size,
+                  subsampling, quality, TJFLAG_NOREALLOC) != 0)
     throw Error(ErrorCode::io, std::string("JPEG encoder: ") + tjGetErrorStr2(handle));
   bytes.resize(size);
   return bytes;

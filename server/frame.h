@@ -22,7 +22,8 @@ struct FrameInfo {
   std::uint32_t revision = 0;  ///< of the scene it shows: one, never a mixture
   std::uint32_t samples = 0;   ///< per pixel
   float error = 0;             ///< estimated RMSE over linear premultiplied RGB; NaN below two samples
-  std::uint32_t rebuildUs = 0, renderUs = 0, encodeUs = 0;  ///< the last rebuild, the last pass, this encoding
+  std::uint32_t rebuildUs = 0, renderUs = 0,
+                encodeUs = 0;  ///< the last rebuild, the last pass, this encoding
   bool interactive = false;    ///< made while edits arrive: maybe smaller, more compressed
   bool final = false;          ///< the stop rule is met: nothing better follows at this revision
 };

@@ -19,8 +19,9 @@ constexpr int kBadUsage = 2;  // what was asked for is not clear
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Renders multi-channel volumes by multi-density Woodcock tracking, for the browser, scripts and files",
-               "scolopax"};
+  CLI::App app{
+      "Renders multi-channel volumes by multi-density Woodcock tracking, for the browser, scripts and files",
+      "scolopax"};
   app.set_version_flag("--version", SCOLOPAX_VERSION);
   app.require_subcommand(1);
   app.footer("scolopax COMMAND --help tells more. Start with: scolopax generate orbitals orbitals.nrrd");

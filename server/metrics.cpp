@@ -29,7 +29,8 @@ struct Metrics::Impl {
                                               .Help("HTTP responses by status")
                                               .Register(registry);
   Counter& sent = counter("scolopax_frames_sent_total", "Frames sent to streams");
-  Counter& replaced = counter("scolopax_frames_dropped_total", "Frames replaced by a newer one before they were sent");
+  Counter& replaced =
+      counter("scolopax_frames_dropped_total", "Frames replaced by a newer one before they were sent");
   Counter& samples = counter("scolopax_samples_total", "Samples rendered, over all pixels");
   Counter& passes = counter("scolopax_passes_total", "Sample passes that ended");
   Counter& cancelled = counter("scolopax_passes_cancelled_total", "Sample passes ended early by an edit");
@@ -64,6 +65,8 @@ void Metrics::framesSent(std::uint64_t sent, std::uint64_t replaced) {
 void Metrics::setSessions(std::size_t count) { impl_->sessions.Set(double(count)); }
 void Metrics::setClients(std::size_t count) { impl_->clients.Set(double(count)); }
 
-std::string Metrics::text() const { return prometheus::TextSerializer().Serialize(impl_->registry.Collect()); }
+std::string Metrics::text() const {
+  return prometheus::TextSerializer().Serialize(impl_->registry.Collect());
+}
 
 }  // namespace scolopax::server

@@ -14,7 +14,9 @@ namespace {
 
 constexpr int kDivisors[] = {1, 2, 3, 4, 6, 8, 12, 16};
 
-double secondsBetween(TimePoint from, TimePoint to) { return std::chrono::duration<double>(to - from).count(); }
+double secondsBetween(TimePoint from, TimePoint to) {
+  return std::chrono::duration<double>(to - from).count();
+}
 
 std::uint32_t microseconds(double seconds) { return std::uint32_t(std::clamp(seconds * 1e6, 0.0, 4e9)); }
 
@@ -34,13 +36,13 @@ int divisorForTarget(std::uint64_t pixels, double secondsPerPixel, double target
 
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
   const std::uint32_t samples = renderer.samples();
-  return samples > 0 && ((stop.samples > 0 && samples >= stop.samples) ||
-                         (stop.seconds > 0 && seconds >= stop.seconds) ||
-                         (stop.error > 0 && samples >= 2 && renderer.estimatedError() <= stop.error));
+  return samples > 0 &&
+         ((stop.samples > 0 && samples >= stop.samples) || (stop.seconds > 0 && seconds >= stop.seconds) ||
+          (stop.error > 0 && samples >= 2 && renderer.estimatedError() <= stop.error));
 }
 
-ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer, Options options,
-                                     Now now, Log log)
+ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer,
+                                     Options options, Now now, Log log)
     : session_(std::move(session)),
       makeRenderer_(std::move(makeRenderer)),
       options_(options),
@@ -85,8 +87,10 @@ std::optional<TimePoint> ProgressiveRender::dueAt() const {
 
 int ProgressiveRender::wantedDivisor(const RenderRequest& request) const {
   if (!request.interactive) return 1;
-  const auto pixels = std::uint64_t(request.scene->render.width) * std::uint64_t(request.scene->render.height);
-  return divisorForTarget(pixels, secondsPerPixel_, std::chrono::duration<double>(options_.frameTarget).count());
+  const auto pixels =
+      std::uint64_t(request.scene->render.width) * std::uint64_t(request.scene->render.height);
+  return divisorForTarget(pixels, secondsPerPixel_,
+                          std::chrono::duration<double>(options_.frameTarget).count());
 }
 
 void ProgressiveRender::takeScene(const RenderRequest& request, PassResult& result) {

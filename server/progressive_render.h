@@ -30,15 +30,16 @@ class ProgressiveRender {
     std::chrono::milliseconds interactiveInterval{33};  ///< between frames while edits arrive
     std::chrono::milliseconds stillInterval{500};       ///< between frames once samples are many
   };
-  ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer, Options options, Now now, Log log);
+  ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer, Options options, Now now,
+                    Log log);
 
   const std::shared_ptr<Session>& session() const { return session_; }
   /// Whether run() has something to do now.
   bool due() const;
   /// When due() may become true without being woken.
   std::optional<TimePoint> dueAt() const;
-  /// One sample pass at most, with the rebuild before it and the submission after it. Never throws: what cannot be
-  /// rendered is told to the session.
+  /// One sample pass at most, with the rebuild before it and the submission after it. Never throws: what
+  /// cannot be rendered is told to the session.
   PassResult run();
 
  private:
@@ -60,19 +61,20 @@ class ProgressiveRender {
   std::unique_ptr<Renderer> renderer_;
   std::shared_ptr<const ResolvedScene> scene_;  ///< that the film shows; null before the first
   std::uint32_t revision_ = 0;
-  int divisor_ = 1;                ///< of width and height
-  double filmSeconds_ = 0;         ///< spent on the film's samples
-  double secondsPerPixel_ = 0;     ///< of one sample, from earlier passes; 0 before the first
+  int divisor_ = 1;             ///< of width and height
+  double filmSeconds_ = 0;      ///< spent on the film's samples
+  double secondsPerPixel_ = 0;  ///< of one sample, from earlier passes; 0 before the first
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
 
-  FrameInfo shown_;                ///< the last frame handed in; revision 0 before the first
+  FrameInfo shown_;  ///< the last frame handed in; revision 0 before the first
   TimePoint shownAt_;
 };
 
 /// Whether rendering ends at what `renderer` has and the seconds it took.
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds);
 
-/// The smallest of 1, 2, 3, 4, 6, 8, ... by which width and height must be divided so that a pass fits the target.
+/// The smallest of 1, 2, 3, 4, 6, 8, ... by which width and height must be divided so that a pass fits the
+/// target.
 int divisorForTarget(std::uint64_t pixels, double secondsPerPixel, double targetSeconds);
 
 }  // namespace scolopax::server

@@ -16,8 +16,8 @@ void keepEarlier(std::optional<TimePoint>& a, const std::optional<TimePoint>& b)
 
 }  // namespace
 
-RenderLoop::RenderLoop(SessionStore& store, MakeRenderer makeRenderer, ProgressiveRender::Options options, Now now,
-                       Log log, OnPass onPass)
+RenderLoop::RenderLoop(SessionStore& store, MakeRenderer makeRenderer, ProgressiveRender::Options options,
+                       Now now, Log log, OnPass onPass)
     : store_(store),
       makeRenderer_(std::move(makeRenderer)),
       options_(options),
@@ -28,7 +28,8 @@ RenderLoop::RenderLoop(SessionStore& store, MakeRenderer makeRenderer, Progressi
 void RenderLoop::followStore() {
   const auto sessions = store_.all();
   const auto known = [&](const std::shared_ptr<Session>& session) {
-    return std::any_of(renders_.begin(), renders_.end(), [&](const auto& r) { return r->session() == session; });
+    return std::any_of(renders_.begin(), renders_.end(),
+                       [&](const auto& r) { return r->session() == session; });
   };
   std::erase_if(renders_, [&](const auto& render) {
     return std::find(sessions.begin(), sessions.end(), render->session()) == sessions.end();

@@ -15,8 +15,8 @@ namespace scolopax::server {
 class RenderLoop {
  public:
   using OnPass = std::function<void(const PassResult&)>;
-  RenderLoop(SessionStore& store, MakeRenderer makeRenderer, ProgressiveRender::Options options, Now now, Log log,
-             OnPass onPass);
+  RenderLoop(SessionStore& store, MakeRenderer makeRenderer, ProgressiveRender::Options options, Now now,
+             Log log, OnPass onPass);
   /// One pass of the next session that has work; none starves another.
   std::optional<TimePoint> step();
 
@@ -34,7 +34,8 @@ class RenderLoop {
 
 class EncodeLoop {
  public:
-  EncodeLoop(SessionStore& store, Now now, Log log) : store_(store), now_(std::move(now)), log_(std::move(log)) {}
+  EncodeLoop(SessionStore& store, Now now, Log log)
+      : store_(store), now_(std::move(now)), log_(std::move(log)) {}
   /// Encodes every picture that waits, one a session, and hands out the frames that are due.
   std::optional<TimePoint> step();
 

@@ -32,7 +32,8 @@ std::vector<protocol::EnumEntry> entries(std::span<const NamedValue> values) {
 /// The value of that wire name; parseScene has made sure that there is one.
 template <class Enum, std::size_t N>
 Enum valueOf(const NamedValue (&list)[N], std::string_view name) {
-  return Enum(std::find_if(list, list + N, [&](const NamedValue& value) { return value.name == name; }) - list);
+  return Enum(std::find_if(list, list + N, [&](const NamedValue& value) { return value.name == name; }) -
+              list);
 }
 
 glm::dvec3 vectorOf(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
@@ -96,7 +97,8 @@ void resolveCamera(protocol::Scene& scene, Scene& render, const Grid& grid) {
   if (!wire.eye) wire.eye = arrayOf(framing.eye);
   if (!wire.target) wire.target = arrayOf(framing.target);
   if (!wire.up) wire.up = arrayOf(framing.up);
-  render.camera = {vectorOf(*wire.eye), vectorOf(*wire.target), vectorOf(*wire.up), wire.fovY, wire.orthoHeight};
+  render.camera = {vectorOf(*wire.eye), vectorOf(*wire.target), vectorOf(*wire.up), wire.fovY,
+                   wire.orthoHeight};
   try {
     makeCameraRays(render.camera, grid, 1, 1);
   } catch (const Error& error) {
@@ -144,7 +146,8 @@ std::shared_ptr<const ResolvedScene> SceneResolver::replace(const json& scene) c
   return resolve(protocol::applyPatch(json::object(), scene, count));
 }
 
-std::shared_ptr<const ResolvedScene> SceneResolver::patch(const ResolvedScene& base, const json& patch) const {
+std::shared_ptr<const ResolvedScene> SceneResolver::patch(const ResolvedScene& base,
+                                                          const json& patch) const {
   const bool namesDataset = patch.is_object() && patch.contains("dataset");
   const auto count = datasetOf(namesDataset ? patch : base.sparse)->volume->channels().size();
   return resolve(protocol::applyPatch(base.sparse, patch, count));
@@ -157,9 +160,9 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
   const Volume& volume = *result->dataset->volume;
   protocol::checkChannelCount(scene, volume.channels().size());
   if (std::uint64_t(scene.image.width) * scene.image.height > options_.maxPixels)
-    throw ProtocolError(422, "/image", "expected at most " + std::to_string(options_.maxPixels) + " pixels, found " +
-                                           std::to_string(scene.image.width) + " x " +
-                                           std::to_string(scene.image.height));
+    throw ProtocolError(422, "/image",
+                        "expected at most " + std::to_string(options_.maxPixels) + " pixels, found " +
+                            std::to_string(scene.image.width) + " x " + std::to_string(scene.image.height));
   Scene& render = result->render;
   scene.dataset = result->dataset->id;
   resolveChannels(scene, render, volume);
@@ -173,8 +176,10 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
   render.height = int(scene.image.height);
   render.background = glm::vec3(linearOf(scene.image.background));
   render.filter = valueOf<PixelFilter>(kPixelFilters, scene.image.filter);
-  if (!scene.stop.samples && !scene.stop.seconds && !scene.stop.error) scene.stop.samples = options_.defaultSamples;
-  result->stop = {scene.stop.samples.value_or(0), scene.stop.seconds.value_or(0), scene.stop.error.value_or(0)};
+  if (!scene.stop.samples && !scene.stop.seconds && !scene.stop.error)
+    scene.stop.samples = options_.defaultSamples;
+  result->stop = {scene.stop.samples.value_or(0), scene.stop.seconds.value_or(0),
+                  scene.stop.error.value_or(0)};
   result->resolved = protocol::toJson(scene);
   result->picture = pictureOf(result->resolved);
   result->sparse = std::move(sparse);

@@ -36,8 +36,8 @@ protocol::Lists rendererLists();
 class SceneResolver {
  public:
   struct Options {
-    std::uint32_t defaultSamples = 64;        ///< when the scene has no stop rule
-    std::uint64_t maxPixels = 16'777'216;     ///< width x height
+    std::uint32_t defaultSamples = 64;     ///< when the scene has no stop rule
+    std::uint64_t maxPixels = 16'777'216;  ///< width x height
   };
   SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options);
 

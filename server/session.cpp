@@ -10,8 +10,8 @@
 namespace scolopax::server {
 namespace {
 
-// A viewer that gets no frames keeps at most so many of its patches' ids; beyond, the oldest are forgotten, which
-// only makes the header's patch id lag.
+// A viewer that gets no frames keeps at most so many of its patches' ids; beyond, the oldest are forgotten,
+// which only makes the header's patch id lag.
 constexpr std::size_t kMaxPendingPatches = 1024;
 
 }  // namespace
@@ -118,8 +118,9 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
            !frame_->info.interactive && (frame_->info.samples >= query.minSamples || frame_->info.final);
   };
   if (pollSamples_.size() >= kMaxPolls)
-    throw protocol::ProtocolError(429, "", "expected at most " + std::to_string(kMaxPolls) +
-                                               " requests to wait for a session's frames, found another");
+    throw protocol::ProtocolError(429, "",
+                                  "expected at most " + std::to_string(kMaxPolls) +
+                                      " requests to wait for a session's frames, found another");
   const auto poll = pollSamples_.insert(query.minSamples);
   hooks_.wakeRender();
   frameCame_.wait_until(lock, deadline, [&] { return closed_ || fits() || failedRevision_ == revision_; });
@@ -161,7 +162,8 @@ RenderRequest Session::requestLocked() const {
   request.scene = scene_;
   request.revision = revision_;
   request.pollSamples.assign(pollSamples_.begin(), pollSamples_.end());
-  const bool seen = std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.visible; });
+  const bool seen =
+      std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.visible; });
   request.wanted = !closed_ && failedRevision_ != revision_ && (seen || !pollSamples_.empty());
   if (seen && lastEdit_) {
     request.interactiveEnd = *lastEdit_ + kInteractiveTime;
@@ -174,8 +176,8 @@ RenderRequest Session::startPass() {
   const std::lock_guard lock(mutex_);
   cancel_ = closed_;
   RenderRequest request = requestLocked();
-  // A small pass is let through, and so is one that follows a cancelled one: however fast edits come, pictures
-  // are shown between them.
+  // A small pass is let through, and so is one that follows a cancelled one: however fast edits come,
+  // pictures are shown between them.
   cancellable_ = !request.interactive && !lastPassCancelled_;
   return request;
 }

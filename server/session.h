@@ -3,14 +3,16 @@
 // thread takes the newest scene and hands in pictures, the encoder thread hands the frames out.
 //
 // Threads and locks:
-//  1. Network threads edit, read, poll, join and leave; ONE render thread and ONE encoder thread serve all sessions.
+//  1. Network threads edit, read, poll, join and leave; ONE render thread and ONE encoder thread serve all
+//  sessions.
 //  2. All that they share is in Session, behind its one mutex; each public function locks it once.
 //  3. The mutex is never held while rendering or encoding: both work on snapshots (shared_ptr to const).
 //  4. The renderer and its film belong to the render thread alone (ProgressiveRender); no lock guards them.
 //  5. Only the encoder thread offers frames to viewers, so an older frame can never replace a newer one.
 //  6. Viewers are called with the mutex held, so that they see edits in order: a ViewerSink only queues, it
 //     neither blocks nor calls back.
-//  7. An edit raises cancel() under the mutex; startPass() lowers it under the mutex while it takes the scene,
+//  7. An edit raises cancel() under the mutex; startPass() lowers it under the mutex while it takes the
+//  scene,
 //     so no edit is lost between the two.
 //  8. Waking a loop takes the loop's own, innermost mutex. The store's mutex is never held with a session's.
 #pragma once
@@ -28,7 +30,8 @@
 
 namespace scolopax::server {
 
-/// A client that sees the session's pictures. Calls queue and return; they come with the session's mutex held.
+/// A client that sees the session's pictures. Calls queue and return; they come with the session's mutex
+/// held.
 class ViewerSink {
  public:
   virtual ~ViewerSink() = default;
@@ -47,8 +50,8 @@ using ViewerId = std::uint64_t;  ///< 0: nobody
 /// Who edits, and on which condition.
 struct EditOrigin {
   ViewerId viewer = 0;
-  std::uint32_t patchId = 0;                  ///< the viewer's own number for the edit
-  std::optional<std::uint32_t> ifRevision;    ///< throws 409 when the scene is at another revision
+  std::uint32_t patchId = 0;                ///< the viewer's own number for the edit
+  std::optional<std::uint32_t> ifRevision;  ///< throws 409 when the scene is at another revision
 };
 
 /// What a script waits for.
@@ -61,9 +64,9 @@ struct FrameQuery {
 struct RenderRequest {
   std::shared_ptr<const ResolvedScene> scene;
   std::uint32_t revision = 0;
-  bool wanted = false;        ///< somebody looks on or waits, and the scene can be rendered
-  bool interactive = false;   ///< edits arrive
-  TimePoint interactiveEnd;   ///< when that ends, if no edit comes
+  bool wanted = false;                     ///< somebody looks on or waits, and the scene can be rendered
+  bool interactive = false;                ///< edits arrive
+  TimePoint interactiveEnd;                ///< when that ends, if no edit comes
   std::vector<std::uint32_t> pollSamples;  ///< sample counts that scripts wait for
 };
 
@@ -88,7 +91,8 @@ class Session {
   const std::string& id() const { return id_; }
   const std::string& token() const { return token_; }  ///< secret: whoever has it may resume
 
-  // --- network threads ---------------------------------------------------------------------------------------
+  // --- network threads
+  // ---------------------------------------------------------------------------------------
   struct SceneState {
     std::shared_ptr<const ResolvedScene> scene;
     std::uint32_t revision;
@@ -106,17 +110,19 @@ class Session {
   void setView(ViewerId id, bool visible, double maxFps);
   std::size_t viewerCount() const;
 
-  /// Waits for a full-resolution frame of the scene as it is now or newer; nullptr when none came in time or the
-  /// session was closed. Throws ProtocolError: 422 when the scene cannot be rendered, 429 when too many
+  /// Waits for a full-resolution frame of the scene as it is now or newer; nullptr when none came in time or
+  /// the session was closed. Throws ProtocolError: 422 when the scene cannot be rendered, 429 when too many
   /// wait already.
-  std::shared_ptr<const EncodedFrame> waitForFrame(const FrameQuery& query, std::chrono::milliseconds timeout);
+  std::shared_ptr<const EncodedFrame> waitForFrame(const FrameQuery& query,
+                                                   std::chrono::milliseconds timeout);
   std::shared_ptr<const EncodedFrame> latestFrame() const;
   /// Ends waiting and viewing; nothing is rendered any more.
   void close(const std::string& reason);
   /// When somebody last looked, edited or asked; now while there is a viewer or a waiting script.
   TimePoint lastUsed() const;
 
-  // --- render thread -----------------------------------------------------------------------------------------
+  // --- render thread
+  // -----------------------------------------------------------------------------------------
   RenderRequest request() const;
   /// The same, and lowers cancel() for the pass that follows.
   RenderRequest startPass();
@@ -128,7 +134,8 @@ class Session {
   /// Nothing is rendered until the next edit.
   void fail(std::uint32_t revision, const std::string& message);
 
-  // --- encoder thread ----------------------------------------------------------------------------------------
+  // --- encoder thread
+  // ----------------------------------------------------------------------------------------
   std::optional<RenderedFrame> takeRendered();
   void publish(EncodedFrame frame);
   /// Offers the latest frame to every viewer that has not had it and may have it now; returns when the next
@@ -174,7 +181,7 @@ class Session {
   std::uint32_t frameNumber_ = 0;
 
   std::atomic<bool> cancel_{false};
-  bool cancellable_ = false;        ///< of the running pass
+  bool cancellable_ = false;  ///< of the running pass
   bool lastPassCancelled_ = false;
 };
 

@@ -13,19 +13,22 @@ SessionStore::SessionStore(std::shared_ptr<const SceneResolver> resolver, Option
     : resolver_(std::move(resolver)), options_(options), hooks_(std::move(hooks)) {}
 
 std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene) {
-  auto session = std::make_shared<Session>(createToken(), createToken(), resolver_, resolver_->replace(scene), hooks_);
+  auto session =
+      std::make_shared<Session>(createToken(), createToken(), resolver_, resolver_->replace(scene), hooks_);
   expire();
   const std::lock_guard lock(mutex_);
   if (sessions_.size() >= options_.maxSessions)
-    throw protocol::ProtocolError(503, "", "there are " + std::to_string(sessions_.size()) +
-                                               " sessions, as many as this server allows");
+    throw protocol::ProtocolError(
+        503, "",
+        "there are " + std::to_string(sessions_.size()) + " sessions, as many as this server allows");
   sessions_.push_back(session);
   return session;
 }
 
 std::shared_ptr<Session> SessionStore::find(std::string_view id) const {
   const std::lock_guard lock(mutex_);
-  const auto found = std::find_if(sessions_.begin(), sessions_.end(), [&](const auto& s) { return s->id() == id; });
+  const auto found =
+      std::find_if(sessions_.begin(), sessions_.end(), [&](const auto& s) { return s->id() == id; });
   return found == sessions_.end() ? nullptr : *found;
 }
 
@@ -40,7 +43,8 @@ bool SessionStore::remove(std::string_view id) {
   std::shared_ptr<Session> session;
   {
     const std::lock_guard lock(mutex_);
-    const auto found = std::find_if(sessions_.begin(), sessions_.end(), [&](const auto& s) { return s->id() == id; });
+    const auto found =
+        std::find_if(sessions_.begin(), sessions_.end(), [&](const auto& s) { return s->id() == id; });
     if (found == sessions_.end()) return false;
     session = *found;
     sessions_.erase(found);

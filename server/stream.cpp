@@ -36,7 +36,8 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
 
   void receive(const std::string& text) {
     try {
-      std::visit([this](const auto& message) { handle(message); }, protocol::parseClientMessage(text, limits_));
+      std::visit([this](const auto& message) { handle(message); },
+                 protocol::parseClientMessage(text, limits_));
     } catch (const ProtocolError& error) {
       sendText(protocol::errorText(error));
     }
@@ -138,8 +139,9 @@ net::WebSocketEvents StreamHub::join(const std::shared_ptr<Session>& session,
   {
     const std::lock_guard lock(mutex_);
     if (streams_.size() >= options_.maxClients)
-      throw ProtocolError(503, "", "there are " + std::to_string(streams_.size()) +
-                                       " streams, as many as this server allows");
+      throw ProtocolError(
+          503, "",
+          "there are " + std::to_string(streams_.size()) + " streams, as many as this server allows");
     streams_.push_back(stream);
   }
   try {

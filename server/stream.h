@@ -27,9 +27,10 @@ class StreamHub {
   StreamHub(SessionStore& store, Metrics& metrics, Options options);
   ~StreamHub();
 
-  /// Joins the socket to the session as a viewer and returns what its events do. Throws ProtocolError(503) when
-  /// there are as many streams as there may be.
-  net::WebSocketEvents join(const std::shared_ptr<Session>& session, const std::shared_ptr<net::WebSocket>& socket);
+  /// Joins the socket to the session as a viewer and returns what its events do. Throws ProtocolError(503)
+  /// when there are as many streams as there may be.
+  net::WebSocketEvents join(const std::shared_ptr<Session>& session,
+                            const std::shared_ptr<net::WebSocket>& socket);
   /// Brings the frame counts of the open streams into the metrics.
   void countFrames();
   std::size_t count() const;

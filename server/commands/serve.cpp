@@ -72,9 +72,11 @@ void waitForSignal() {
 void serve(ServeOptions options) {
   if (options.paths.empty())
     throw CLI::ValidationError(
-        "serve", "expected at least one volume file. For a first picture: scolopax generate orbitals orbitals.nrrd, "
-                 "then scolopax serve orbitals.nrrd");
-  const auto log = std::make_shared<spdlog::logger>("scolopax", std::make_shared<spdlog::sinks::stderr_sink_mt>());
+        "serve",
+        "expected at least one volume file. For a first picture: scolopax generate orbitals orbitals.nrrd, "
+        "then scolopax serve orbitals.nrrd");
+  const auto log =
+      std::make_shared<spdlog::logger>("scolopax", std::make_shared<spdlog::sinks::stderr_sink_mt>());
   log->set_level(spdlog::level::from_str(options.logLevel));
   log->flush_on(spdlog::level::info);
   const auto warn = [log](const std::string& line) { log->warn(line); };
@@ -83,7 +85,8 @@ void serve(ServeOptions options) {
   options.config.keepSession = std::chrono::milliseconds((long long)(options.keepSeconds * 1000));
   options.config.webRoot = findWebRoot();
   if (!isLoopback(options.config.host))
-    log->warn("{} can be reached from other machines, and what is sent is not encrypted", options.config.host);
+    log->warn("{} can be reached from other machines, and what is sent is not encrypted",
+              options.config.host);
 
   auto datasets = io::loadDatasets(server::pathsBelowRoot(options.paths, options.dataRoot),
                                    io::defaultMemoryLimitBytes(), warn);
@@ -95,7 +98,8 @@ void serve(ServeOptions options) {
   const int threads = options.config.threads;
   server::Application application(
       options.config, std::move(datasets),
-      [threads](std::shared_ptr<const Volume> volume) { return makeCpuRenderer(std::move(volume), threads); }, warn);
+      [threads](std::shared_ptr<const Volume> volume) { return makeCpuRenderer(std::move(volume), threads); },
+      warn);
   catchSignals();
   application.start();
   std::printf("Scolopax is ready: %s\n", application.url().c_str());
@@ -110,7 +114,8 @@ void serve(ServeOptions options) {
 CLI::App* addServeCommand(CLI::App& root) {
   auto options = std::make_shared<ServeOptions>();
   server::Config& config = options->config;
-  CLI::App* command = root.add_subcommand("serve", "Serves volumes to browsers and scripts until it is told to stop");
+  CLI::App* command =
+      root.add_subcommand("serve", "Serves volumes to browsers and scripts until it is told to stop");
   const auto add = [command](const std::string& name, auto& value, const std::string& doc) {
     std::string variable = "SCOLOPAX_";
     for (const char c : name) variable += c == '-' ? '_' : char(std::toupper(static_cast<unsigned char>(c)));
@@ -119,12 +124,16 @@ CLI::App* addServeCommand(CLI::App& root) {
 
   command->add_option("PATH", options->paths,
                       "Volume files. Files of one grid become the channels of one data set");
-  add("host", config.host, "Address to listen on; 0.0.0.0 is every one of this machine")->type_name("ADDRESS");
+  add("host", config.host, "Address to listen on; 0.0.0.0 is every one of this machine")
+      ->type_name("ADDRESS");
   add("port", config.port, "Port to listen on; 0 takes any free one")->type_name("PORT");
-  add("token-file", options->tokenFile, "File with the token that opens the server; without it, a new one each start")
+  add("token-file", options->tokenFile,
+      "File with the token that opens the server; without it, a new one each start")
       ->type_name("FILE");
   add("data-root", options->dataRoot, "Folder that every PATH is below and relative to")->type_name("FOLDER");
-  add("threads", config.threads, "Threads that render; 0 is all there are")->check(CLI::Range(0, 1024))->type_name("N");
+  add("threads", config.threads, "Threads that render; 0 is all there are")
+      ->check(CLI::Range(0, 1024))
+      ->type_name("N");
   add("log-level", options->logLevel, "What goes to standard error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "critical", "off"}));
   add("allow-origin", config.allowedOrigins, "Another site whose pages may use this server; may be repeated")
@@ -137,11 +146,13 @@ CLI::App* addServeCommand(CLI::App& root) {
   limit("max-sessions", config.maxSessions, "Sessions at once")->check(CLI::PositiveNumber);
   limit("max-clients", config.maxClients, "Streams at once")->check(CLI::PositiveNumber);
   limit("max-image", config.maxPixels, "Pixels of one picture")->check(CLI::PositiveNumber);
-  limit("max-render-seconds", config.maxRenderSeconds, "Seconds of one POST /render")->check(CLI::PositiveNumber);
+  limit("max-render-seconds", config.maxRenderSeconds, "Seconds of one POST /render")
+      ->check(CLI::PositiveNumber);
   limit("max-renders", config.maxRenders, "POST /render at once")->check(CLI::PositiveNumber);
   limit("max-body", config.maxBodyBytes, "Bytes of one request's body")->check(CLI::PositiveNumber);
   limit("max-message", config.maxMessageBytes, "Bytes of one WebSocket message")->check(CLI::PositiveNumber);
-  limit("max-json-depth", config.maxJsonDepth, "Lists and objects within each other")->check(CLI::PositiveNumber);
+  limit("max-json-depth", config.maxJsonDepth, "Lists and objects within each other")
+      ->check(CLI::PositiveNumber);
   limit("keep-session", options->keepSeconds, "Seconds that a session outlives its last client")
       ->check(CLI::NonNegativeNumber);
 
@@ -149,7 +160,8 @@ CLI::App* addServeCommand(CLI::App& root) {
       ->envname("SCOLOPAX_CONFIG")
       ->type_name("FILE");
   command->footer(
-      "Each option can also be set in the environment (--max-body as SCOLOPAX_MAX_BODY) or in the file of --config;\n"
+      "Each option can also be set in the environment (--max-body as SCOLOPAX_MAX_BODY) or in the file of "
+      "--config;\n"
       "the command line wins over the environment, the environment over the file.\n"
       "The ready line on standard output holds the address with the token that opens the page.\n"
       "SIGTERM and Ctrl-C end the server in order.");

@@ -28,11 +28,20 @@ struct Api {
   SceneResolver resolver{datasets, {64, 1000}};
   StreamHub streams{workshop.store, metrics, {}};
   std::atomic<bool> stopping{false};
-  ApiContext context{config, *datasets, resolver, workshop.store, streams, metrics,
+  ApiContext context{config,
+                     *datasets,
+                     resolver,
+                     workshop.store,
+                     streams,
+                     metrics,
                      [this](const std::shared_ptr<const Volume>&) {
                        return std::make_unique<FakeRenderer>(workshop.control);
                      },
-                     [](const std::string&) {}, stopping, [] { return json{{"backend", "fake"}}; }};
+                     [](const std::string&) {},
+                     stopping,
+                     [] {
+                       return json{{"backend", "fake"}};
+                     }};
   std::vector<Route> routes;
 
   Api() {
@@ -89,7 +98,8 @@ TEST(Api, ListsAndDescribesDatasets) {
   ASSERT_EQ(list["datasets"].size(), 2u);
   EXPECT_EQ(json::parse(api.call("GET", "/api/v1/datasets/other").body), list["datasets"][1]);
   EXPECT_EQ(api.errorOf("GET", "/api/v1/datasets/none").first, 404);
-  EXPECT_EQ(json::parse(api.call("GET", "/api/v1/datasets/small/histogram?channel=1").body)["maximum"], 230.0);
+  EXPECT_EQ(json::parse(api.call("GET", "/api/v1/datasets/small/histogram?channel=1").body)["maximum"],
+            230.0);
   EXPECT_EQ(api.errorOf("GET", "/api/v1/datasets/small/histogram?channel=2").first, 422);
   EXPECT_EQ(api.errorOf("GET", "/api/v1/datasets/small/histogram?channel=x").first, 422);
   EXPECT_EQ(json::parse(api.call("GET", "/api/v1/datasets/small/probe?x=1&y=0&z=0").body)["values"][0], 1.0);
@@ -125,8 +135,10 @@ TEST(Api, GivesTheSameBytesForTheSameRender) {
 
 TEST(Api, HoldsARenderToTheLimits) {
   Api api;
-  EXPECT_EQ(api.errorOf("POST", "/api/v1/render", R"({"image": {"width": 50, "height": 21}})"), Expected(422, "/image"));
-  EXPECT_EQ(api.errorOf("POST", "/api/v1/render", R"({"stop": {"seconds": 61}, "image": {"width": 9, "height": 9}})"),
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/render", R"({"image": {"width": 50, "height": 21}})"),
+            Expected(422, "/image"));
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/render",
+                        R"({"stop": {"seconds": 61}, "image": {"width": 9, "height": 9}})"),
             Expected(422, "/stop/seconds"));
   EXPECT_EQ(api.errorOf("POST", "/api/v1/render", R"({"channels": [{}, {"density": "thick"}]})"),
             Expected(422, "/channels/1/density"));
@@ -168,17 +180,22 @@ TEST(Api, EditsASessionsScene) {
   EXPECT_EQ(session["scene"]["integrator"]["seed"], 3);
 
   const json patched = json::parse(api.call("PATCH", path + "/scene", R"({"integrator": {"seed": 4}})",
-                                            {{"Content-Type", "application/merge-patch+json"}}).body);
+                                            {{"Content-Type", "application/merge-patch+json"}})
+                                       .body);
   EXPECT_EQ(patched["revision"], 2);
   EXPECT_EQ(patched["scene"]["integrator"]["seed"], 4);
   EXPECT_EQ(api.errorOf("PATCH", path + "/scene", R"({"integrator": {"sede": 4}})"),
             Expected(422, "/integrator/sede"));
-  EXPECT_EQ(api.errorOf("PATCH", path + "/scene", "{}", {{"Content-Type", "application/json"}, {"If-Match", "\"1\""}}),
+  EXPECT_EQ(api.errorOf("PATCH", path + "/scene", "{}",
+                        {{"Content-Type", "application/json"}, {"If-Match", "\"1\""}}),
             Expected(409, ""));
-  EXPECT_EQ(api.errorOf("PATCH", path + "/scene", "{}", {{"Content-Type", "application/json"}, {"If-Match", "x"}}).first,
-            400);
-  const json put = json::parse(api.call("PUT", path + "/scene", "{}",
-                                        {{"Content-Type", "application/json"}, {"If-Match", "\"2\""}}).body);
+  EXPECT_EQ(
+      api.errorOf("PATCH", path + "/scene", "{}", {{"Content-Type", "application/json"}, {"If-Match", "x"}})
+          .first,
+      400);
+  const json put = json::parse(
+      api.call("PUT", path + "/scene", "{}", {{"Content-Type", "application/json"}, {"If-Match", "\"2\""}})
+          .body);
   EXPECT_EQ(put["revision"], 3);
   EXPECT_EQ(put["scene"]["integrator"]["seed"], 0);
   EXPECT_EQ(json::parse(api.call("GET", path + "/scene").body), put);
@@ -268,8 +285,9 @@ TEST(Api, CountsInTheMetrics) {
   pass.renderSeconds = 0.5;
   api.metrics.passEnded(pass);
   const std::string text = api.call("GET", "/metrics").body;
-  for (const char* line : {"scolopax_http_requests_total{status=\"404\"} 2", "scolopax_sessions 1",
-                           "scolopax_samples_total 100", "scolopax_render_seconds_total 0.5", "scolopax_clients 0"})
+  for (const char* line :
+       {"scolopax_http_requests_total{status=\"404\"} 2", "scolopax_sessions 1", "scolopax_samples_total 100",
+        "scolopax_render_seconds_total 0.5", "scolopax_clients 0"})
     EXPECT_NE(text.find(line), std::string::npos) << line << " in\n" << text;
 }
 

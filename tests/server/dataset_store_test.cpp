@@ -94,7 +94,8 @@ TEST(DatasetStore, KeepsPathsBelowTheRoot) {
   std::filesystem::create_directories(root / "inside");
   std::ofstream(root / "inside" / "a.nrrd") << "x";
   std::filesystem::create_symlink("/etc", root / "link");
-  EXPECT_EQ(pathsBelowRoot({"inside/a.nrrd"}, root).front(), std::filesystem::canonical(root) / "inside/a.nrrd");
+  EXPECT_EQ(pathsBelowRoot({"inside/a.nrrd"}, root).front(),
+            std::filesystem::canonical(root) / "inside/a.nrrd");
   EXPECT_THROW(pathsBelowRoot({"../a.nrrd"}, root), Error);
   EXPECT_THROW(pathsBelowRoot({"/etc/passwd"}, root), Error);
   EXPECT_THROW(pathsBelowRoot({"link/passwd"}, root), Error);

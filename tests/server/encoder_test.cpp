@@ -17,7 +17,8 @@ struct StartOfFrame {
 StartOfFrame startOfFrame(const std::vector<std::uint8_t>& jpeg) {
   for (std::size_t at = 2; at + 12 < jpeg.size();) {
     if (jpeg[at + 1] == 0xC0)
-      return {jpeg[at + 7] * 256 + jpeg[at + 8], jpeg[at + 5] * 256 + jpeg[at + 6], jpeg[at + 9], jpeg[at + 11]};
+      return {jpeg[at + 7] * 256 + jpeg[at + 8], jpeg[at + 5] * 256 + jpeg[at + 6], jpeg[at + 9],
+              jpeg[at + 11]};
     at += 2 + std::size_t(jpeg[at + 2]) * 256 + jpeg[at + 3];
   }
   return {};

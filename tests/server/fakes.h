@@ -21,7 +21,8 @@ class FakeClock {
  public:
   void advance(std::chrono::microseconds by) { microseconds_ += by.count(); }
   Now now() {
-    return [this] { return TimePoint(std::chrono::seconds(1000) + std::chrono::microseconds(microseconds_)); };
+    return
+        [this] { return TimePoint(std::chrono::seconds(1000) + std::chrono::microseconds(microseconds_)); };
   }
 
  private:
@@ -31,11 +32,11 @@ class FakeClock {
 /// What a test does to, and learns from, every fake renderer it hands out.
 struct FakeControl {
   FakeClock* clock = nullptr;
-  double secondsPerPixel = 0;          ///< the clock moves so far in a pass
-  std::function<void()> duringPass;    ///< called in the middle of each pass
+  double secondsPerPixel = 0;        ///< the clock moves so far in a pass
+  std::function<void()> duringPass;  ///< called in the middle of each pass
   std::function<double(std::uint32_t samples)> error = [](std::uint32_t) { return 1.0; };
-  std::string failure;                 ///< setScene throws it
-  std::vector<std::uint32_t> passes;   ///< the seed of the scene of each pass that was not cancelled
+  std::string failure;                     ///< setScene throws it
+  std::vector<std::uint32_t> passes;       ///< the seed of the scene of each pass that was not cancelled
   std::vector<std::pair<int, int>> sizes;  ///< of each such pass
   int renderersMade = 0;
 };
@@ -57,7 +58,8 @@ class FakeRenderer : public Renderer {
   bool renderSample(const std::atomic<bool>& cancel) override {
     const auto pixels = double(scene_.width) * scene_.height;
     if (control_->clock)
-      control_->clock->advance(std::chrono::microseconds((long long)(pixels * control_->secondsPerPixel * 1e6)));
+      control_->clock->advance(
+          std::chrono::microseconds((long long)(pixels * control_->secondsPerPixel * 1e6)));
     // A copy: it may replace itself.
     if (const auto during = control_->duringPass) during();
     if (cancel) return false;

@@ -51,8 +51,10 @@ TEST(RenderLoop, StopsAtTheEstimatedErrorAndAtTheTime) {
   Workshop workshop;
   workshop.control->error = [](std::uint32_t samples) { return 1.0 / samples; };
   workshop.control->secondsPerPixel = 1.0;
-  const auto byError = workshop.store.create({{"image", {{"width", 1}, {"height", 1}}}, {"stop", {{"error", 0.2}}}});
-  const auto byTime = workshop.store.create({{"image", {{"width", 1}, {"height", 1}}}, {"stop", {{"seconds", 7}}}});
+  const auto byError =
+      workshop.store.create({{"image", {{"width", 1}, {"height", 1}}}, {"stop", {{"error", 0.2}}}});
+  const auto byTime =
+      workshop.store.create({{"image", {{"width", 1}, {"height", 1}}}, {"stop", {{"seconds", 7}}}});
   const auto first = std::make_shared<FakeViewer>(), second = std::make_shared<FakeViewer>();
   byError->addViewer(first);
   byTime->addViewer(second);
@@ -105,7 +107,8 @@ TEST(RenderLoop, NeverMixesRevisionsInOnePicture) {
     workshop.clock.advance(std::chrono::milliseconds(i % 7 * 60));
   }
   ASSERT_GT(viewer->frames.size(), 10u);
-  for (const auto& frame : viewer->frames) EXPECT_EQ(frame.red, float(frame.info.revision)) << frame.info.number;
+  for (const auto& frame : viewer->frames)
+    EXPECT_EQ(frame.red, float(frame.info.revision)) << frame.info.number;
 }
 
 TEST(RenderLoop, KeepsTheFilmOfACancelledPass) {

@@ -94,7 +94,9 @@ TEST(SceneResolver, TakesTheNamesOfTheRenderersLists) {
   EXPECT_EQ(lists.methods[0].name, "auto");
   EXPECT_EQ(lists.blendModes.size(), std::size(kBlendModes));
   for (const auto& colormap : lists.colormaps)
-    EXPECT_GT(resolver().replace({{"channels", {{{"colormap", colormap.name}}}}})->render.channels[0].color.size(), 1u)
+    EXPECT_GT(
+        resolver().replace({{"channels", {{{"colormap", colormap.name}}}}})->render.channels[0].color.size(),
+        1u)
         << colormap.name;
 }
 
@@ -113,7 +115,8 @@ TEST(SceneResolver, ChecksAPatchAgainstTheDatasetThatItNames) {
   const auto resolve = resolver();
   const auto base = resolve.replace(json::object());
   EXPECT_EQ(resolve.patch(*base, {{"dataset", "other"}})->dataset->id, "other");
-  EXPECT_EQ(resolve.patch(*resolve.patch(*base, {{"dataset", "other"}}), {{"dataset", nullptr}})->dataset->id, "small");
+  EXPECT_EQ(resolve.patch(*resolve.patch(*base, {{"dataset", "other"}}), {{"dataset", nullptr}})->dataset->id,
+            "small");
   EXPECT_THROW(resolve.patch(*base, {{"dataset", "none"}}), ProtocolError);
 }
 
