@@ -56,7 +56,7 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   };
   const auto renderer = context.makeRenderer(scene->dataset->volume);
-  renderer->setScene(scene->render);
+  const RebuildStats rebuild = renderer->setScene(scene->render);
   while (!stopMet(scene->stop, *renderer, seconds())) {
     // A picture that depends on the machine's speed is only for those who asked for it.
     if (seconds() > limit)
@@ -76,8 +76,9 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
                       {"Scolopax-Error", error},
                       {"Scolopax-Seed", std::to_string(scene->render.seed)},
                       {"Scolopax-Method", std::string(nameOf(scene->render.method))},
-                      {"Scolopax-Scene-Hash", sceneHash(*scene)},
+                      {"Scolopax-Scene", sceneHash(*scene)},
                       {"Scolopax-Render-Ms", std::to_string(milliseconds)},
+                      {"Scolopax-Rebuild-Ms", std::to_string(std::int64_t(rebuild.rebuildMs))},
                       {"Vary", "Accept"}};
   return response;
 }

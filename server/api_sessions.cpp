@@ -57,7 +57,8 @@ net::Response create(ApiContext& context, const net::Request& request) {
   auto response = jsonResponse(201, {{"id", session->id()},
                                      {"token", session->token()},
                                      {"revision", state.revision},
-                                     {"scene", state.scene->resolved}});
+                                     {"scene", state.scene->resolved},
+                                     {"stream", "api/v1/sessions/" + session->id() + "/stream"}});
   response.headers.emplace_back("Location", "/api/v1/sessions/" + session->id());
   return response;
 }
@@ -78,6 +79,15 @@ net::Response describe(ApiContext& context, const net::Request& request) {
   return jsonResponse(200, description);
 }
 
+std::chrono::milliseconds pollTimeout(const Config& config, const net::Request& request) {
+  if (!request.queryValue("timeout")) return config.pollTimeout;
+  const double most = std::chrono::duration<double>(config.pollTimeout).count();
+  const double seconds = queryNumber(request, "timeout");
+  if (seconds < 0)
+    throw ProtocolError(422, "", "query parameter timeout: expected seconds from 0, found less");
+  return std::chrono::milliseconds(std::int64_t(std::min(seconds, most) * 1000));
+}
+
 net::Response frame(ApiContext& context, const net::Request& request) {
   const auto session = sessionOf(context, request);
   const std::string* asked = request.queryValue("format");
@@ -88,7 +98,7 @@ net::Response frame(ApiContext& context, const net::Request& request) {
     throw ProtocolError(
         422, "", "query parameter format: expected jpeg, png or exr, found \"" + std::string(format) + '"');
   const FrameQuery query{queryUnsigned(request, "after", 0), queryUnsigned(request, "minSamples", 1)};
-  const auto found = session->waitForFrame(query, context.config.pollTimeout);
+  const auto found = session->waitForFrame(query, pollTimeout(context.config, request));
   if (!found && context.stopping) throw ProtocolError(503, "", "the server is stopping");
   if (!found) return {204, "", "", {}};
   net::Response response{200, std::string(type->mediaType), "", {}};
@@ -179,7 +189,8 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
        {id,
         {"after", "query", "integer", "Number of the last frame seen; a newer one is waited for"},
         {"minSamples", "query", "integer", "Samples per pixel that it has at least, unless it is final"},
-        {"format", "query", "string", "jpeg (default), png or exr"}},
+        {"format", "query", "string", "jpeg (default), png or exr"},
+        {"timeout", "query", "number", "Seconds to wait, at most 25, which is the default"}},
        "",
        imageTypes,
        net::RouteKind::slow,

@@ -22,6 +22,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr int kMaxSide = 16384;  // of a picture, as the table of fields says
+
 constexpr std::string_view kNoPage =
     "Scolopax is running, but its page is not built.\n\n"
     "Build it with:  cd client_web && npm ci && npm run build\n"
@@ -60,17 +62,17 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
           {"colormaps", std::move(maps)},
           {"imageFormats", std::move(formats)},
           {"limits",
-           {{"maxPixels", config.maxPixels},
-            {"maxSessions", config.maxSessions},
-            {"maxClients", config.maxClients},
-            {"maxRenderSeconds", config.maxRenderSeconds},
-            {"maxRenders", config.maxRenders},
-            {"maxBodyBytes", config.maxBodyBytes},
-            {"maxMessageBytes", config.maxMessageBytes},
-            {"maxJsonDepth", config.maxJsonDepth},
-            {"maxPolls", Session::kMaxPolls},
-            {"pollSeconds", std::chrono::duration<double>(config.pollTimeout).count()},
-            {"keepSessionSeconds", std::chrono::duration<double>(config.keepSession).count()}}}};
+           {{"bodyBytes", config.maxBodyBytes},
+            {"messageBytes", config.maxMessageBytes},
+            {"sceneDepth", config.maxJsonDepth},
+            {"imageWidth", kMaxSide},
+            {"imageHeight", kMaxSide},
+            {"imagePixels", config.maxPixels},
+            {"sessions", config.maxSessions},
+            {"clients", config.maxClients},
+            {"renders", config.maxRenders},
+            {"renderSeconds", config.maxRenderSeconds},
+            {"waitingPolls", Session::kMaxPolls}}}};
 }
 
 }  // namespace

@@ -78,12 +78,12 @@ std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesys
 json describeJson(const Dataset& dataset) {
   const Grid& grid = dataset.volume->grid();
   json description = {
-      {"id", dataset.id}, {"title", dataset.title}, {"dimensions", {grid.dims.x, grid.dims.y, grid.dims.z}}};
+      {"id", dataset.id}, {"title", dataset.title}, {"dims", {grid.dims.x, grid.dims.y, grid.dims.z}}};
   description["spacing"] = list(grid.spacing());
   description["diagonal"] = grid.diagonal();
-  json matrix = json::array();  // row by row, as it is written on paper; glm keeps columns
-  for (int row = 0; row < 4; ++row)
-    for (int column = 0; column < 4; ++column) matrix.push_back(grid.worldFromVoxel[column][row]);
+  json matrix = json::array();  // column by column
+  for (int column = 0; column < 4; ++column)
+    for (int row = 0; row < 4; ++row) matrix.push_back(grid.worldFromVoxel[column][row]);
   description["worldFromVoxel"] = std::move(matrix);
   json& channels = description["channels"] = json::array();
   for (const Channel& channel : dataset.volume->channels())
@@ -91,9 +91,7 @@ json describeJson(const Dataset& dataset) {
                         {"unit", channel.unit},
                         {"type", nameOf(channel.voxels.type())},
                         {"minimum", channel.histogram.minimum},
-                        {"maximum", channel.histogram.maximum},
-                        {"finiteCount", channel.histogram.finiteCount},
-                        {"nonFiniteCount", channel.histogram.nonFiniteCount}});
+                        {"maximum", channel.histogram.maximum}});
   return description;
 }
 
@@ -103,8 +101,11 @@ json histogramJson(const Dataset& dataset, int channel) {
     throw protocol::ProtocolError(422, "/channel",
                                   "expected a channel from 0 to " + std::to_string(channels.size() - 1) +
                                       ", found " + std::to_string(channel));
-  const Histogram& histogram = channels[std::size_t(channel)].histogram;
+  const Channel& measured = channels[std::size_t(channel)];
+  const Histogram& histogram = measured.histogram;
   return {{"channel", channel},
+          {"name", measured.name},
+          {"unit", measured.unit},
           {"minimum", histogram.minimum},
           {"maximum", histogram.maximum},
           {"finiteCount", histogram.finiteCount},

@@ -168,8 +168,8 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
   resolveChannels(scene, render, volume);
   resolveCamera(scene, render, volume.grid());
   render.blend = valueOf<BlendMode>(kBlendModes, scene.blend.mode);
-  if (scene.integrator.method == kAutoMethod) scene.integrator.method = nameOf(Method::superposed);
-  render.method = valueOf<Method>(kMethods, scene.integrator.method);
+  render.method = scene.integrator.method == kAutoMethod ? Method::superposed
+                                                         : valueOf<Method>(kMethods, scene.integrator.method);
   render.macrocell = int(scene.integrator.macrocell);
   render.seed = scene.integrator.seed;
   render.width = int(scene.image.width);

@@ -23,7 +23,7 @@ struct StopRule {
 /// A scene in the forms the server needs it in. Immutable once made.
 struct ResolvedScene {
   nlohmann::json sparse;    ///< what the user set
-  nlohmann::json resolved;  ///< every value filled in
+  nlohmann::json resolved;  ///< every value filled in; `auto` stays
   nlohmann::json picture;   ///< `resolved` without what leaves the picture as it is
   Scene render;
   StopRule stop;

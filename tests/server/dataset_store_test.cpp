@@ -20,7 +20,7 @@ using nlohmann::json;
 TEST(DatasetStore, DescribesGridAndChannels) {
   const json description = describeJson(*testing::smallStore()->first());
   EXPECT_EQ(description["id"], "small");
-  EXPECT_EQ(description["dimensions"], json({4, 3, 2}));
+  EXPECT_EQ(description["dims"], json({4, 3, 2}));
   EXPECT_EQ(description["spacing"], json({1.0, 1.0, 1.0}));
   ASSERT_EQ(description["channels"].size(), 2u);
   EXPECT_EQ(description["channels"][1]["name"], "green");

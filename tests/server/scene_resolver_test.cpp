@@ -38,7 +38,8 @@ TEST(SceneResolver, FillsEveryValueOfAnEmptyScene) {
   EXPECT_EQ(scene->resolved["channels"][1]["name"], "green");
   EXPECT_NE(scene->resolved["channels"][0]["color"], scene->resolved["channels"][1]["color"]);
   EXPECT_EQ(scene->resolved["camera"]["eye"].size(), 3u);
-  EXPECT_EQ(scene->resolved["integrator"]["method"], "superposed");
+  EXPECT_EQ(scene->resolved["integrator"]["method"], "auto");
+  EXPECT_EQ(scene->render.method, Method::superposed);
   EXPECT_EQ(scene->resolved["stop"], (json{{"samples", 64}}));
   EXPECT_EQ(scene->stop.samples, 64u);
 }
