@@ -36,9 +36,10 @@ int divisorForTarget(std::uint64_t pixels, double secondsPerPixel, double target
 
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
   const std::uint32_t samples = renderer.samples();
+  // The estimate counts from 16 samples on: fewer can look alike by chance.
   return samples > 0 &&
          ((stop.samples > 0 && samples >= stop.samples) || (stop.seconds > 0 && seconds >= stop.seconds) ||
-          (stop.error > 0 && samples >= 2 && renderer.estimatedError() <= stop.error));
+          (stop.error > 0 && samples >= 16 && renderer.estimatedError() <= stop.error));
 }
 
 ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer,

@@ -21,17 +21,28 @@ struct Encoding {
   Image8 bytes;  ///< empty for float formats
 };
 
+bool isFloat(const std::string& extension) {
+  return extension == "exr" || extension == "tif" || extension == "tiff";
+}
+
+void checkExtension(const std::string& extension) {
+  if (!isFloat(extension) && extension != "png" && extension != "jpg" && extension != "jpeg")
+    throw Error(ErrorCode::unsupported,
+                "image format: expected png, jpg, exr or tif, found " + inQuotes(extension));
+}
+
 Encoding prepare(const Image& image, glm::vec3 background, const std::string& extension) {
   if (image.width < 1 || image.height < 1 ||
       image.pixels.size() != std::size_t(image.width) * std::size_t(image.height)) {
     throw Error(ErrorCode::badInput, "image: expected width x height pixels, at least one");
   }
   Encoding encoding;
-  if (extension == "exr" || extension == "tif" || extension == "tiff") {
+  checkExtension(extension);
+  if (isFloat(extension)) {
     encoding.spec = OIIO::ImageSpec(image.width, image.height, 4, OIIO::TypeFloat);
     encoding.spec.attribute("oiio:ColorSpace", "Linear");
     encoding.spec.attribute("compression", "zip");
-  } else if (extension == "png" || extension == "jpg" || extension == "jpeg") {
+  } else {
     encoding.bytes = toSrgb8(image, background);
     encoding.spec = OIIO::ImageSpec(image.width, image.height, 3, OIIO::TypeUInt8);
     encoding.spec.attribute("oiio:ColorSpace", "sRGB");
@@ -39,9 +50,6 @@ Encoding prepare(const Image& image, glm::vec3 background, const std::string& ex
       encoding.spec.attribute("Compression", "jpeg:95");
       encoding.spec.attribute("jpeg:subsampling", "4:4:4");
     }
-  } else {
-    throw Error(ErrorCode::unsupported,
-                "image format: expected png, jpg, exr or tif, found " + inQuotes(extension));
   }
   return encoding;
 }
@@ -69,6 +77,8 @@ std::string extensionOf(const fs::path& path) {
 }
 
 }  // namespace
+
+void checkImageName(const fs::path& path) { checkExtension(extensionOf(path)); }
 
 void writeImage(const fs::path& path, const Image& image, glm::vec3 background) {
   write(path.string(), image, prepare(image, background, extensionOf(path)), nullptr);

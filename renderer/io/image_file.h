@@ -14,6 +14,9 @@ namespace scolopax::io {
 /// `background`. Throws Error(unsupported) for another extension, Error(io) when it cannot be written.
 void writeImage(const std::filesystem::path& path, const Image& image, glm::vec3 background);
 
+/// Throws Error(unsupported) when writeImage knows no format of that extension.
+void checkImageName(const std::filesystem::path& path);
+
 /// Reads any picture OpenImageIO knows, as linear premultiplied RGBA (8- and 16-bit files are taken as sRGB).
 Image readImage(const std::filesystem::path& path);
 

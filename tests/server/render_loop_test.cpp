@@ -52,14 +52,14 @@ TEST(RenderLoop, StopsAtTheEstimatedErrorAndAtTheTime) {
   workshop.control->error = [](std::uint32_t samples) { return 1.0 / samples; };
   workshop.control->secondsPerPixel = 1.0;
   const auto byError =
-      workshop.store.create({{"image", {{"width", 1}, {"height", 1}}}, {"stop", {{"error", 0.2}}}});
+      workshop.store.create({{"image", {{"width", 1}, {"height", 1}}}, {"stop", {{"error", 0.05}}}});
   const auto byTime =
       workshop.store.create({{"image", {{"width", 1}, {"height", 1}}}, {"stop", {{"seconds", 7}}}});
   const auto first = std::make_shared<FakeViewer>(), second = std::make_shared<FakeViewer>();
   byError->addViewer(first);
   byTime->addViewer(second);
   workshop.steps(40);
-  EXPECT_EQ(first->frames.back().info.samples, 5u);
+  EXPECT_EQ(first->frames.back().info.samples, 20u);
   EXPECT_TRUE(first->frames.back().info.final);
   EXPECT_EQ(second->frames.back().info.samples, 7u);
   EXPECT_TRUE(second->frames.back().info.final);
