@@ -22,6 +22,7 @@ std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene) {
         503, "",
         "there are " + std::to_string(sessions_.size()) + " sessions, as many as this server allows");
   sessions_.push_back(session);
+  hooks_.wakeRender();  // which ends it when nobody comes
   return session;
 }
 

@@ -58,7 +58,7 @@ class Server:
         self.stop()
 
     def stop(self, how=signal.SIGTERM):
-        if self.process.poll() is None:
+        if how is not None and self.process.poll() is None:
             self.process.send_signal(how)
         status = self.process.wait(timeout=60)
         self.process.stdout.close()

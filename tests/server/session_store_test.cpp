@@ -33,6 +33,14 @@ TEST(SessionStore, EndsASessionSomeTimeAfterItsLastViewer) {
   EXPECT_EQ(workshop.store.findByToken(session->token()), nullptr);
 }
 
+TEST(SessionStore, WakesTheLoopThatWillEndANewSession) {
+  Workshop workshop({32, 5min});
+  EXPECT_EQ(workshop.render.step(), std::nullopt);
+  workshop.store.create(json::object());
+  EXPECT_EQ(workshop.renderWakes, 1);
+  EXPECT_EQ(workshop.render.step(), workshop.hooks.now() + 5min);
+}
+
 TEST(SessionStore, KeepsTheFilmBetweenTwoViewers) {
   Workshop workshop({32, 5min});
   const auto session = workshop.store.create({{"stop", {{"samples", 100}}}});

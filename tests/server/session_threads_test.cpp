@@ -110,7 +110,9 @@ TEST(SessionThreads, MakeAndEndSessionsWhileOthersRender) {
         const auto session = server.store.create(kTinyImage);
         const auto viewer = std::make_shared<FakeViewer>();
         session->addViewer(viewer);
-        if (i % 2 == 0) EXPECT_NE(session->waitForFrame({}, 60s), nullptr);
+        if (i % 2 == 0) {
+          EXPECT_NE(session->waitForFrame({}, 60s), nullptr);
+        }
         EXPECT_TRUE(server.store.remove(session->id()));
         EXPECT_EQ(viewer->closed, "the session was deleted");
       }

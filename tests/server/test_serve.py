@@ -157,7 +157,7 @@ class Http(unittest.TestCase):
         self.assertEqual(self.problem("POST", "/api/v1/render", bad)[:2], (422, "/channels/1/opacity/1/1"))
         self.assertEqual(self.problem("POST", "/api/v1/render", {"image": {"width": 201, "height": 200}})[:2],
                          (422, "/image"))
-        self.assertEqual(self.problem("POST", "/api/v1/render", {"stop": {"seconds": 1e6}})[:2], (422, "/stop/seconds"))
+        self.assertEqual(self.problem("POST", "/api/v1/render", {**RENDER, "stop": {"seconds": 1e6}})[:2], (422, "/stop/seconds"))
         self.assertEqual(self.problem("POST", "/api/v1/render", RENDER, {"Accept": "text/html"})[0], 406)
         self.assertEqual(self.problem("POST", "/api/v1/render", b"{}", {"Content-Type": "text/plain"})[0], 415)
         self.assertEqual(self.problem("POST", "/api/v1/render", b"{", {"Content-Type": "application/json"})[0], 400)
@@ -188,8 +188,8 @@ class Http(unittest.TestCase):
         self.assertEqual(self.problem("GET", path)[0], 404)
 
     def test_sessions_are_limited(self):
-        made = [self.server.json("POST", "/api/v1/sessions", {})[1]["id"] for _ in range(3)]
-        status, headers, _ = self.server.call("POST", "/api/v1/sessions", {})
+        made = [self.server.json("POST", "/api/v1/sessions", {"scene": RENDER})[1]["id"] for _ in range(3)]
+        status, headers, _ = self.server.call("POST", "/api/v1/sessions", {"scene": RENDER})
         self.assertEqual(status, 503)
         self.assertIn("Retry-After", headers)
         for session in made:
@@ -357,7 +357,7 @@ class Ending(unittest.TestCase):
                     thread.join(60)
 
             asyncio.run(run())
-            self.assertEqual(server.stop(), 0)
+            self.assertEqual(server.stop(None), 0)
             self.assertEqual(answers, {"poll": 503, "render": 503})
 
 
