@@ -55,7 +55,7 @@ std::optional<Refusal> readHead(const HeadFields& head, std::size_t bodyLimit, R
       return Refusal{415, "A body must be sent without Content-Encoding."};
     }
   }
-  if (count("Host") != (head.version() < 11 ? count("Host") : 1) || count("Host") > 1) {
+  if (count("Host") > 1 || (count("Host") == 0 && head.version() >= 11)) {
     return Refusal{400, "One Host header is needed."};
   }
   if (std::find(kMethods.begin(), kMethods.end(), request.method) == kMethods.end()) {
