@@ -11,8 +11,9 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
-#include <set>
+#include <map>
 #include <string>
+#include <vector>
 
 #include "server/net/router.h"
 #include "server/net/server.h"
