@@ -112,19 +112,33 @@ Image readImage(const fs::path& path) {
     throw Error(ErrorCode::tooLarge, shown(path) + ": expected a picture of at most 2^28 pixels, found " +
                                          std::to_string(spec.width) + "x" + std::to_string(spec.height));
   }
-  const int channels = std::min(spec.nchannels, 4);
-  std::vector<float> values(std::size_t(count) * std::size_t(channels));
-  input->geterror();  // warnings of opening; some decoding errors are recorded without read_image failing
-  if (!input->read_image(0, 0, 0, channels, OIIO::TypeFloat, values.data()) || input->has_error()) {
+  constexpr int kMostChannels = 1024;
+  if (spec.nchannels > kMostChannels || count * spec.nchannels > 4 * kMostPixels) {
+    throw Error(ErrorCode::tooLarge, shown(path) + ": expected a picture of few channels, found " +
+                                         std::to_string(spec.nchannels));
+  }
+  const auto stored = std::size_t(spec.nchannels);
+  std::vector<float> values(std::size_t(count) * stored);
+  input->geterror();  // what opening recorded are mere warnings
+  // Row by row where it can be: OpenImageIO does not tell of damage in several deflated strips read at once.
+  bool whole = true;
+  if (spec.tile_width != 0)
+    whole = input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeFloat, values.data());
+  for (int y = 0; spec.tile_width == 0 && whole && y < spec.height; ++y) {
+    float* row = &values[std::size_t(y) * std::size_t(spec.width) * stored];
+    whole = input->read_scanline(spec.y + y, spec.z, OIIO::TypeFloat, row);
+  }
+  if (!whole || input->has_error()) {
     throw Error(ErrorCode::badInput, shown(path) + ": cannot be read: " + cleanText(input->geterror()));
   }
 
+  const int channels = std::min(spec.nchannels, 4);
   const bool encoded = !spec.format.is_floating_point();
   const bool straightAlpha = spec.get_int_attribute("oiio:UnassociatedAlpha") != 0;
   const bool hasAlpha = channels == 2 || channels == 4;
   Image image{spec.width, spec.height, std::vector<glm::vec4>(std::size_t(count))};
   for (std::size_t i = 0; i < image.pixels.size(); ++i) {
-    const float* value = &values[i * std::size_t(channels)];
+    const float* value = &values[i * stored];
     const float alpha = hasAlpha ? value[channels - 1] : 1.0f;
     glm::vec3 color = channels >= 3 ? glm::vec3(value[0], value[1], value[2]) : glm::vec3(value[0]);
     if (encoded) {

@@ -141,6 +141,36 @@ std::uint64_t largestRatio(const OIIO::ImageSpec& spec) {
   return 1 << 15;
 }
 
+/// Row by row, or tile by tile: OpenImageIO unpacks several deflated strips or tiles at once by itself, and
+/// then does not tell when they are damaged.
+bool readPixels(OIIO::ImageInput& input, std::vector<std::byte>& page) {
+  const OIIO::ImageSpec spec = input.spec();
+  const std::size_t pixelBytes = spec.pixel_bytes(true), rowBytes = pixelBytes * std::size_t(spec.width);
+  if (spec.tile_width == 0) {
+    for (int y = 0; y < spec.height; ++y) {
+      if (!input.read_native_scanline(0, 0, spec.y + y, spec.z, &page[std::size_t(y) * rowBytes]))
+        return false;
+    }
+    return true;
+  }
+  constexpr std::uint64_t kLargestTile = std::uint64_t(1) << 28;
+  const std::size_t tileRowBytes = pixelBytes * std::size_t(spec.tile_width);
+  if (spec.tile_depth > 1 || saturatingProduct(tileRowBytes, std::uint64_t(spec.tile_height)) > kLargestTile)
+    return false;
+  std::vector<std::byte> tile(tileRowBytes * std::size_t(spec.tile_height));
+  for (int y = 0; y < spec.height; y += spec.tile_height) {
+    for (int x = 0; x < spec.width; x += spec.tile_width) {
+      if (!input.read_native_tile(0, 0, spec.x + x, spec.y + y, spec.z, tile.data())) return false;
+      const std::size_t bytes = pixelBytes * std::size_t(std::min(spec.tile_width, spec.width - x));
+      for (int row = 0; row < std::min(spec.tile_height, spec.height - y); ++row) {
+        std::memcpy(&page[std::size_t(y + row) * rowBytes + std::size_t(x) * pixelBytes],
+                    &tile[std::size_t(row) * tileRowBytes], bytes);
+      }
+    }
+  }
+  return true;
+}
+
 /// Reads the pages in order, each into `page`: `samples` interleaved numbers a pixel, host byte order.
 class PageReader {
  public:
@@ -171,9 +201,8 @@ class PageReader {
       throw Error(ErrorCode::unsupported,
                   where + ": expected " + text(first_) + " as the first, found " + text(spec));
     }
-    // Some decoding errors are recorded without read_image failing; what open recorded are mere warnings.
-    input->geterror();
-    if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::UNKNOWN, page.data()) || input->has_error()) {
+    input->geterror();  // what opening recorded are mere warnings
+    if (!readPixels(*input, page) || input->has_error()) {
       throw Error(ErrorCode::badInput, where + ": cannot be decoded: " + cleanText(input->geterror()));
     }
   }

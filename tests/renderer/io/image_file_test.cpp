@@ -74,6 +74,20 @@ TEST(ImageFile, EncodingInMemoryGivesTheFilesPicture) {
   }
 }
 
+TEST(ImageFile, DamagedFilesAreNotReadAsPictures) {
+  const TempDir folder;
+  Image image{64, 64, {}};
+  for (int i = 0; i < 64 * 64; ++i) image.pixels.emplace_back(float(i * i % 1009), float(i), 0, 1);
+  for (const char* name : {"a.tif", "a.exr", "a.png"}) {
+    writeImage(folder / name, image, glm::vec3(0));
+    std::ifstream file(folder / name, std::ios::binary);
+    std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    bytes[bytes.size() / 2] = char(bytes[bytes.size() / 2] ^ 0xFF);
+    EXPECT_THAT(errorOf([&] { readImage(writeBytes(folder / name, bytes)); }), HasSubstr("cannot be read"))
+        << name;
+  }
+}
+
 TEST(ImageFile, BadRequestsAndFilesAreRefusedInOneLine) {
   const TempDir folder;
   const Image image = testImage();

@@ -292,26 +292,37 @@ TEST(TiffFiles, EveryTruncationIsRefused) {
   }
 }
 
-TEST(TiffFiles, DamagedCompressedPagesAreRefused) {
-  const TempDir folder;
-  OIIO::ImageSpec spec(64, 64, 1, OIIO::TypeUInt8);
+/// Strips or tiles of 64x60 deflated pixels, several of them.
+std::string deflatedPicture(const TempDir& folder, int tileSize) {
+  OIIO::ImageSpec spec(64, 60, 1, OIIO::TypeUInt8);
   spec.attribute("compression", "zip");
-  std::vector<std::uint8_t> pixels(64 * 64);
+  spec.attribute("tiff:RowsPerStrip", 16);
+  spec.tile_width = spec.tile_height = tileSize;
+  std::vector<std::uint8_t> pixels(64 * 60);
   for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = std::uint8_t(i * i / 7);
-  const auto path = folder / "a.tif";
-  const auto output = OIIO::ImageOutput::create(path.string());
-  ASSERT_TRUE(output->open(path.string(), spec) && output->write_image(OIIO::TypeUInt8, pixels.data()) &&
+  const std::string path = (folder / "deflated.tif").string();
+  const auto output = OIIO::ImageOutput::create(path);
+  EXPECT_TRUE(output->open(path, spec) && output->write_image(OIIO::TypeUInt8, pixels.data()) &&
               output->close());
   std::ifstream file(path, std::ios::binary);
-  const std::string whole{std::istreambuf_iterator<char>(file), {}};
-  EXPECT_EQ(valuesOf(loadBytes(folder, whole).channels[0])[100], double(100 * 100 / 7 % 256));
-  // The strips are the larger part of the file and its end.
-  ASSERT_GT(whole.size(), 1000u);
-  for (const std::size_t at : {whole.size() / 2, whole.size() - 300, whole.size() - 50}) {
-    std::string damaged = whole;
-    damaged[at] = char(damaged[at] ^ 0xFF);
-    EXPECT_THAT(loadError(writeBytes(folder / "b.tif", damaged)), HasSubstr("page 1: cannot be decoded"))
-        << at;
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST(TiffFiles, DeflatedStripsAndTilesLoadAndDamagedOnesAreRefused) {
+  const TempDir folder;
+  for (const int tileSize : {0, 16}) {
+    const std::string whole = deflatedPicture(folder, tileSize);
+    const auto values = valuesOf(loadBytes(folder, whole).channels[0]);
+    ASSERT_EQ(values.size(), 64u * 60u);
+    for (std::size_t i = 0; i < values.size(); ++i) ASSERT_EQ(values[i], double(i * i / 7 % 256)) << i;
+    // The packed pixels are the larger part of the file and its end.
+    ASSERT_GT(whole.size(), 1000u);
+    for (const std::size_t at : {whole.size() / 2, whole.size() - 300, whole.size() - 50}) {
+      std::string damaged = whole;
+      damaged[at] = char(damaged[at] ^ 0xFF);
+      EXPECT_THAT(loadError(writeBytes(folder / "b.tif", damaged)), HasSubstr("page 1: cannot be decoded"))
+          << at;
+    }
   }
 }
 
