@@ -83,7 +83,8 @@ TEST(ImageFile, DamagedFilesAreNotReadAsPictures) {
     std::ifstream file(folder / name, std::ios::binary);
     std::string bytes{std::istreambuf_iterator<char>(file), {}};
     bytes[bytes.size() / 2] = char(bytes[bytes.size() / 2] ^ 0xFF);
-    EXPECT_THAT(errorOf([&] { readImage(writeBytes(folder / name, bytes)); }), HasSubstr("cannot be read"))
+    EXPECT_THAT(errorOf([&] { readImage(writeBytes(folder / name, bytes)); }),
+                testing::AnyOf(HasSubstr("cannot be read"), HasSubstr("is not a picture")))
         << name;
   }
 }
