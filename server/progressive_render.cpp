@@ -13,6 +13,7 @@ namespace scolopax::server {
 namespace {
 
 constexpr int kDivisors[] = {1, 2, 3, 4, 6, 8, 12, 16};
+constexpr int kProbeDivisor = 4;
 
 double secondsBetween(TimePoint from, TimePoint to) {
   return std::chrono::duration<double>(to - from).count();
@@ -88,9 +89,11 @@ std::optional<TimePoint> ProgressiveRender::dueAt() const {
 
 int ProgressiveRender::wantedDivisor(const RenderRequest& request) const {
   if (!request.interactive) return 1;
+  // What a pass costs is not known before the first: a small one tells.
+  if (!secondsPerPixel_) return kProbeDivisor;
   const auto pixels =
       std::uint64_t(request.scene->render.width) * std::uint64_t(request.scene->render.height);
-  return divisorForTarget(pixels, secondsPerPixel_,
+  return divisorForTarget(pixels, *secondsPerPixel_,
                           std::chrono::duration<double>(options_.frameTarget).count());
 }
 
@@ -100,7 +103,7 @@ void ProgressiveRender::takeScene(const RenderRequest& request, PassResult& resu
     renderer_.reset();
     volume_ = request.scene->dataset->volume;
     renderer_ = makeRenderer_(volume_);
-    secondsPerPixel_ = 0;
+    secondsPerPixel_.reset();
   }
   const int divisor = wantedDivisor(request);
   const RebuildStats stats = renderer_->setScene(atDivisor(request.scene->render, divisor));
@@ -124,7 +127,7 @@ void ProgressiveRender::addSample(PassResult& result) {
   filmSeconds_ += result.renderSeconds;
   renderUs_ = microseconds(result.renderSeconds);
   const double perPixel = result.renderSeconds / double(result.pixels);
-  secondsPerPixel_ = secondsPerPixel_ == 0 ? perPixel : 0.5 * (secondsPerPixel_ + perPixel);
+  secondsPerPixel_ = secondsPerPixel_ ? 0.5 * (*secondsPerPixel_ + perPixel) : perPixel;
 }
 
 void ProgressiveRender::show(const RenderRequest& request) {

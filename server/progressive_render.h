@@ -61,9 +61,9 @@ class ProgressiveRender {
   std::unique_ptr<Renderer> renderer_;
   std::shared_ptr<const ResolvedScene> scene_;  ///< that the film shows; null before the first
   std::uint32_t revision_ = 0;
-  int divisor_ = 1;             ///< of width and height
-  double filmSeconds_ = 0;      ///< spent on the film's samples
-  double secondsPerPixel_ = 0;  ///< of one sample, from earlier passes; 0 before the first
+  int divisor_ = 1;                        ///< of width and height
+  double filmSeconds_ = 0;                 ///< spent on the film's samples
+  std::optional<double> secondsPerPixel_;  ///< of one sample, from earlier passes
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
 
   FrameInfo shown_;  ///< the last frame handed in; revision 0 before the first

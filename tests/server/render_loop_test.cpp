@@ -168,11 +168,26 @@ TEST(RenderLoop, RendersSmallWhileEditsArriveAndWholeWhenTheyStop) {
   EXPECT_FALSE(viewer->frames[2].info.interactive);
 }
 
+TEST(RenderLoop, BeginsSmallWhenTheFirstPassWasCancelled) {
+  Workshop workshop;
+  const auto session = workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.control->duringPass = [&] {
+    workshop.control->duringPass = nullptr;
+    session->patch(seedPatch(1), {});
+  };
+  workshop.steps(2);
+  ASSERT_EQ(viewer->frames.size(), 1u);
+  EXPECT_EQ(viewer->frames[0].width, 100);
+}
+
 TEST(RenderLoop, SleepsUntilQualityIsDueWhenTheSmallPictureIsDone) {
   Workshop workshop;
   const auto session = workshop.store.create({{"stop", {{"samples", 2}}}});
   const auto viewer = std::make_shared<FakeViewer>();
   session->addViewer(viewer);
+  workshop.step();
   session->patch(seedPatch(1), {});
   workshop.steps(2);
   const auto next = workshop.render.step();
@@ -182,7 +197,7 @@ TEST(RenderLoop, SleepsUntilQualityIsDueWhenTheSmallPictureIsDone) {
   workshop.step();
   EXPECT_TRUE(viewer->frames.back().info.final);
   EXPECT_FALSE(viewer->frames.back().info.interactive);
-  EXPECT_EQ(workshop.control->passes.size(), 2u);  // it was whole already: the film goes on
+  EXPECT_EQ(workshop.control->passes.size(), 3u);  // it was whole already: the film goes on
 }
 
 TEST(RenderLoop, ChoosesTheLargestResolutionThatFitsTheTarget) {

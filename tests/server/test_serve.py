@@ -127,6 +127,15 @@ class Http(unittest.TestCase):
         for path in ("/metrics", "/api/v1/datasets", "/api/v1/openapi.json"):
             self.assertEqual(self.server.call("GET", path, token=False)[0], 401)
 
+    def test_the_address_of_the_ready_line_opens_the_page_or_says_how_to_build_it(self):
+        self.assertEqual(self.server.call("GET", "/", token=False)[0], 401)
+        status, headers, body = self.server.call("GET", "/")
+        self.assertEqual(status, 200)
+        if headers["Content-Type"].startswith("text/plain"):
+            self.assertIn(b"npm run build", body)
+        else:
+            self.assertIn(b"<script", body)
+
     def test_files_of_one_grid_are_channels_of_one_data_set(self):
         status, answer = self.server.json("GET", "/api/v1/datasets")
         self.assertEqual(status, 200)
