@@ -109,8 +109,8 @@ export class Store {
 
   /** The size in device pixels that the picture should have. */
   setImageSize(width: number, height: number): void {
-    const { imageWidth = Infinity, imageHeight = Infinity, maxPixels = Infinity } = this.capabilities.peek().limits ?? {};
-    const shrink = Math.min(1, imageWidth / width, imageHeight / height, Math.sqrt(maxPixels / (width * height)));
+    const { imageWidth = Infinity, imageHeight = Infinity, imagePixels = Infinity } = this.capabilities.peek().limits ?? {};
+    const shrink = Math.min(1, imageWidth / width, imageHeight / height, Math.sqrt(imagePixels / (width * height)));
     this.wantedSize = {
       width: Math.max(1, Math.floor(width * shrink)),
       height: Math.max(1, Math.floor(height * shrink)),
