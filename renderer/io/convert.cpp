@@ -88,7 +88,9 @@ VoxelBuffer narrowed(const VoxelBuffer& stored, std::string& loss) {
   const std::size_t count = stored.sizeBytes() / sizeof(From);
   const From* from = reinterpret_cast<const From*>(stored.data());
   const auto range = std::minmax_element(from, from + count);
-  const auto fits = [&]<class To>(To) { return std::in_range<To>(*range.first) && std::in_range<To>(*range.second); };
+  const auto fits = [&]<class To>(To) {
+    return std::in_range<To>(*range.first) && std::in_range<To>(*range.second);
+  };
   loss = "every value fits";
   if (fits(std::int16_t{})) {
     return widened<From, std::int16_t>(stored, [](From value) { return static_cast<std::int16_t>(value); });
