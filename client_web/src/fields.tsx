@@ -13,8 +13,9 @@ import {
 import { choicesOf, fieldAt, type Path } from './schema';
 import type { Store } from './store';
 
-export function FieldControl({ store, path }: { store: Store; path: Path }) {
-  const field = fieldAt(path);
+export function FieldControl({ store, path, label }: { store: Store; path: Path; label?: string }) {
+  const found = fieldAt(path);
+  const field = label ? { ...found, label } : found;
   const value = valueAt(store.scene.value as Json | undefined, path);
   const props = { field, onChange: (next: Json) => store.set(path, next) };
   switch (field.kind) {

@@ -1,26 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
 // How the picture is made. The first settings are those most asked for; all others of the scene follow
 // under "More settings", so that a new one in the schema appears there by itself.
-import { FieldControls } from './fields';
-import { leavesBelow, type Path } from './schema';
+import { FieldControl, FieldControls } from './fields';
+import { fieldAt, leavesBelow, type Path } from './schema';
 import type { Store } from './store';
 
-const kFirst = ['blend.mode', 'integrator.method', 'image.background'];
-/** Edited elsewhere, or following the window. */
-const kElsewhere = /^(dataset|channels|camera|image\.(width|height))(\.|$)/;
+const kFirst = [
+  { path: ['blend', 'mode'], label: 'Blend mode' },
+  { path: ['integrator', 'method'], label: 'Method' },
+  { path: ['image', 'background'], label: 'Background' },
+];
+/** Edited elsewhere, following the window, or above. */
+const kElsewhere = new Set(['dataset', 'image.width', 'image.height', ...kFirst.map(({ path }) => path.join('.'))]);
 
-const all: Path[] = leavesBelow([]).filter((path) => !kElsewhere.test(path.join('.')));
-const first = kFirst.flatMap((name) => all.filter((path) => path.join('.') === name));
-const further = all.filter((path) => !first.includes(path));
+/** One group for each object of the scene that has something left. */
+const groups: { label: string; paths: Path[] }[] = fieldAt([])
+  .members.filter((key) => key !== 'channels' && key !== 'camera')
+  .map((key) => ({
+    label: fieldAt([key]).label,
+    paths: leavesBelow([key]).filter((path) => !kElsewhere.has(path.join('.'))),
+  }))
+  .filter(({ paths }) => paths.length > 0);
 
 export function SettingsPanel({ store }: { store: Store }) {
   return (
     <section class="group" aria-labelledby="settings-title">
       <h3 id="settings-title">Rendering</h3>
-      <FieldControls store={store} paths={first} />
+      {kFirst.map(({ path, label }) => (
+        <FieldControl key={label} store={store} path={path} label={label} />
+      ))}
       <details>
         <summary>More settings</summary>
-        <FieldControls store={store} paths={further} />
+        {groups.map(({ label, paths }) => (
+          <div key={label} role="group" aria-label={label}>
+            <h4>{label}</h4>
+            <FieldControls store={store} paths={paths} />
+          </div>
+        ))}
       </details>
     </section>
   );
