@@ -154,7 +154,7 @@ export function ColorControl({ field, value, onChange }: ControlProps<string>) {
   const id = useId();
   return (
     <Row field={field} id={id}>
-      <output class="mono">{value}</output>
+      <span class="mono">{value}</span>
       <input id={id} type="color" value={value} onInput={(event) => onChange(event.currentTarget.value)} />
     </Row>
   );

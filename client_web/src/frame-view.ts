@@ -45,6 +45,8 @@ export class FrameView {
       }
       this.context.drawImage(picture, 0, 0);
       picture.close();
+      this.canvas.dataset.revision = String(header.revision); // which scene is on screen, for whoever asks the page
+      this.canvas.dataset.samples = String(header.samples);
       return true;
     } catch {
       return false; // a damaged picture is skipped: the next one replaces it

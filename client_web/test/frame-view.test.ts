@@ -19,7 +19,7 @@ it('the newest picture wins, and every picture is reported once', async () => {
   const decode = () => new Promise((resolve) => decodes.push(() => resolve({ width: 4, height: 3, close() {} })));
   vi.stubGlobal('createImageBitmap', decode);
   const drawImage = vi.fn();
-  const canvas = { width: 1, height: 1, getContext: () => ({ drawImage }) } as unknown as HTMLCanvasElement;
+  const canvas = { width: 1, height: 1, dataset: {}, getContext: () => ({ drawImage }) } as unknown as HTMLCanvasElement;
   const done: [number, boolean][] = [];
   const view = new FrameView(canvas, (header, drawn) => done.push([header.frame, drawn]));
 
@@ -37,7 +37,7 @@ it('the newest picture wins, and every picture is reported once', async () => {
 
 it('a damaged picture is skipped and does not stop the next', async () => {
   vi.stubGlobal('createImageBitmap', vi.fn().mockRejectedValueOnce(new Error('damaged')).mockResolvedValue({ width: 1, height: 1, close() {} }));
-  const canvas = { width: 1, height: 1, getContext: () => ({ drawImage() {} }) } as unknown as HTMLCanvasElement;
+  const canvas = { width: 1, height: 1, dataset: {}, getContext: () => ({ drawImage() {} }) } as unknown as HTMLCanvasElement;
   const done: [number, boolean][] = [];
   const view = new FrameView(canvas, (header, drawn) => done.push([header.frame, drawn]));
   view.show(message(1));

@@ -5,7 +5,16 @@ import { randomBytes } from 'node:crypto';
 import { writeFileSync } from 'node:fs';
 import path from 'node:path';
 import { after, test } from 'node:test';
-import { eventually, generateOrbitals, launchBrowser, openPage, scratchFolder, startServer, steadyPicture } from './support.mjs';
+import {
+  eventually,
+  generateOrbitals,
+  launchBrowser,
+  openPage,
+  scratchFolder,
+  sceneOnServer,
+  startServer,
+  steadyPicture,
+} from './support.mjs';
 
 const started = [];
 after(async () => {
@@ -42,10 +51,7 @@ test('a killed server is reported, and a restarted one is reconnected to', async
   await steadyPicture(page, 2);
   assert.equal(await page.locator('input[type=color].swatch').first().inputValue(), '#00ff00');
   assert.equal(await page.locator('.channel header .switch').nth(1).isChecked(), false);
-  const server = await page.evaluate(async () => {
-    const { id } = JSON.parse(sessionStorage.getItem('scolopax.session'));
-    return (await fetch(`api/v1/sessions/${id}/scene`)).json();
-  });
+  const server = await sceneOnServer(page);
   assert.equal(server.scene.channels[0].color, '#00ff00');
   assert.equal(server.scene.channels[1].visible, false);
   assert.deepEqual(faults, []);

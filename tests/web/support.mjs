@@ -126,9 +126,36 @@ export async function samplesShown(page) {
   return Number(text.match(/(\d+)(?: \/ \d+)? samples?/)?.[1] ?? 0);
 }
 
-/** Waits for a picture of the newest scene with so many samples, and looks at it. */
+/** The session as the server has it. */
+export const sceneOnServer = (page) =>
+  page.evaluate(async () => {
+    const { id } = JSON.parse(sessionStorage.getItem('scolopax.session'));
+    return (await fetch(`api/v1/sessions/${id}/scene`)).json();
+  });
+
+/** Waits until a full-size picture of the newest scene has so many samples, and looks at it. */
 export async function steadyPicture(page, samples = 16) {
-  await page.waitForTimeout(400); // the page's own edits have been sent and a new film begun
-  await eventually(async () => (await samplesShown(page)) >= samples, `no picture with ${samples} samples`, 60_000);
+  await page.locator('canvas[data-revision]').waitFor();
+  let revision;
+  // The page sends its edits with the next animation frame, and some follow from an answer of the server.
+  await eventually(async () => {
+    const before = revision;
+    revision = (await sceneOnServer(page)).revision;
+    if (revision === before) return true;
+    await page.waitForTimeout(500);
+    return false;
+  }, 'the scene does not come to rest');
+  await eventually(
+    () =>
+      page.locator('canvas').evaluate(
+        ({ dataset, width, parentElement }, wanted) =>
+          Number(dataset.revision) >= wanted.revision &&
+          Number(dataset.samples) >= wanted.samples &&
+          width === Math.round(parentElement.clientWidth * Math.min(2, devicePixelRatio)),
+        { revision, samples },
+      ),
+    `no full picture of revision ${revision} with ${samples} samples`,
+    90_000,
+  );
   return lookAt(page);
 }
