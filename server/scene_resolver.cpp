@@ -69,7 +69,7 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
     ChannelAppearance& look = render.channels.emplace_back();
     if (!wire.name) wire.name = channels[i].name;
     if (!wire.range) {
-      const ValueRange range = defaultRange(channels[i]);
+      const ValueRange range = defaultRange(volume, int(i));
       wire.range = {range.lo, range.hi};
     }
     if (!wire.color && !wire.colormap) {

@@ -7,14 +7,18 @@
 namespace scolopax {
 namespace {
 
-/// Optical depth of one channel's typical structure: the outside is clear to see, the inside still shows.
+/// Optical depth of a typical structure of all channels together: the outside is clear to see, the inside
+/// still shows.
 constexpr double kStructureDepth = 6.0;
+
+/// Share of the voxels below the default range.
+constexpr double kBelowOnly = 0.5, kBelowEach = 0.92;
 
 }  // namespace
 
-ValueRange defaultRange(const Channel& channel) {
-  const Histogram& h = channel.histogram;
-  double lo = h.quantile(0.002), hi = h.quantile(0.999);
+ValueRange defaultRange(const Volume& volume, int channel) {
+  const Histogram& h = volume.channels()[std::size_t(channel)].histogram;
+  double lo = h.quantile(volume.channels().size() == 1 ? kBelowOnly : kBelowEach), hi = h.quantile(0.9995);
   if (!(lo < hi)) lo = h.minimum, hi = h.maximum;  // nearly all voxels have one value
   if (lo < hi) return {lo, hi};
   // One value everywhere: visible unless it is zero.
@@ -33,7 +37,7 @@ std::array<std::uint8_t, 3> defaultColor(int index) {
 
 double defaultDensity(const Volume& volume, int channel) {
   const Channel& c = volume.channels()[std::size_t(channel)];
-  const ValueRange range = defaultRange(c);
+  const ValueRange range = defaultRange(volume, channel);
   // Share of the voxels that the ramp makes visible, and their mean opacity.
   constexpr int kSteps = 1024;
   int seen = 0;
@@ -49,7 +53,7 @@ double defaultDensity(const Volume& volume, int channel) {
   const double mean = seen > 0 ? opacity / seen : 0.5;
   // Edge of a cube that the visible voxels would fill: how thick the structures are, roughly.
   const double thickness = volume.grid().diagonal() / std::sqrt(3.0) * std::cbrt(share);
-  return kStructureDepth / (mean * thickness);
+  return kStructureDepth / std::sqrt(double(volume.channels().size())) / (mean * thickness);
 }
 
 }  // namespace scolopax

@@ -15,8 +15,9 @@ struct ValueRange {
   double lo, hi;  ///< data units, lo < hi
 };
 
-/// From near the lowest to near the highest value, by percentile; never empty.
-ValueRange defaultRange(const Channel& channel);
+/// By percentile, never empty: of an only channel the upper half of its values, of several the top twelfth of
+/// each, so that what they mark shows instead of what they have in common.
+ValueRange defaultRange(const Volume& volume, int channel);
 
 /// sRGB bytes, distinct for neighbouring indices.
 std::array<std::uint8_t, 3> defaultColor(int index);

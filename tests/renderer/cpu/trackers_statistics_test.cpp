@@ -80,7 +80,7 @@ void paintPrimaries(Scene& scene) {
 void useDefaults(const Volume& volume, Scene& scene) {
   scene.channels.resize(volume.channels().size());
   for (std::size_t i = 0; i < scene.channels.size(); ++i) {
-    const ValueRange range = defaultRange(volume.channels()[i]);
+    const ValueRange range = defaultRange(volume, int(i));
     scene.channels[i].rangeLo = range.lo;
     scene.channels[i].rangeHi = range.hi;
     scene.channels[i].density = defaultDensity(volume, int(i));
