@@ -81,9 +81,9 @@ export function StatusBar({ store }: { store: Store }) {
             hint="Estimated RMSE, linear premultiplied RGB"
           />
           <Figure
-            name="ms"
+            name="ms latency"
             value={latency === undefined ? '–' : latency.toFixed(0)}
-            hint="Latency: from sending an edit to the first picture that contains it"
+            hint="From sending an edit to the first picture that contains it"
           />
           <Figure name="frames/s" value={rate.toFixed(1)} hint="Pictures drawn per second" />
           <Figure name="" value={store.scene.value?.integrator?.method ?? ''} hint="Method" />

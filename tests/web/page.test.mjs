@@ -75,7 +75,7 @@ test('an edit of a colour changes the colour of the picture', async () => {
 
 test('the time from an edit to its picture is shown', async () => {
   await eventually(
-    async () => /\d+ ms/.test(await page.locator('.status').textContent()),
+    async () => /\d+ ms latency/.test(await page.locator('.status').textContent()),
     'no latency in the status bar',
   );
 });

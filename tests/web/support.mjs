@@ -22,9 +22,9 @@ export function scratchFolder() {
   return folder;
 }
 
-export function generateOrbitals(folder) {
-  const file = path.join(folder, 'orbitals.nrrd');
-  const made = spawnSync(program, ['generate', 'orbitals', file, '--size', '48'], { encoding: 'utf8' });
+export function generateOrbitals(folder, name = 'orbitals.nrrd', options = ['--size', '48']) {
+  const file = path.join(folder, name);
+  const made = spawnSync(program, ['generate', 'orbitals', file, ...options], { encoding: 'utf8' });
   if (made.status !== 0) throw new Error(`generate ended with ${made.status}: ${made.stderr}`);
   return file;
 }
@@ -133,8 +133,17 @@ export const sceneOnServer = (page) =>
     return (await fetch(`api/v1/sessions/${id}/scene`)).json();
   });
 
+/** Edits the scene as another client would: a script with the same access. */
+export const patchFromOutside = (page, patch) =>
+  page.evaluate(async (body) => {
+    const { id } = JSON.parse(sessionStorage.getItem('scolopax.session'));
+    const headers = { 'content-type': 'application/json' };
+    const answer = await fetch(`api/v1/sessions/${id}/scene`, { method: 'PATCH', headers, body: JSON.stringify(body) });
+    if (!answer.ok) throw new Error(await answer.text());
+  }, patch);
+
 /** Waits until a full-size picture of the newest scene has so many samples, and looks at it. */
-export async function steadyPicture(page, samples = 16) {
+export async function steadyPicture(page, samples = 16, timeoutMs = 90_000) {
   await page.locator('canvas[data-revision]').waitFor();
   let revision;
   // The page sends its edits with the next animation frame, and some follow from an answer of the server.
@@ -155,7 +164,7 @@ export async function steadyPicture(page, samples = 16) {
         { revision, samples },
       ),
     `no full picture of revision ${revision} with ${samples} samples`,
-    90_000,
+    timeoutMs,
   );
   return lookAt(page);
 }

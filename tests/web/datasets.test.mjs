@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// With several data sets the page offers a choice, and shows the one chosen with channels and view of its own.
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import { difference, eventually, generateOrbitals, launchBrowser, openPage, scratchFolder, startServer, steadyPicture } from './support.mjs';
+
+const started = [];
+after(async () => {
+  for (const end of started.reverse()) await end();
+});
+
+test('choosing another data set shows it', async () => {
+  const folder = scratchFolder();
+  const files = [generateOrbitals(folder), generateOrbitals(folder, 'pair.nrrd', ['--size', '32', '--channels', '2'])];
+  const server = await startServer(files);
+  started.push(() => server.end());
+  const browser = await launchBrowser();
+  started.push(() => browser.close());
+  const { page, faults } = await openPage(browser, server.url);
+
+  const first = await steadyPicture(page, 4);
+  const channels = page.locator('.channel');
+  const four = await channels.count();
+  assert.equal(four, 4);
+  await page.locator('input[type=color].swatch').first().fill('#00ff00');
+  await page.getByRole('combobox', { name: 'Data set' }).selectOption('pair');
+  await eventually(async () => (await channels.count()) === 2, 'the channels of the pair are not shown');
+  assert.match(await page.locator('.dataset').textContent(), /32 × 32 × 32 voxels/);
+  const second = await steadyPicture(page, 4);
+  assert.ok(Math.max(...second.blocks) > 30, 'the pair is dark');
+  assert.ok(difference(first, second) > 8, 'the picture is still the first');
+  assert.notEqual(await page.locator('input[type=color].swatch').first().inputValue(), '#00ff00');
+  assert.deepEqual(faults, []);
+});
