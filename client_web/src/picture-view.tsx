@@ -20,7 +20,8 @@ export function PictureView({ store, attach }: { store: Store; attach(view: Fram
     let timer: ReturnType<typeof setTimeout> | undefined;
     const measure = () => {
       const ratio = Math.min(kMostPixelRatio, window.devicePixelRatio || 1);
-      store.setImageSize(Math.round(element.clientWidth * ratio), Math.round(element.clientHeight * ratio));
+      const { clientWidth, clientHeight } = element;
+      store.setImageSize({ width: Math.round(clientWidth * ratio), height: Math.round(clientHeight * ratio) });
     };
     const observer = new ResizeObserver(() => {
       clearTimeout(timer);

@@ -8,6 +8,7 @@ import { DatasetList } from './dataset-list';
 import { Edits } from './edits';
 import type { FrameHeader } from './frame-header';
 import { FrameMeter } from './frame-meter';
+import { fitSize, type Size } from './image-size';
 import { applyPatch, isObject, patchAt, type Json, type JsonObject } from './merge-patch';
 import type { Camera } from './orbit-camera';
 import type { Scene } from './scene.generated';
@@ -51,7 +52,7 @@ export class Store {
   private revision = 0;
   private settleTimer: ReturnType<typeof setTimeout> | undefined;
   private onRefreshed: (() => void) | undefined;
-  private wantedSize: { width: number; height: number } | undefined;
+  private place: Size | undefined;
 
   constructor(private readonly onFrame: (message: ArrayBuffer) => void) {
     this.link = new Connection(
@@ -108,13 +109,8 @@ export class Store {
   }
 
   /** The size in device pixels that the picture should have. */
-  setImageSize(width: number, height: number): void {
-    const { imageWidth = Infinity, imageHeight = Infinity, imagePixels = Infinity } = this.capabilities.peek().limits ?? {};
-    const shrink = Math.min(1, imageWidth / width, imageHeight / height, Math.sqrt(imagePixels / (width * height)));
-    this.wantedSize = {
-      width: Math.max(1, Math.floor(width * shrink)),
-      height: Math.max(1, Math.floor(height * shrink)),
-    };
+  setImageSize(place: Size): void {
+    this.place = place;
     this.applySize();
   }
 
@@ -212,8 +208,8 @@ export class Store {
 
   private applySize(): void {
     const image = this.scene.peek()?.image;
-    const size = this.wantedSize;
-    if (!size || !image || (image.width === size.width && image.height === size.height)) return;
-    this.edit({ image: size });
+    if (!this.place || !image) return;
+    const { width, height } = fitSize(this.place, this.capabilities.peek().limits);
+    if (image.width !== width || image.height !== height) this.edit({ image: { width, height } });
   }
 }
