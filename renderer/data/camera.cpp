@@ -34,6 +34,20 @@ Basis basisOf(const Camera& camera) {
   return {right, glm::cross(right, forward), forward};
 }
 
+bool isFinite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+void checkCamera(const Camera& camera) {
+  if (!isFinite(camera.eye) || !isFinite(camera.target) || !isFinite(camera.up))
+    throw Error(ErrorCode::badInput, "camera: eye, target and up must be finite");
+  if (camera.orthoHeight ? !(*camera.orthoHeight > 0 && std::isfinite(*camera.orthoHeight))
+                         : !(camera.fovY > 0 && camera.fovY < 180))
+    throw Error(ErrorCode::badInput,
+                camera.orthoHeight
+                    ? "camera.orthoHeight: expected a finite number above 0, found " +
+                          std::to_string(*camera.orthoHeight)
+                    : "camera.fovY: expected above 0 and below 180, found " + std::to_string(camera.fovY));
+}
+
 glm::dvec3 centreOf(const Grid& grid) {
   return glm::dvec3(grid.worldFromVoxel * glm::dvec4(glm::dvec3(grid.dims - 1) * 0.5, 1));
 }
@@ -41,6 +55,7 @@ glm::dvec3 centreOf(const Grid& grid) {
 }  // namespace
 
 kernel::CameraRays makeCameraRays(const Camera& camera, const Grid& grid, int width, int height) {
+  checkCamera(camera);
   const Basis basis = basisOf(camera);
   const glm::dmat4 voxelFromWorld = glm::inverse(grid.worldFromVoxel);
   const glm::dmat3 linear(voxelFromWorld);

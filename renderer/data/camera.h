@@ -20,7 +20,8 @@ struct Camera {
 };
 
 /// Rays in voxel coordinates, computed in double and shifted to just before the box, so that neither an
-/// offset of the world nor a far eye costs precision. Throws Error(badInput) for a camera without direction.
+/// offset of the world nor a far eye costs precision. Throws Error(badInput) for a camera without direction,
+/// or with a number that is not finite or out of range.
 kernel::CameraRays makeCameraRays(const Camera& camera, const Grid& grid, int width, int height);
 
 /// The default view: the whole box in the frame, seen from a little above and to the side.

@@ -68,10 +68,10 @@ TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearan
   const double hi = (a.rangeHi - channel.intercept) / channel.slope;
   constexpr double kLimit = 0x1p126;
   origin_ = float(std::clamp(lo, -kLimit, kLimit));
-  if (a.rangeLo == a.rangeHi) {
+  if (lo == hi) {  // or the ends differ by less than slope and intercept can tell
     // A step: 0 below, 1 from lo on. The origin is the last float at which the position may still be 1.
     const float infinity = std::numeric_limits<float>::infinity();
-    const bool rising = channel.slope > 0;
+    const bool rising = (channel.slope > 0) == (a.rangeLo <= a.rangeHi);
     if (rising && double(origin_) < lo) origin_ = std::nextafter(origin_, infinity);
     if (!rising && double(origin_) > lo) origin_ = std::nextafter(origin_, -infinity);
     scale_ = rising ? std::numeric_limits<float>::max() : -std::numeric_limits<float>::max();

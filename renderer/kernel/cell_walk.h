@@ -22,8 +22,10 @@ SCOLOPAX_HD inline Interval clipToBox(const Ray& ray, glm::ivec3 dims) {
       continue;
     }
     const float a = (lo - o) / d, b = (hi - o) / d;
-    inside.enter = maximum(inside.enter, minimum(a, b));
-    inside.exit = minimum(inside.exit, maximum(a, b));
+    const float near = minimum(a, b), far = maximum(a, b);
+    if (!(near <= far)) return {0.0f, 0.0f};  // not finite: such a ray sees nothing
+    inside.enter = maximum(inside.enter, near);
+    inside.exit = minimum(inside.exit, far);
   }
   if (!(inside.exit < kInfinity)) return {0.0f, 0.0f};  // no direction at all
   return inside;
@@ -37,7 +39,8 @@ class CellWalk {
     for (int axis = 0; axis < 3; ++axis) {
       const float at = (ray.origin[axis] + inside.enter * ray.direction[axis]) * inverseSize;
       cell_[axis] = int(clamp(at, 0.0f, float(grid.cells[axis] - 1)));
-      inverseDirection_[axis] = 1.0f / ray.direction[axis];
+      // Finite also for a denormal direction: a plane at distance 0 is at t = 0, not NaN.
+      inverseDirection_[axis] = clamp(1.0f / ray.direction[axis], -kLargestFinite, kLargestFinite);
       next_[axis] = planeAfter(axis);
     }
     leave();

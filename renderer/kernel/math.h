@@ -11,6 +11,7 @@
 namespace scolopax::kernel {
 
 inline constexpr float kInfinity = __builtin_huge_valf();
+inline constexpr float kLargestFinite = 0x1.fffffep127f;
 
 SCOLOPAX_HD inline float squareRoot(float x) { return __builtin_sqrtf(x); }
 SCOLOPAX_HD inline float minimum(float a, float b) { return a < b ? a : b; }

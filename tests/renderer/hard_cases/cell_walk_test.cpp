@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rays that traversals get wrong: along faces and edges, with zero components, and with no sense at all.
+#include "renderer/kernel/cell_walk.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace scolopax::kernel {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kDenormal = std::numeric_limits<float>::denorm_min();
+constexpr float kLargest = std::numeric_limits<float>::max();
+
+/// A grid of macrocells without values: walks read none.
+MajorantView gridFor(glm::ivec3 dims, int size) {
+  return {glm::max(glm::ivec3(1), (dims - 2 + size) / size), float(size), nullptr};
+}
+int longestWalk(const MajorantView& grid) { return grid.cells.x + grid.cells.y + grid.cells.z - 2; }
+std::size_t cellCount(const MajorantView& grid) {
+  return std::size_t(grid.cells.x) * std::size_t(grid.cells.y) * std::size_t(grid.cells.z);
+}
+
+/// The clip in double, for rays that are finite.
+Interval clipInDouble(const Ray& ray, glm::ivec3 dims) {
+  double enter = 0, exit = 1e300;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double o = double(ray.origin[axis]), d = double(ray.direction[axis]);
+    if (d == 0) {
+      if (o < -0.5 || o > dims[axis] - 0.5) return {0, 0};
+      continue;
+    }
+    const double a = (-0.5 - o) / d, b = (dims[axis] - 0.5 - o) / d;
+    enter = std::max(enter, std::min(a, b));
+    exit = std::min(exit, std::max(a, b));
+  }
+  return {float(enter), float(exit)};
+}
+
+TEST(CellWalk, VisitsTheCellsOfARayWithoutGapsAndEndsWithIt) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  for (const glm::ivec3 dims : {glm::ivec3(13, 7, 19), glm::ivec3(1, 1, 1), glm::ivec3(2, 31, 1)})
+    for (const int size : {1, 3, 4, 5, 64}) {
+      const MajorantView grid = gridFor(dims, size);
+      for (int trial = 0; trial < 5000; ++trial) {
+        Ray ray;
+        for (int axis = 0; axis < 3; ++axis) {
+          // Often exactly on a face of voxels, cells or the box, and often without a component.
+          const float where = (uniform(random) * 0.5f + 0.5f) * float(dims[axis]) - 0.5f;
+          const auto kind = random() % 4;
+          ray.origin[axis] = kind == 0   ? std::floor(where)
+                             : kind == 1 ? (random() % 2 ? -0.5f : float(dims[axis]) - 0.5f)
+                                         : where;
+          ray.direction[axis] = random() % 3 == 0 ? 0.0f : random() % 3 == 0 ? 1.0f : uniform(random);
+        }
+        if (ray.direction == glm::vec3(0)) continue;
+        ray.origin -= ray.direction * float(random() % 3) * 32.0f;  // exact for direction 1
+        const Interval inside = clipToBox(ray, dims), exact = clipInDouble(ray, dims);
+        if (exact.exit - exact.enter > 1e-3f) {  // else rounding decides
+          ASSERT_NEAR(inside.enter, exact.enter, 1e-4f + exact.enter * 1e-5f);
+          ASSERT_NEAR(inside.exit, exact.exit, 1e-4f + exact.exit * 1e-5f);
+        }
+        if (!(inside.enter < inside.exit)) continue;
+        CellWalk walk(ray, inside, grid);
+        ASSERT_EQ(walk.enter(), inside.enter);
+        for (int step = 0;; ++step) {
+          ASSERT_LE(step, longestWalk(grid));
+          ASSERT_LT(walk.index(), cellCount(grid));
+          ASSERT_LE(walk.enter(), walk.exit());
+          // A point of the piece is not moved by more than rounding.
+          const float t = 0.5f * (walk.enter() + walk.exit());
+          const glm::vec3 p = ray.origin + t * ray.direction, q = walk.pointAt(t);
+          for (int axis = 0; axis < 3; ++axis)
+            ASSERT_NEAR(p[axis], q[axis], 2e-5f * (1 + std::abs(ray.origin[axis]))) << "size " << size;
+          const float left = walk.exit();
+          if (!walk.advance()) {
+            ASSERT_EQ(left, inside.exit);
+            break;
+          }
+          ASSERT_EQ(walk.enter(), left);
+        }
+      }
+    }
+}
+
+TEST(CellWalk, CountsTheFacesOfTheBoxAsInsideAndNothingBeside) {
+  const glm::ivec3 dims(6, 4, 9);
+  const auto lengthAt = [&](glm::vec3 origin, glm::vec3 direction) {
+    const Interval inside = clipToBox({origin, direction}, dims);
+    return inside.enter < inside.exit ? inside.exit - inside.enter : 0.0f;
+  };
+  for (const float x : {-0.5f, 0.0f, 2.0f, 5.5f})
+    for (const float y : {-0.5f, 1.0f, 3.5f}) {
+      EXPECT_EQ(lengthAt({x, y, -8}, {0, 0, 1}), 9);
+      EXPECT_EQ(lengthAt({x, y, -8}, {-0.0f, 0, 1}), 9);
+      EXPECT_EQ(lengthAt({x, y, 20}, {0, -0.0f, -1}), 9);
+      EXPECT_EQ(lengthAt({x, y, -8}, {0, 0, -1}), 0);
+      EXPECT_EQ(lengthAt({x, y, 2.5f}, {0, 0, -1}), 3);  // from inside
+      EXPECT_EQ(lengthAt({x, y, 2.5f}, {0, 0, 1}), 6);
+    }
+  for (const float x : {std::nextafter(-0.5f, -1.0f), std::nextafter(5.5f, 6.0f)})
+    EXPECT_EQ(lengthAt({x, 1, -8}, {0, 0, 1}), 0);
+  EXPECT_EQ(lengthAt({-0.5f, -0.5f, -0.5f}, {-1, -1, -1}), 0);  // in a corner, looking out
+  EXPECT_EQ(lengthAt({-0.5f, -0.5f, -0.5f}, {1, 1, 1}), 4);     // and in
+  EXPECT_EQ(lengthAt({2, 2, 2}, {0, 0, 0}), 0);
+}
+
+TEST(CellWalk, TakesADenormalDirectionForNone) {
+  // 1 / direction is infinite and, on the plane between two cells, its product with 0 is NaN.
+  const glm::ivec3 dims(9, 9, 9);
+  const MajorantView grid = gridFor(dims, 4);
+  for (int axis = 0; axis < 3; ++axis)
+    for (const float tiny : {kDenormal, -kDenormal, 1e-39f, -1e-39f})
+      for (int along = 0; along < 3; ++along) {
+        if (along == axis) continue;
+        Ray ray{glm::vec3(4), glm::vec3(0)};
+        ray.origin[along] = -3;
+        ray.direction[along] = 1;
+        ray.direction[axis] = tiny;
+        const Interval inside = clipToBox(ray, dims);
+        ASSERT_EQ(inside.enter, 2.5f);
+        ASSERT_EQ(inside.exit, 11.5f);
+        CellWalk walk(ray, inside, grid);
+        std::vector<float> ends;
+        do
+          if (walk.exit() > walk.enter()) ends.push_back(walk.exit());
+        while (walk.advance());
+        EXPECT_EQ(ends, (std::vector<float>{7, 11.5f})) << axis << along << tiny;
+      }
+}
+
+TEST(CellWalk, OfRaysWithoutSenseIsBoundedAndSeesNothingWhereTheyAreNotFinite) {
+  const float values[] = {0.0f, -0.0f,     0.3f,       -0.3f,  1.0f,  -1.0f,    2.0f,
+                          4.0f, kDenormal, -kDenormal, 1e-39f, 1e30f, kLargest, -kLargest,
+                          kNaN, kInfinity, -kInfinity, 1e-30f, 5.5f,  -0.5f,    -1e-39f};
+  std::mt19937 random(2);
+  const glm::ivec3 dims(6, 5, 9);
+  for (const int size : {1, 2, 4}) {
+    const MajorantView grid = gridFor(dims, size);
+    for (int trial = 0; trial < 400'000; ++trial) {
+      Ray ray;
+      bool finite = true;
+      for (int i = 0; i < 6; ++i) {
+        float& component = i < 3 ? ray.origin[i] : ray.direction[i - 3];
+        component = values[random() % std::size(values)];
+        finite = finite && isFinite(component);
+      }
+      const Interval inside = clipToBox(ray, dims);
+      ASSERT_TRUE(finite || !(inside.enter < inside.exit)) << trial;
+      // Whatever the interval, also one that no caller would walk.
+      for (const Interval interval :
+           {inside, Interval{0, 10}, Interval{-kInfinity, kInfinity}, Interval{kNaN, kNaN}}) {
+        CellWalk walk(ray, interval, grid);
+        int steps = 0;
+        do {
+          ASSERT_LE(steps++, longestWalk(grid)) << trial;
+          ASSERT_LT(walk.index(), cellCount(grid)) << trial;
+          for (const float t : {walk.enter(), walk.exit(), kNaN}) {
+            const glm::vec3 p = walk.pointAt(t);
+            for (int axis = 0; axis < 3; ++axis)
+              ASSERT_TRUE(p[axis] >= -0.5f && p[axis] <= float(dims[axis] + size)) << trial;
+          }
+        } while (walk.advance());
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace scolopax::kernel

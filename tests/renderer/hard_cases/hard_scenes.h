@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the hard cases share: colours of zeros and ones, fields with some structure, and views of them.
+#pragma once
+#include "tests/support/statistics.h"
+#include "tests/support/volumes.h"
+
+namespace scolopax::test {
+
+constexpr glm::dvec3 kRed(1, 0, 0), kGreen(0, 1, 0), kBlue(0, 0, 1), kWhite(1, 1, 1);
+constexpr Method kTrackers[] = {Method::superposed, Method::syncDda};
+
+/// Opacity rises from 0 at lo to 1 at hi.
+inline ChannelAppearance ramp(double lo, double hi, double density, glm::dvec3 color = kWhite) {
+  ChannelAppearance a;
+  a.rangeLo = lo;
+  a.rangeHi = hi;
+  a.density = density;
+  a.color = {{0, color}};
+  return a;
+}
+
+/// A lumpy field between 0 and 1, different for every `kind`.
+inline auto lumps(int kind = 0) {
+  return [kind](int x, int y, int z) {
+    return 0.5 + 0.5 * std::sin(0.9 * x + kind) * std::cos(1.3 * y - 0.5 * kind) * std::sin(0.7 * z + 1.1);
+  };
+}
+
+/// A picture with one value everywhere: the closed form of a scene that looks the same in every pixel.
+inline reference::ReferenceImage flat(const Scene& scene, glm::dvec4 value) {
+  const std::size_t pixels = std::size_t(scene.width) * std::size_t(scene.height);
+  return {{scene.width, scene.height, std::vector<glm::vec4>(pixels, glm::vec4(value))}, {}, 0};
+}
+
+/// Every tracker, and the reference, against optical thickness `depth` of one colour in every pixel.
+inline void expectThickness(const std::shared_ptr<const Volume>& volume, Scene scene, double depth,
+                            glm::dvec3 color, int samples) {
+  const double alpha = -std::expm1(-depth);
+  const auto expected = flat(scene, glm::dvec4(color, 1) * alpha);
+  expectTrackersMatch(expected, volume, scene, samples);
+  scene.filter = PixelFilter::point;
+  const auto reference = reference::renderReference(*volume, scene, 1);
+  for (const glm::vec4& pixel : reference.image.pixels)
+    ASSERT_NEAR(pixel.a / alpha, 1, 1e-5 + reference.maximumRayError / alpha);
+}
+
+/// Every tracker against the reference, through pixel centres.
+inline void expectReference(const std::shared_ptr<const Volume>& volume, Scene scene, int samples) {
+  scene.filter = PixelFilter::point;
+  expectTrackersMatchReference(volume, scene, samples, 1);
+}
+
+/// Perspective view of a scene whose channels are still to be set.
+inline Scene viewFrom(const Volume& volume, glm::dvec3 eye, glm::dvec3 target, double fovY, int side) {
+  Scene scene;
+  scene.camera.eye = eye;
+  scene.camera.target = target;
+  scene.camera.up = {0.1, 1, 0.2};
+  scene.camera.fovY = fovY;
+  scene.width = scene.height = side;
+  scene.channels.resize(volume.channels().size());
+  return scene;
+}
+
+inline RenderStats statsOf(const std::shared_ptr<const Volume>& volume, Scene scene, Method method,
+                           int samples) {
+  scene.method = method;
+  const auto renderer = makeCpuRenderer(volume, 0);
+  renderer->countCosts();
+  renderer->setScene(scene);
+  const std::atomic<bool> never = false;
+  for (int i = 0; i < samples; ++i) renderer->renderSample(never);
+  return renderer->stats();
+}
+
+}  // namespace scolopax::test
