@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 #include <new>
 
 #include "renderer/core/error.h"
@@ -34,17 +35,37 @@ void checkGrid(const Grid& grid) {
     throw Error(ErrorCode::badInput, "volume: the affine from voxels to world is singular");
 }
 
-/// Kernels interpolate in float. A power of two, moved from the voxels to the slope, keeps differences of
-/// huge values finite and spreads of tiny ones above the denormals; nothing is rounded.
-void normaliseMagnitude(Channel& channel) {
+/// Kernels interpolate in float. What float does badly is moved from the voxels to slope and intercept, exactly:
+/// a power of two, so that differences of huge values stay finite and spreads of tiny ones above the denormals
+/// (only denormals beside huge values are rounded); and the least value of a spread that is narrow for its
+/// distance from zero, so that what lies between two voxels has the resolution of the spread.
+void normalise(Channel& channel) {
   if (channel.voxels.type() != ScalarType::f32) return;
-  float largest = 0;
-  for (const float v : channel.voxels.as<float>())
-    if (std::isfinite(v)) largest = std::max(largest, std::abs(v));
-  if (largest == 0 || (largest < 0x1p124f && largest > 0x1p-100f)) return;
-  const int shift = -std::ilogb(largest);
-  for (float& v : channel.voxels.as<float>()) v = std::ldexp(v, shift);
-  channel.slope = std::ldexp(channel.slope, -shift);
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const auto voxels = channel.voxels.as<float>();
+  float least = kInfinity, most = -kInfinity;
+  for (const float v : voxels) {
+    if (!std::isfinite(v)) continue;
+    least = std::min(least, v);
+    most = std::max(most, v);
+  }
+  const float largest = std::max(std::abs(least), std::abs(most));
+  if (!(least <= most) || largest == 0) return;
+  // Below 2^124 the kernels' differences are finite; 1 is as good as any size for the tiny.
+  const int shift = largest >= 0x1p124f ? 123 - std::ilogb(largest)
+                    : largest <= 0x1p-100f ? -std::ilogb(largest)
+                                           : 0;
+  if (shift != 0) {
+    for (float& v : voxels) v = std::ldexp(v, shift);
+    channel.slope = std::ldexp(channel.slope, -shift);
+    least = std::ldexp(least, shift);
+    most = std::ldexp(most, shift);
+  }
+  // Within a factor of two, differences of floats are exact.
+  if (least < most && most - least <= std::abs(least) * 0x1p-8f) {
+    for (float& v : voxels) v -= least;
+    channel.intercept += channel.slope * double(least);
+  }
 }
 
 }  // namespace
@@ -104,7 +125,7 @@ Volume::Volume(Grid grid, std::vector<ChannelSource> sources) : grid_(grid) {
     if (!std::isfinite(channel.slope) || channel.slope == 0 || !std::isfinite(channel.intercept))
       throw Error(ErrorCode::badInput, "volume: channel '" + channel.name +
                                            "' needs a finite slope that is not 0 and a finite intercept");
-    normaliseMagnitude(channel);
+    normalise(channel);
     channel.histogram = measureHistogram(channel.voxels, channel.slope, channel.intercept);
     channels_.push_back(std::move(channel));
   }

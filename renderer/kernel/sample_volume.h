@@ -8,7 +8,8 @@
 
 namespace scolopax::kernel {
 
-/// One axis of a fetch: the two neighbours' offsets in voxels, and the weight of the second.
+/// One axis of a fetch: the two neighbours' offsets in voxels, and the weight of the second, below 1: at the
+/// last voxel and beyond they change places, so that its value comes out exactly, whatever is beside it.
 struct AxisWeight {
   std::size_t low, high;
   float t;
@@ -18,8 +19,8 @@ SCOLOPAX_HD inline AxisWeight axisWeight(float x, int size, std::size_t stride) 
   const float inside = clamp(x, 0.0f, float(size - 1));
   const int last = size > 1 ? size - 2 : 0;
   const int whole = int(inside);
-  const int i = whole < last ? whole : last;
-  return {std::size_t(i) * stride, std::size_t(size > 1 ? i + 1 : 0) * stride, inside - float(i)};
+  if (whole > last) return {std::size_t(whole) * stride, std::size_t(last) * stride, 0.0f};
+  return {std::size_t(whole) * stride, std::size_t(size > 1 ? whole + 1 : 0) * stride, inside - float(whole)};
 }
 
 /// Exact where a == b; between a and b but for rounding, which the macrocells allow for.

@@ -78,6 +78,10 @@ TEST(Values, FarFromZeroKeepTheResolutionOfTheirVoxels) {
   for (int k = 0; k <= 16; ++k) values.push_back(1e6 + k * 0.0625);  // neighbouring floats
   const Row row = Row::of<float>(values);
   for (int k = 0; k <= 16; ++k) EXPECT_EQ(row.position(k, 1e6, 1e6 + 1), k / 16.0);
+  for (double x = 0; x < 16; x += 0.3)  // between two voxels there is more than they can hold
+    EXPECT_NEAR(row.position(x, 1e6, 1e6 + 1), x / 16, 2 * kUlp);
+  const std::vector<double> negative = {-1e6, -1e6 + 0.125};
+  EXPECT_NEAR(Row::of<float>(negative).position(0.3, -1e6, -1e6 + 0.125), 0.3, kUlp);
   // Ends of a range that are no floats themselves.
   EXPECT_NEAR(row.position(4, 1e6 + 0.03, 1e6 + 0.53), (0.25 - 0.03) / 0.5, 4 * kUlp);
   const Row kelvin = Row::of<float>({280, 295, 310});
@@ -149,6 +153,20 @@ TEST(Values, ThatAreTinyOrHugeKeepTheirPlaceInTheRange) {
   EXPECT_EQ(huge.position(3, -kLargest, kLargest), 1);
   EXPECT_EQ(huge.position(3, 0, 1e-30), 1);
   EXPECT_EQ(huge.position(0, 0, 1e-30), 0);
+}
+
+TEST(Values, BesideAFillValueKeepTheirPlaceInTheRange) {
+  for (const double fill : {kLargest, -kLargest, -1e20, 9.97e36, -9999.0}) {
+    const Row row = Row::of<float>({0, 0.25, 1e-3, 1, 0.7, fill, 0.3});
+    EXPECT_EQ(row.position(1, 0, 1), 0.25);
+    EXPECT_NEAR(row.position(2, 0, 1), 1e-3, 1e-3 * kUlp);
+    EXPECT_EQ(row.position(3, 0, 1), 1);
+    EXPECT_NEAR(row.position(2, 0, 2e-3), 0.5, kUlp);
+    // The last voxel's value fills the half voxel beyond it.
+    for (const double x : {6.0, 6.2, 6.5}) EXPECT_NEAR(row.position(x, 0, 1), 0.3, kUlp) << fill;
+    const Row turned = Row::of<float>({0.3, fill});
+    for (const double x : {-0.5, 0.0}) EXPECT_NEAR(turned.position(x, 0, 1), 0.3, kUlp) << fill;
+  }
 }
 
 TEST(Values, OfMinusZeroAreZero) {
