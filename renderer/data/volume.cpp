@@ -35,10 +35,10 @@ void checkGrid(const Grid& grid) {
     throw Error(ErrorCode::badInput, "volume: the affine from voxels to world is singular");
 }
 
-/// Kernels interpolate in float. What float does badly is moved from the voxels to slope and intercept, exactly:
-/// a power of two, so that differences of huge values stay finite and spreads of tiny ones above the denormals
-/// (only denormals beside huge values are rounded); and the least value of a spread that is narrow for its
-/// distance from zero, so that what lies between two voxels has the resolution of the spread.
+/// Kernels interpolate in float. What float does badly is moved from the voxels to slope and intercept,
+/// exactly: a power of two, so that differences of huge values stay finite and spreads of tiny ones above the
+/// denormals (only denormals beside huge values are rounded); and the least value of a spread that is narrow
+/// for its distance from zero, so that what lies between two voxels has the resolution of the spread.
 void normalise(Channel& channel) {
   if (channel.voxels.type() != ScalarType::f32) return;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -52,7 +52,7 @@ void normalise(Channel& channel) {
   const float largest = std::max(std::abs(least), std::abs(most));
   if (!(least <= most) || largest == 0) return;
   // Below 2^124 the kernels' differences are finite; 1 is as good as any size for the tiny.
-  const int shift = largest >= 0x1p124f ? 123 - std::ilogb(largest)
+  const int shift = largest >= 0x1p124f    ? 123 - std::ilogb(largest)
                     : largest <= 0x1p-100f ? -std::ilogb(largest)
                                            : 0;
   if (shift != 0) {

@@ -17,8 +17,8 @@ std::shared_ptr<const Volume> rampAlongZ(int n) {
 }
 
 TEST(Thickness, OfOneHundredThousandthIsNotAFactorOfTwoOff) {
-  // 34 million rays see 340 collisions: 6 sigma are 33 %. From 1e-6 on the exact law is tested without noise in
-  // draws_test.
+  // 34 million rays see 340 collisions: 6 sigma are 33 %. From 1e-6 on the exact law is tested without noise
+  // in draws_test.
   const glm::ivec3 dims(4, 4, 16);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int) { return 1; }));
   const double thickness = 1e-5, alpha = -std::expm1(-thickness);

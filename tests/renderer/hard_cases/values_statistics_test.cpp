@@ -33,7 +33,8 @@ auto between(double lo, double hi) {
 
 TEST(VoxelValues, OfAConstantVolumeAreSeenAtTheirPlaceOnTheCurve) {
   for (const double value : {0.0, 0.3, 1.0}) {
-    const auto volume = volumeOf(gridOf(kDims), channelOf<float>(kDims, [&](int, int, int) { return value; }));
+    const auto volume =
+        volumeOf(gridOf(kDims), channelOf<float>(kDims, [&](int, int, int) { return value; }));
     Scene scene = frontScene(*volume, 16, 16);
     scene.camera.orthoHeight = 5;  // inside the silhouette
     scene.channels[0] = ramp(0, 1, 0.4, kRed);
@@ -43,12 +44,12 @@ TEST(VoxelValues, OfAConstantVolumeAreSeenAtTheirPlaceOnTheCurve) {
 }
 
 TEST(VoxelValues, ThatAreNotFiniteLeaveHolesOfTheirCells) {
-  for (const double bad :
-       {double(NAN), double(INFINITY), -double(INFINITY)}) {
+  for (const double bad : {double(NAN), double(INFINITY), -double(INFINITY)}) {
     const auto holed = [&](int x, int y, int z) {
       return (x == 3 && y == 2) || (x == 0 && y == 5 && z == 4) ? bad : lumps()(x, y, z);
     };
-    const auto volume = volumeOf(gridOf(kDims), channelOf<float>(kDims, holed), channelOf<float>(kDims, lumps(2)));
+    const auto volume =
+        volumeOf(gridOf(kDims), channelOf<float>(kDims, holed), channelOf<float>(kDims, lumps(2)));
     Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kSide);
     scene.channels = {ramp(0, 1, 0.5, kRed), ramp(0, 1, 0.3, kBlue)};
     for (const int macrocell : {1, 4}) {
@@ -59,8 +60,18 @@ TEST(VoxelValues, ThatAreNotFiniteLeaveHolesOfTheirCells) {
 }
 
 TEST(VoxelValues, OfEveryKindAtOnceMatchTheReference) {
-  const float kinds[] = {NAN,   INFINITY, -INFINITY,      float(kLargest), -float(kLargest), float(kDenormal),
-                         -0.0f, 0.0f,     -float(kDenormal), 1e-30f,       1.0f,             -1e20f};
+  const float kinds[] = {NAN,
+                         INFINITY,
+                         -INFINITY,
+                         float(kLargest),
+                         -float(kLargest),
+                         float(kDenormal),
+                         -0.0f,
+                         0.0f,
+                         -float(kDenormal),
+                         1e-30f,
+                         1.0f,
+                         -1e20f};
   std::uint32_t state = 5;
   const auto value = [&](int, int, int) {
     state = state * 1664525u + 1013904223u;
@@ -68,7 +79,8 @@ TEST(VoxelValues, OfEveryKindAtOnceMatchTheReference) {
   };
   const auto volume = volumeOf(gridOf({12, 12, 12}), channelOf<float>({12, 12, 12}, value));
   Scene scene = viewFrom(*volume, {28, 20, -14}, {5.5, 5.5, 5.5}, 32, kSide);
-  for (const auto& [lo, hi] : {std::pair(0.0, 1.0), std::pair(-kLargest, kLargest), std::pair(-1e-38, 1e-38)}) {
+  for (const auto& [lo, hi] :
+       {std::pair(0.0, 1.0), std::pair(-kLargest, kLargest), std::pair(-1e-38, 1e-38)}) {
     scene.channels = {ramp(lo, hi, 0.3, kGreen)};
     expectReference(volume, scene, kSamples);
   }
