@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace scolopax::reference {
 namespace {
@@ -50,7 +51,7 @@ void CellScalar::appendCrossings(double value, std::vector<double>& crossings) c
     const double s = -(h + std::copysign(std::sqrt(discriminant), h));
     for (const double root : {s / a, c / s})  // one may be infinite or NaN: then it is not inside
       if (root > 0 && root < 1) ends[count++] = root;
-    std::sort(ends.begin(), ends.begin() + count);
+    if (count == 3 && ends[2] < ends[1]) std::swap(ends[1], ends[2]);
   }
   ends[count] = 1;
   for (std::size_t i = 0; i < count; ++i) {
