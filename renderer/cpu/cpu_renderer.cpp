@@ -9,8 +9,8 @@
 #include "renderer/data/film.h"
 #include "renderer/data/render_plan.h"
 #include "renderer/kernel/render_pixel.h"
-#include "renderer/kernel/trackers/superposed.h"
-#include "renderer/kernel/trackers/sync_dda.h"
+#include "renderer/kernel/trackers/one_process.h"
+#include "renderer/kernel/trackers/process_per_channel.h"
 #include "renderer/renderer.h"
 
 namespace scolopax {
@@ -26,9 +26,9 @@ struct Pass {
 constexpr int kTile = 16;
 
 /// One tile of 16x16 pixels: neighbouring rays share voxels and macrocells.
-template <class Tracker, class Blend>
+template <class Tracker, class Blend, class Features>
 void renderTile(const Pass& pass, int tileX, int tileY) {
-  const kernel::RenderPixel<Tracker, Blend> render{pass.scene, pass.sample, pass.pixels, pass.cost};
+  const kernel::RenderPixel<Tracker, Blend, Features> render{pass.scene, pass.sample, pass.pixels, pass.cost};
   const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
   const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
   for (int y = tileY * kTile; y < endY; ++y)
@@ -37,21 +37,42 @@ void renderTile(const Pass& pass, int tileX, int tileY) {
 
 using TileFunction = void (*)(const Pass&, int, int);
 
+// One instance for every combination that a scene can ask for, chosen once per pass.
+template <class Tracker, class Blend>
+TileFunction chooseLight(const Scene& scene) {
+  using kernel::LightFeatures;
+  if (scene.shading)
+    return scene.shadows ? renderTile<Tracker, Blend, LightFeatures<true, true>>
+                         : renderTile<Tracker, Blend, LightFeatures<true, false>>;
+  return scene.shadows ? renderTile<Tracker, Blend, LightFeatures<false, true>>
+                       : renderTile<Tracker, Blend, LightFeatures<false, false>>;
+}
+
 template <class Tracker>
-TileFunction tileFunctionOf(BlendMode blend) {
-  switch (blend) {
+TileFunction chooseBlend(const Scene& scene) {
+  switch (scene.blend) {
     case BlendMode::density:
-      return renderTile<Tracker, kernel::BlendDensity>;
+      return chooseLight<Tracker, kernel::BlendDensity>(scene);
+    case BlendMode::max:
+      return chooseLight<Tracker, kernel::BlendMax>(scene);
+    case BlendMode::mix:
+      return chooseLight<Tracker, kernel::BlendMix>(scene);
+    case BlendMode::composite:
+      return chooseLight<Tracker, kernel::BlendComposite>(scene);
   }
   return nullptr;
 }
 
-TileFunction tileFunctionOf(Method method, BlendMode blend) {
-  switch (method) {
+TileFunction chooseKernel(const Scene& scene) {
+  switch (scene.method) {
     case Method::superposed:
-      return tileFunctionOf<kernel::Superposed>(blend);
+      return chooseBlend<kernel::Superposed>(scene);
+    case Method::cumulative:
+      return chooseBlend<kernel::Cumulative>(scene);
     case Method::syncDda:
-      return tileFunctionOf<kernel::SyncDda>(blend);
+      return chooseBlend<kernel::SyncDda>(scene);
+    case Method::nDda:
+      return chooseBlend<kernel::NDda>(scene);
   }
   return nullptr;
 }
@@ -82,7 +103,7 @@ class CpuRenderer final : public Renderer {
   bool renderSample(const std::atomic<bool>& cancel) override {
     const kernel::SceneView& scene = plan_.view();
     const Pass pass{scene, film_.samples(), film_.pass(), counting_ ? cost_.data() : nullptr};
-    const TileFunction renderTileAt = tileFunctionOf(plan_.scene().method, plan_.scene().blend);
+    const TileFunction renderTileAt = chooseKernel(plan_.scene());
     const int tilesX = (scene.width + kTile - 1) / kTile, tilesY = (scene.height + kTile - 1) / kTile;
     bool complete = false;
     arena_.execute([&] {

@@ -4,6 +4,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+
 namespace scolopax {
 
 std::vector<float> buildMajorants(const std::vector<ValueInterval>& intervals,
@@ -17,7 +19,8 @@ std::vector<float> buildMajorants(const std::vector<ValueInterval>& intervals,
   return bounds;
 }
 
-std::vector<float> combineMajorants(std::span<const std::vector<float>* const> channels, std::size_t cells) {
+std::vector<float> combineMajorants(std::span<const std::vector<float>* const> channels, std::size_t cells,
+                                    bool sums) {
   const std::size_t stride = 1 + channels.size();
   std::vector<float> values(cells * stride);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells, 4096),
@@ -26,7 +29,7 @@ std::vector<float> combineMajorants(std::span<const std::vector<float>* const> c
                         float* cell = &values[i * stride];
                         for (std::size_t n = 0; n < channels.size(); ++n) {
                           cell[1 + n] = (*channels[n])[i];
-                          cell[0] += cell[1 + n];
+                          cell[0] = sums ? cell[0] + cell[1 + n] : std::max(cell[0], cell[1 + n]);
                         }
                       }
                     });

@@ -15,7 +15,9 @@ namespace scolopax {
 std::vector<float> buildMajorants(const std::vector<ValueInterval>& intervals,
                                   const TransferFunction& transfer);
 
-/// Interleaves the bounds of the visible channels: per cell their sum, then each.
-std::vector<float> combineMajorants(std::span<const std::vector<float>* const> channels, std::size_t cells);
+/// Interleaves the bounds of the visible channels: per cell their sum (or, for blend modes that show one
+/// channel at a point, their maximum), then each.
+std::vector<float> combineMajorants(std::span<const std::vector<float>* const> channels, std::size_t cells,
+                                    bool sums);
 
 }  // namespace scolopax

@@ -9,13 +9,20 @@ namespace scolopax {
 
 /// One line per entry: C++ name, wire name, what it is. Adding a tracker or blend mode is a line here and a
 /// struct in renderer/kernel; the instantiations expand these lists.
-#define SCOLOPAX_BLEND_MODES(X) \
-  X(density, "density", "extinctions add up; a collision shows the one channel it happened in (Eq. 6-7)")
+#define SCOLOPAX_BLEND_MODES(X)                                                                             \
+  X(density, "density", "extinctions add up; a collision shows the one channel it happened in (Eq. 6-7)")   \
+  X(max, "max", "at every point the channel of the largest extinction hides the others (Eq. 8-9)")          \
+  X(mix, "mix", "extinction as max; colours of all channels weighted by extinction and weight (Eq. 8, 10)") \
+  X(composite, "composite",                                                                                 \
+    "every channel rendered alone, the pictures added: depth between channels is lost (4.2)")
 
-#define SCOLOPAX_METHODS(X)                                                                         \
-  X(superposed, "superposed",                                                                       \
-    "one Poisson process over all channels, one optical depth carried across macrocells; unbiased") \
-  X(syncDda, "sync-dda", "one traversal, every channel tracked inside each macrocell (Listing 4); unbiased")
+#define SCOLOPAX_METHODS(X)                                                                                  \
+  X(superposed, "superposed",                                                                                \
+    "one Poisson process over all channels; a drawn channel is fetched and tested; unbiased")                \
+  X(cumulative, "cumulative",                                                                                \
+    "one Poisson process over all channels; all are fetched and tested (5.1); unbiased")                     \
+  X(syncDda, "sync-dda", "one traversal, every channel tracked inside each macrocell (Listing 4); unbiased") \
+  X(nDda, "n-dda", "a traversal for every channel, the nearest collision wins (Listing 3, mended); unbiased")
 
 #define SCOLOPAX_PIXEL_FILTERS(X)                              \
   X(box, "box", "samples spread evenly over the pixel's area") \

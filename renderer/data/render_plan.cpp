@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/data/render_plan.h"
 
+#include <algorithm>
 #include <chrono>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 
 #include "renderer/core/error.h"
 
@@ -21,16 +24,50 @@ bool samePicture(Scene a, const Scene& b) {
   return a == b;
 }
 
+/// Whether the bound of all channels together is the sum of theirs.
+bool sumsExtinction(BlendMode blend) { return blend != BlendMode::max && blend != BlendMode::mix; }
+
 void check(const Scene& scene, const Volume& volume) {
   const auto fail = [](const std::string& what) { throw Error(ErrorCode::badInput, what); };
   if (scene.channels.size() != volume.channels().size())
     fail("scene: expected " + std::to_string(volume.channels().size()) + " channels, found " +
          std::to_string(scene.channels.size()));
   checkImageSize(scene);
+  if (scene.lights.size() > std::size_t(kernel::kMaxLights))
+    fail("lights: at most " + std::to_string(kernel::kMaxLights) + " are possible, found " +
+         std::to_string(scene.lights.size()));
+  for (const Light& light : scene.lights)
+    if (!(light.intensity >= 0) || !(glm::min(light.color.x, glm::min(light.color.y, light.color.z)) >= 0))
+      fail("lights: colour and intensity must not be negative");
   if (scene.macrocell < 1 || scene.macrocell > 64)
     fail("integrator.macrocell: expected 1 to 64, found " + std::to_string(scene.macrocell));
 }
 
+}  // namespace
+
+namespace {
+/// Lights to voxel space; none when neither shading nor shadows ask for them.
+void placeLights(const Scene& scene, const Grid& grid, kernel::SceneView* view) {
+  const glm::dvec3 spacing = grid.spacing();
+  const double smallest = std::min({spacing.x, spacing.y, spacing.z});
+  const glm::dmat3 linear(grid.worldFromVoxel);
+  view->worldFromVoxel = glm::mat3(linear / smallest);
+  view->gradientFromVoxel = glm::mat3(glm::inverse(glm::transpose(linear / smallest)));
+  view->smallestSpacing = float(smallest);
+  view->lightCount = 0;
+  if (!scene.shading && !scene.shadows) return;
+  const std::vector<Light> headlight(1);
+  const glm::dmat4 voxelFromWorld = glm::inverse(grid.worldFromVoxel);
+  for (const Light& light : scene.lights.empty() ? headlight : scene.lights) {
+    kernel::LightView& v = view->lights[view->lightCount++];
+    v.kind = light.kind;
+    v.intensity = glm::vec3(light.color * light.intensity);
+    if (light.kind == kernel::LightKind::point)
+      v.vector = glm::vec3(glm::dvec3(voxelFromWorld * glm::dvec4(light.vector, 1)));
+    else
+      v.vector = glm::vec3(glm::dmat3(voxelFromWorld) * -glm::normalize(light.vector));
+  }
+}
 }  // namespace
 
 void checkImageSize(const Scene& scene) {
@@ -52,14 +89,14 @@ RebuildStats RenderPlan::update(const Scene& scene) {
   const auto macrocells = newCells ? sharedMacrocells(volume_, scene.macrocell) : macrocells_;
   if (newCells) stats.macrocellChannels = int(volume_->channels().size());
   std::vector<std::optional<ChannelPlan>> rebuilt(scene.channels.size());
-  bool combine = newCells || !scene_;
+  bool combine = newCells || !scene_ || sumsExtinction(scene_->blend) != sumsExtinction(scene.blend);
   for (std::size_t i = 0; i < scene.channels.size(); ++i) {
     const ChannelAppearance& appearance = scene.channels[i];
     const bool stale = newCells || !scene_ || !sameExtinction(scene_->channels[i], appearance);
-    const bool recolored = !scene_ || scene_->channels[i].color != appearance.color;
+    const bool restyled = !scene_ || scene_->channels[i] != appearance;
     if (scene_ && scene_->channels[i].visible != appearance.visible) combine = true;
     const bool unbuilt = i < channels_.size() && channels_[i] && channels_[i]->majorants.empty();
-    if (!stale && !recolored && !(unbuilt && appearance.visible)) continue;
+    if (!stale && !restyled && !(unbuilt && appearance.visible)) continue;
     ChannelPlan plan{TransferFunction(volume_->channels()[i], appearance), {}};
     const bool seen = appearance.visible && !plan.transfer.invisible();
     if (seen && (stale || unbuilt)) {
@@ -91,7 +128,8 @@ RebuildStats RenderPlan::update(const Scene& scene) {
   }
   const glm::ivec3 cells = macrocells_->cells;
   if (combine)
-    majorants_ = combineMajorants(bounds, std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z));
+    majorants_ = combineMajorants(bounds, std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z),
+                                  sumsExtinction(scene.blend));
 
   view_.rays = rays;
   view_.width = scene.width;
@@ -102,6 +140,7 @@ RebuildStats RenderPlan::update(const Scene& scene) {
   view_.channelCount = int(channelViews_.size());
   view_.channels = channelViews_.data();
   view_.majorants = {cells, float(macrocells_->size), majorants_.data()};
+  placeLights(scene, volume_->grid(), &view_);
   stats.rebuildMs =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   return stats;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "renderer/data/camera.h"
+#include "renderer/data/light.h"
 #include "renderer/data/method.h"
 
 namespace scolopax {
@@ -30,6 +31,8 @@ struct ChannelAppearance {
   double rangeLo = 0, rangeHi = 1;  ///< data units
   double gamma = 1;                 ///< > 0
   double density = 1;               ///< extinction = opacity * density, per world unit; >= 0
+  double weight = 1;                ///< of the colour in blend mode mix; >= 0
+  Material material;
   std::vector<OpacityKnot> opacity{{0, 0}, {1, 1}};
   std::vector<ColorKnot> color{{0, {1, 1, 1}}};
   bool operator==(const ChannelAppearance&) const = default;
@@ -39,6 +42,9 @@ struct Scene {
   std::vector<ChannelAppearance> channels;  ///< one per channel of the volume
   Camera camera;
   BlendMode blend = BlendMode::density;
+  bool shading = false;  ///< by the gradient of the scalar field
+  bool shadows = false;
+  std::vector<Light> lights;  ///< at most kernel::kMaxLights; none means one headlight
   Method method = Method::superposed;
   int macrocell = 4;  ///< voxels per macrocell edge
   std::uint32_t seed = 0;

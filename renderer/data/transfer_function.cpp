@@ -42,12 +42,20 @@ void checkPositions(const std::vector<Knot>& knots, const char* what) {
 }  // namespace
 
 TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearance& a)
-    : gamma_(float(a.gamma)), density_(float(std::min(a.density, 1e30))) {
+    : gamma_(float(a.gamma)),
+      density_(float(std::min(a.density, 1e30))),
+      weight_(float(a.weight)),
+      material_{float(a.material.ambient), float(a.material.diffuse), float(a.material.specular),
+                float(a.material.shininess)} {
   checkPositions(a.opacity, "opacity");
   checkPositions(a.color, "colormap");
   if (!(a.gamma > 0) || !(a.density >= 0) || !std::isfinite(a.rangeLo) || !std::isfinite(a.rangeHi))
     throw Error(ErrorCode::badInput,
                 "channel '" + channel.name + "': gamma must be above 0, density not negative, range finite");
+  const Material& m = a.material;
+  if (!(a.weight >= 0) || !(m.ambient >= 0) || !(m.diffuse >= 0) || !(m.specular >= 0) || !(m.shininess > 0))
+    throw Error(ErrorCode::badInput, "channel '" + channel.name +
+                                         "': weight and material must not be negative, shininess above 0");
   for (const OpacityKnot& knot : a.opacity) {
     if (!(knot.value >= 0 && knot.value <= 1))
       throw Error(ErrorCode::badInput,
@@ -68,6 +76,7 @@ TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearan
   const double hi = (a.rangeHi - channel.intercept) / channel.slope;
   constexpr double kLimit = 0x1p126;
   origin_ = float(std::clamp(lo, -kLimit, kLimit));
+  inverseRange_ = float(1.0 / std::abs(hi - lo));
   if (lo == hi) {  // or the ends differ by less than slope and intercept can tell
     // A step: 0 below, 1 from lo on. The origin is the last float at which the position may still be 1.
     const float infinity = std::numeric_limits<float>::infinity();
@@ -92,6 +101,9 @@ kernel::ChannelView TransferFunction::view(const Channel& channel) const {
   view.offset = offset_;
   view.gamma = gamma_;
   view.density = density_;
+  view.weight = weight_;
+  view.material = material_;
+  view.inverseRange = inverseRange_;
   view.opacity = opacity_.view();
   view.color = color_.view();
   return view;

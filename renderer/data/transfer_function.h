@@ -35,7 +35,8 @@ class TransferFunction {
   Curve<float> opacity_;
   Curve<glm::vec3> color_;
   float origin_, scale_, offset_;
-  float gamma_, density_;
+  float gamma_, density_, weight_, inverseRange_;
+  kernel::MaterialView material_;
 };
 
 }  // namespace scolopax

@@ -1,35 +1,91 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every tracker returns, and the tentative collision they share.
+// What trackers look for, and the tests of a tentative collision that they share.
 #pragma once
 #include <optional>
 
+#include "renderer/kernel/blend_modes.h"
 #include "renderer/kernel/cell_walk.h"
-#include "renderer/kernel/classify.h"
 #include "renderer/kernel/rng.h"
-#include "renderer/kernel/sample_volume.h"
 
 namespace scolopax::kernel {
 
+/// A distance along a ray, in world units, kept as the entry of a macrocell and the way past it: free flights
+/// far shorter than the resolution of their sum can still be told apart.
+struct Place {
+  float enter, past;
+  SCOLOPAX_HD float t() const { return enter + past; }
+};
+SCOLOPAX_HD inline bool nearer(const Place& a, const Place& b) {
+  return a.enter < b.enter || (a.enter == b.enter && a.past < b.past);
+}
+
 /// Nearest accepted collision along a ray.
 struct Collision {
-  float t;         ///< world units along the ray
-  int channel;     ///< among the visible channels
-  float position;  ///< on that channel's curves
+  Place place;
+  glm::vec3 point;  ///< voxel coordinates
+  int channel;      ///< among the visible channels
+  float position;   ///< on that channel's curves
 };
 
-/// Tentative collisions after which a sample gives up and counts as truncated: a bound on the work of one
-/// ray, far above what any thickness that can be told from opaque needs.
+/// Tentative collisions after which a ray gives up and counts as truncated: a bound on its work, far above
+/// what any thickness that can be told from opaque needs.
 inline constexpr std::uint32_t kMaxTentativeCollisions = 1u << 20;
 
-/// Fetches one channel at a tentative collision and accepts with probability extinction / majorant (Eq. 4).
-/// Strictly below, so that zero extinction is never hit; voxels that are not finite have none.
-SCOLOPAX_HD inline bool accept(const SceneView& scene, int channel, float majorant, glm::vec3 point, float u,
-                               float* position, SampleCost* cost) {
-  ++cost->fetches;
-  const float stored = sampleStored(scene.channels[channel], scene.dims, point);
-  if (!isFinite(stored)) return false;
-  *position = curvePosition(scene.channels[channel], stored);
-  return u * majorant < extinctionAt(scene.channels[channel], *position);
+/// Tentative collision of the process of all channels together, whose bound is their sum. Accepts with
+/// probability extinction / bound (Eq. 4), strictly below, so that zero extinction is never hit.
+struct PickOneChannel {
+  /// Draws the channel first, with probability bound_n / sum, and fetches only that one.
+  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, const float* bounds, Place place,
+                                                   glm::vec3 point, const RandomBlock& random,
+                                                   SampleCost* cost) {
+    float pick = uniformOf(random.y) * bounds[0];
+    int n = 0;
+    while (n + 1 < scene.channelCount && pick >= bounds[1 + n]) pick -= bounds[1 + n++];
+    const Classified c = classify(scene, n, point, cost);
+    if (!(uniformOf(random.z) * bounds[1 + n] < c.extinction)) return std::nullopt;
+    return Collision{place, point, n, c.position};
+  }
+};
+struct TestAllChannels {
+  /// Fetches channel after channel until the drawn share of the bound is used up.
+  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, const float* bounds, Place place,
+                                                   glm::vec3 point, const RandomBlock& random,
+                                                   SampleCost* cost) {
+    float left = uniformOf(random.y) * bounds[0];
+    for (int n = 0; n < scene.channelCount; ++n) {
+      const Classified c = classify(scene, n, point, cost);
+      if (left < c.extinction) return Collision{place, point, n, c.position};
+      left -= c.extinction;
+    }
+    return std::nullopt;
+  }
+};
+/// The same for max and mix, whose bound is the largest of the channels'.
+struct TestLargest {
+  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, const float* bounds, Place place,
+                                                   glm::vec3 point, const RandomBlock& random,
+                                                   SampleCost* cost) {
+    const Largest largest = largestOf(scene, point, cost);
+    if (!(uniformOf(random.z) * bounds[0] < largest.extinction)) return std::nullopt;
+    return Collision{place, point, largest.channel, largest.position};
+  }
+};
+
+/// Tentative collision of one channel's own process. In max and mix a channel has extinction only where it is
+/// the largest (Eq. 8).
+template <class Blend>
+SCOLOPAX_HD std::optional<Collision> testChannel(const SceneView& scene, int n, float bound, Place place,
+                                                 glm::vec3 point, const RandomBlock& random,
+                                                 SampleCost* cost) {
+  const Classified c = classify(scene, n, point, cost);
+  if (!(uniformOf(random.z) * bound < c.extinction)) return std::nullopt;
+  if constexpr (!Blend::kSums)
+    for (int other = 0; other < scene.channelCount; ++other) {
+      if (other == n) continue;
+      const float extinction = classify(scene, other, point, cost).extinction;
+      if (extinction > c.extinction || (extinction == c.extinction && other < n)) return std::nullopt;
+    }
+  return Collision{place, point, n, c.position};
 }
 
 }  // namespace scolopax::kernel

@@ -3,6 +3,7 @@
 // Only channels that can be seen are in here.
 #pragma once
 #include <cstdint>
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
 #include "renderer/core/scalar_type.h"
@@ -21,6 +22,21 @@ struct CurveView {
   int count;
 };
 
+/// Blinn-Phong coefficients of one channel.
+struct MaterialView {
+  float ambient, diffuse, specular, shininess;
+};
+
+enum class LightKind : std::uint8_t { directional, point, headlight };
+
+struct LightView {
+  LightKind kind;
+  glm::vec3 vector;     ///< directional: towards the light, voxel space, length 1 in world units; point: its
+                        ///< voxel position
+  glm::vec3 intensity;  ///< linear colour times intensity
+};
+inline constexpr int kMaxLights = 8;
+
 /// One channel: where its voxels are and how a stored value becomes extinction and colour.
 struct ChannelView {
   const void* voxels;
@@ -30,7 +46,10 @@ struct ChannelView {
   float density;                ///< extinction = opacity * density, per world unit
   CurveView<float> opacity;
   CurveView<glm::vec3> color;  ///< linear RGB
-  int index;                   ///< of the channel in the volume
+  float weight;                ///< of the colour in blend mode mix
+  MaterialView material;
+  float inverseRange;  ///< 1 / |hi - lo| of the range in stored values
+  int index;           ///< of the channel in the volume
 };
 
 /// Bounds of the extinction per macrocell. Cell (i,j,k) covers voxel coordinates [i, i+1] * cellSize; the
@@ -50,6 +69,11 @@ struct SceneView {
   int channelCount;
   const ChannelView* channels;
   MajorantView majorants;
+  int lightCount;  ///< 0 unless shading or shadows are on
+  LightView lights[kMaxLights];
+  glm::mat3 worldFromVoxel;  ///< linear part, in units of the smallest spacing: lengths near 1 at any scale
+  glm::mat3 gradientFromVoxel;  ///< its inverse transpose
+  float smallestSpacing;        ///< world units
 };
 
 /// What a sample cost, for tests, benchmarks and the cost heat map.

@@ -77,7 +77,7 @@ inline ::testing::AssertionResult isUnbiased(const Image& found, int samples,
 inline void expectTrackersMatch(const reference::ReferenceImage& expected,
                                 const std::shared_ptr<const Volume>& volume, const Scene& scene,
                                 int samples) {
-  for (const Method method : {Method::superposed, Method::syncDda})
+  for (const Method method : {Method::superposed, Method::cumulative, Method::syncDda, Method::nDda})
     EXPECT_TRUE(isUnbiased(renderAnalog(volume, scene, method, samples), samples, expected))
         << nameOf(method);
 }

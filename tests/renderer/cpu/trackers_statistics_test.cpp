@@ -66,9 +66,13 @@ TEST_P(HomogeneousBox, SharesItsCollisionsAmongChannelsByTheirExtinction) {
                          flat(scene, glm::dvec4(0.1, 0.25, 0.65, 1) * alpha)));
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, HomogeneousBox, testing::Values(Method::superposed, Method::syncDda),
+INSTANTIATE_TEST_SUITE_P(Methods, HomogeneousBox,
+                         testing::Values(Method::superposed, Method::cumulative, Method::syncDda,
+                                         Method::nDda),
                          [](const auto& tested) {
-                           return tested.param == Method::superposed ? "Superposed" : "SyncDda";
+                           std::string name(nameOf(tested.param));
+                           std::erase(name, '-');
+                           return name;
                          });
 
 /// Colours of zeros and ones for every channel, so that the pixels are binomial.

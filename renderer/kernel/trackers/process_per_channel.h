@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tracking with a Poisson process per channel, the paper's two methods: n-dda walks the macrocells once per
+// channel, sync-dda once for all. The nearest accepted collision wins.
+#pragma once
+#include "renderer/kernel/collision.h"
+
+namespace scolopax::kernel {
+
+enum class CellOutcome { nothing, hit, exhausted };
+
+/// Tracks channel n through the walk's current cell, as far as `nearest`, which a hit replaces.
+template <class Blend>
+SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, int n, const CellWalk& walk, Sampler& sampler,
+                                  std::optional<Collision>* nearest, std::uint32_t* tentative,
+                                  SampleCost* cost) {
+  const float bound =
+      scene.majorants.values[walk.index() * std::size_t(1 + scene.channelCount) + std::size_t(1 + n)];
+  if (!(bound > 0.0f)) return CellOutcome::nothing;
+  const float total = bound * (walk.exit() - walk.enter());
+  float passed = 0.0f;
+  while (true) {
+    const RandomBlock random = sampler.next();
+    passed += opticalDepth(uniformOf(random.x));
+    // The cell's end first: a step that leaves a thin cell says nothing about what lies behind it, also when
+    // it overshoots the nearest collision so far. (Listing 3 prints the other order, and loses collisions by
+    // it.)
+    if (!(passed < total)) return CellOutcome::nothing;
+    const Place place{walk.enter(), passed / bound};
+    if (*nearest && !nearer(place, (*nearest)->place)) return CellOutcome::nothing;
+    if (const auto hit = testChannel<Blend>(scene, n, bound, place, walk.pointAt(place.t()), random, cost)) {
+      *nearest = hit;
+      return CellOutcome::hit;
+    }
+    if (++*tentative >= kMaxTentativeCollisions) return CellOutcome::exhausted;
+  }
+}
+
+/// One channel along the ray, no further than `nearest`, which a hit replaces.
+template <class Blend>
+SCOLOPAX_HD void trackChannel(const SceneView& scene, int n, const Ray& ray, Interval inside,
+                              Sampler& sampler, std::optional<Collision>* nearest, SampleCost* cost) {
+  CellWalk walk(ray, inside, scene.majorants);
+  std::uint32_t tentative = 0;
+  do {
+    if (*nearest && nearer((*nearest)->place, {walk.enter(), 0.0f})) return;
+    ++cost->cellSteps;
+    const CellOutcome outcome = trackCell<Blend>(scene, n, walk, sampler, nearest, &tentative, cost);
+    if (outcome == CellOutcome::exhausted) cost->truncated = 1;
+    if (outcome != CellOutcome::nothing) return;
+  } while (walk.advance());
+}
+
+/// Listing 3, with the order of its two tests mended.
+struct NDda {
+  template <class Blend>
+  SCOLOPAX_HD static std::optional<Collision> track(const SceneView& scene, const Ray& ray, Interval inside,
+                                                    Sampler& sampler, SampleCost* cost) {
+    std::optional<Collision> nearest;
+    for (int n = 0; n < scene.channelCount; ++n)
+      trackChannel<Blend>(scene, n, ray, inside, sampler, &nearest, cost);
+    return nearest;
+  }
+};
+
+/// Listing 4.
+struct SyncDda {
+  template <class Blend>
+  SCOLOPAX_HD static std::optional<Collision> track(const SceneView& scene, const Ray& ray, Interval inside,
+                                                    Sampler& sampler, SampleCost* cost) {
+    CellWalk walk(ray, inside, scene.majorants);
+    std::uint32_t tentative = 0;
+    do {
+      ++cost->cellSteps;
+      if (!(scene.majorants.values[walk.index() * std::size_t(1 + scene.channelCount)] > 0.0f)) continue;
+      std::optional<Collision> nearest;
+      for (int n = 0; n < scene.channelCount; ++n)
+        if (trackCell<Blend>(scene, n, walk, sampler, &nearest, &tentative, cost) == CellOutcome::exhausted) {
+          cost->truncated = 1;
+          return std::nullopt;
+        }
+      if (nearest) return nearest;
+    } while (walk.advance());
+    return std::nullopt;
+  }
+};
+
+}  // namespace scolopax::kernel
