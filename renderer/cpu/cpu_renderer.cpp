@@ -1,78 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-// The CPU backend: owns plan and film, runs the kernels over tiles with TBB. Every instance of
-// RenderPixel is made here from the lists of data/method.h.
+// The CPU backend: owns plan and film, runs the kernels over tiles with TBB.
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 
+#include "renderer/cpu/tile_kernels.h"
 #include "renderer/data/film.h"
 #include "renderer/data/render_plan.h"
-#include "renderer/kernel/render_pixel.h"
-#include "renderer/kernel/trackers/one_process.h"
-#include "renderer/kernel/trackers/process_per_channel.h"
 #include "renderer/renderer.h"
 
 namespace scolopax {
 namespace {
 
-struct Pass {
-  kernel::SceneView scene;
-  std::uint32_t sample;
-  glm::vec4* pixels;
-  kernel::SampleCost* cost;
-};
-
-constexpr int kTile = 16;
-
-/// One tile of 16x16 pixels: neighbouring rays share voxels and macrocells.
-template <class Tracker, class Blend, class Features>
-void renderTile(const Pass& pass, int tileX, int tileY) {
-  const kernel::RenderPixel<Tracker, Blend, Features> render{pass.scene, pass.sample, pass.pixels, pass.cost};
-  const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
-  const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
-  for (int y = tileY * kTile; y < endY; ++y)
-    for (int x = tileX * kTile; x < endX; ++x) render(y * pass.scene.width + x);
-}
-
-using TileFunction = void (*)(const Pass&, int, int);
-
-// One instance for every combination that a scene can ask for, chosen once per pass.
-template <class Tracker, class Blend>
-TileFunction chooseLight(const Scene& scene) {
-  using kernel::LightFeatures;
-  if (scene.shading)
-    return scene.shadows ? renderTile<Tracker, Blend, LightFeatures<true, true>>
-                         : renderTile<Tracker, Blend, LightFeatures<true, false>>;
-  return scene.shadows ? renderTile<Tracker, Blend, LightFeatures<false, true>>
-                       : renderTile<Tracker, Blend, LightFeatures<false, false>>;
-}
-
-template <class Tracker>
-TileFunction chooseBlend(const Scene& scene) {
-  switch (scene.blend) {
-    case BlendMode::density:
-      return chooseLight<Tracker, kernel::BlendDensity>(scene);
-    case BlendMode::max:
-      return chooseLight<Tracker, kernel::BlendMax>(scene);
-    case BlendMode::mix:
-      return chooseLight<Tracker, kernel::BlendMix>(scene);
-    case BlendMode::composite:
-      return chooseLight<Tracker, kernel::BlendComposite>(scene);
-  }
-  return nullptr;
-}
-
 TileFunction chooseKernel(const Scene& scene) {
   switch (scene.method) {
     case Method::superposed:
-      return chooseBlend<kernel::Superposed>(scene);
+      return chooseTileFunction<kernel::Superposed>(scene);
     case Method::cumulative:
-      return chooseBlend<kernel::Cumulative>(scene);
+      return chooseTileFunction<kernel::Cumulative>(scene);
     case Method::syncDda:
-      return chooseBlend<kernel::SyncDda>(scene);
+      return chooseTileFunction<kernel::SyncDda>(scene);
     case Method::nDda:
-      return chooseBlend<kernel::NDda>(scene);
+      return chooseTileFunction<kernel::NDda>(scene);
   }
   return nullptr;
 }

@@ -30,6 +30,9 @@ struct Medium {
 Medium blended(BlendMode mode, const ChannelSample* samples, std::size_t count) {
   Medium medium;
   switch (mode) {
+    case BlendMode::max:
+    case BlendMode::mix:
+    case BlendMode::composite:  // TEMP
     case BlendMode::density:
       for (std::size_t n = 0; n < count; ++n) {
         medium.extinction += samples[n].extinction;

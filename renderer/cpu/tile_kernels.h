@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kernels over a tile of pixels, one instance for every combination that a scene can ask for. A tracker's
+// instances are compiled in a file of their own, kernels_*.cpp.
+#pragma once
+#include <algorithm>
+
+#include "renderer/data/scene.h"
+#include "renderer/kernel/render_pixel.h"
+#include "renderer/kernel/trackers/one_process.h"
+#include "renderer/kernel/trackers/process_per_channel.h"
+
+namespace scolopax {
+
+/// One sample of every pixel; pixels and cost as in kernel::RenderPixel.
+struct Pass {
+  kernel::SceneView scene;
+  std::uint32_t sample;
+  glm::vec4* pixels;
+  kernel::SampleCost* cost;
+};
+
+/// Neighbouring rays share voxels and macrocells.
+inline constexpr int kTile = 16;
+
+/// Renders the tile at (tileX, tileY), in tiles.
+using TileFunction = void (*)(const Pass&, int tileX, int tileY);
+
+template <class Tracker, class Blend, class Features>
+void renderTile(const Pass& pass, int tileX, int tileY) {
+  const kernel::RenderPixel<Tracker, Blend, Features> render{pass.scene, pass.sample, pass.pixels, pass.cost};
+  const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
+  const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
+  for (int y = tileY * kTile; y < endY; ++y)
+    for (int x = tileX * kTile; x < endX; ++x) render(y * pass.scene.width + x);
+}
+
+template <class Tracker, class Blend>
+TileFunction chooseLight(const Scene& scene) {
+  using kernel::LightFeatures;
+  if (scene.shading)
+    return scene.shadows ? renderTile<Tracker, Blend, LightFeatures<true, true>>
+                         : renderTile<Tracker, Blend, LightFeatures<true, false>>;
+  return scene.shadows ? renderTile<Tracker, Blend, LightFeatures<false, true>>
+                       : renderTile<Tracker, Blend, LightFeatures<false, false>>;
+}
+
+template <class Tracker>
+TileFunction chooseTileFunction(const Scene& scene) {
+  switch (scene.blend) {
+    case BlendMode::density:
+      return chooseLight<Tracker, kernel::BlendDensity>(scene);
+    case BlendMode::max:
+      return chooseLight<Tracker, kernel::BlendMax>(scene);
+    case BlendMode::mix:
+      return chooseLight<Tracker, kernel::BlendMix>(scene);
+    case BlendMode::composite:
+      return chooseLight<Tracker, kernel::BlendComposite>(scene);
+  }
+  return nullptr;
+}
+
+extern template TileFunction chooseTileFunction<kernel::Superposed>(const Scene&);
+extern template TileFunction chooseTileFunction<kernel::Cumulative>(const Scene&);
+extern template TileFunction chooseTileFunction<kernel::SyncDda>(const Scene&);
+extern template TileFunction chooseTileFunction<kernel::NDda>(const Scene&);
+
+}  // namespace scolopax
