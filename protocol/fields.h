@@ -45,6 +45,7 @@ struct Exclusive {
 };
 
 inline constexpr std::size_t kMaxChannelItems = 32;
+inline constexpr std::size_t kMaxLightItems = 8;
 inline constexpr std::size_t kMaxControlPoints = 4096;
 
 /// Specialised below: title, doc, exclusive pairs and the tuple of fields of one struct.
@@ -54,6 +55,34 @@ struct Table;
 template <class T>
 concept Described = requires {
   Table<T>::fields;
+};
+
+template <>
+struct Table<Material> {
+  static constexpr std::string_view title = "Material";
+  static constexpr std::string_view doc = "How a channel answers light (Blinn-Phong).";
+  static constexpr auto fields = std::tuple{
+      field("ambient", &Material::ambient, "Light that comes from everywhere; also what is left in shadow.",
+            {.atLeast = 0, .atMost = 10}),
+      field("diffuse", &Material::diffuse, "Matt reflection.", {.atLeast = 0, .atMost = 10}),
+      field("specular", &Material::specular, "Highlight, in the light's colour.", {.atLeast = 0, .atMost = 10}),
+      field("shininess", &Material::shininess, "Exponent of the highlight: larger is smaller and sharper.",
+            {.above = 0, .atMost = 10000}),
+  };
+};
+
+template <>
+struct Table<Light> {
+  static constexpr std::string_view title = "Light";
+  static constexpr std::string_view doc = "One light.";
+  static constexpr auto fields = std::tuple{
+      field("type", &Light::type, "What kind of light.", {.names = &Lists::lightTypes}),
+      field("direction", &Light::direction, "Where a directional light travels TO; need not be normalised."),
+      field("position", &Light::position, "Where a point light stands; its light does not fall off.",
+            {.unit = "world units"}),
+      field("color", &Light::color, "Colour.", {.color = true}),
+      field("intensity", &Light::intensity, "Factor of the colour.", {.atLeast = 0, .atMost = 1e6}),
+  };
 };
 
 template <>
@@ -83,6 +112,9 @@ struct Table<Channel> {
             {.above = 0, .atMost = 100}),
       field("density", &Channel::density, "Extinction where opacity is 1; null is chosen from the data.",
             {.unit = "1 / world unit", .atLeast = 0, .atMost = 1e30}),
+      field("weight", &Channel::weight, "Factor of the channel's colour in blend mode mix.",
+            {.atLeast = 0, .atMost = 1e6}),
+      field("material", &Channel::material, "How the channel answers light."),
   };
 };
 
@@ -167,6 +199,11 @@ struct Table<Scene> {
             {.maxItems = kMaxChannelItems}),
       field("blend", &Scene::blend, "How the channels are combined."),
       field("camera", &Scene::camera, "Where one looks from."),
+      field("lights", &Scene::lights, "Lights for shading and shadows; none means one headlight, at the eye.",
+            {.maxItems = kMaxLightItems}),
+      field("shading", &Scene::shading,
+            "Light by the gradient of the scalar field, faded where the field is flat."),
+      field("shadows", &Scene::shadows, "Whether channels cast shadows, on themselves and each other."),
       field("integrator", &Scene::integrator, "How the picture is computed."),
       field("image", &Scene::image, "The picture."),
       field("stop", &Scene::stop, "When rendering ends."),

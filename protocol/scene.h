@@ -26,6 +26,14 @@ struct ColorPoint {
 /// The name of a colour table, or control points.
 using Colormap = std::variant<std::string, std::vector<ColorPoint>>;
 
+/// Blinn-Phong coefficients.
+struct Material {
+  double ambient = 0.3;
+  double diffuse = 0.7;
+  double specular = 0.2;
+  double shininess = 20;
+};
+
 struct Channel {
   std::optional<std::string> name;
   bool visible = true;
@@ -35,10 +43,20 @@ struct Channel {
   std::vector<ControlPoint> opacity{{0, 0}, {1, 1}};
   double gamma = 1;
   std::optional<double> density;
+  double weight = 1;
+  Material material;
 };
 
 struct Blend {
   std::string mode = "density";
+};
+
+struct Light {
+  std::string type = "directional";
+  std::array<double, 3> direction{0.5, -0.5, -1};
+  std::array<double, 3> position{0, 0, 0};
+  std::string color = "#ffffff";
+  double intensity = 1;
 };
 
 struct Camera {
@@ -71,6 +89,9 @@ struct Scene {
   std::vector<Channel> channels;
   Blend blend;
   Camera camera;
+  std::vector<Light> lights;
+  bool shading = false;
+  bool shadows = false;
   Integrator integrator;
   ImageSettings image;
   Stop stop;

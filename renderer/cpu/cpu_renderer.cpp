@@ -15,14 +15,11 @@ namespace {
 
 TileFunction chooseKernel(const Scene& scene) {
   switch (scene.method) {
-    case Method::superposed:
-      return chooseTileFunction<kernel::Superposed>(scene);
-    case Method::cumulative:
-      return chooseTileFunction<kernel::Cumulative>(scene);
-    case Method::syncDda:
-      return chooseTileFunction<kernel::SyncDda>(scene);
-    case Method::nDda:
-      return chooseTileFunction<kernel::NDda>(scene);
+    case Method::superposed: return chooseTileFunction<kernel::Analog<kernel::Superposed>>(scene);
+    case Method::cumulative: return chooseTileFunction<kernel::Analog<kernel::Cumulative>>(scene);
+    case Method::syncDda: return chooseTileFunction<kernel::Analog<kernel::SyncDda>>(scene);
+    case Method::nDda: return chooseTileFunction<kernel::Analog<kernel::NDda>>(scene);
+    case Method::raymarch: return chooseTileFunction<kernel::RayMarch>(scene);
   }
   return nullptr;
 }

@@ -3,6 +3,6 @@
 
 namespace scolopax {
 
-template TileFunction chooseTileFunction<kernel::Cumulative>(const Scene&);
+template TileFunction chooseTileFunction<kernel::Analog<kernel::Cumulative>>(const Scene&);
 
 }  // namespace scolopax

@@ -3,6 +3,6 @@
 
 namespace scolopax {
 
-template TileFunction chooseTileFunction<kernel::NDda>(const Scene&);
+template TileFunction chooseTileFunction<kernel::Analog<kernel::NDda>>(const Scene&);
 
 }  // namespace scolopax

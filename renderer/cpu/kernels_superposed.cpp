@@ -3,6 +3,6 @@
 
 namespace scolopax {
 
-template TileFunction chooseTileFunction<kernel::Superposed>(const Scene&);
+template TileFunction chooseTileFunction<kernel::Analog<kernel::Superposed>>(const Scene&);
 
 }  // namespace scolopax

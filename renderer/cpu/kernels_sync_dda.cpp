@@ -3,6 +3,6 @@
 
 namespace scolopax {
 
-template TileFunction chooseTileFunction<kernel::SyncDda>(const Scene&);
+template TileFunction chooseTileFunction<kernel::Analog<kernel::SyncDda>>(const Scene&);
 
 }  // namespace scolopax

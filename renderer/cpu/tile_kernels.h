@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kernels over a tile of pixels, one instance for every combination that a scene can ask for. A tracker's
+// Kernels over a tile of pixels, one instance for every combination that a scene can ask for. An integrator's
 // instances are compiled in a file of their own, kernels_*.cpp.
 #pragma once
 #include <algorithm>
 
 #include "renderer/data/scene.h"
+#include "renderer/kernel/analog.h"
+#include "renderer/kernel/raymarch.h"
 #include "renderer/kernel/render_pixel.h"
 #include "renderer/kernel/trackers/one_process.h"
 #include "renderer/kernel/trackers/process_per_channel.h"
@@ -25,43 +27,45 @@ inline constexpr int kTile = 16;
 /// Renders the tile at (tileX, tileY), in tiles.
 using TileFunction = void (*)(const Pass&, int tileX, int tileY);
 
-template <class Tracker, class Blend, class Features>
+template <class Integrator, class Blend, class Features>
 void renderTile(const Pass& pass, int tileX, int tileY) {
-  const kernel::RenderPixel<Tracker, Blend, Features> render{pass.scene, pass.sample, pass.pixels, pass.cost};
+  const kernel::RenderPixel<Integrator, Blend, Features> render{pass.scene, pass.sample, pass.pixels,
+                                                                pass.cost};
   const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
   const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
   for (int y = tileY * kTile; y < endY; ++y)
     for (int x = tileX * kTile; x < endX; ++x) render(y * pass.scene.width + x);
 }
 
-template <class Tracker, class Blend>
+template <class Integrator, class Blend>
 TileFunction chooseLight(const Scene& scene) {
   using kernel::LightFeatures;
   if (scene.shading)
-    return scene.shadows ? renderTile<Tracker, Blend, LightFeatures<true, true>>
-                         : renderTile<Tracker, Blend, LightFeatures<true, false>>;
-  return scene.shadows ? renderTile<Tracker, Blend, LightFeatures<false, true>>
-                       : renderTile<Tracker, Blend, LightFeatures<false, false>>;
+    return scene.shadows ? renderTile<Integrator, Blend, LightFeatures<true, true>>
+                         : renderTile<Integrator, Blend, LightFeatures<true, false>>;
+  return scene.shadows ? renderTile<Integrator, Blend, LightFeatures<false, true>>
+                       : renderTile<Integrator, Blend, LightFeatures<false, false>>;
 }
 
-template <class Tracker>
+template <class Integrator>
 TileFunction chooseTileFunction(const Scene& scene) {
   switch (scene.blend) {
     case BlendMode::density:
-      return chooseLight<Tracker, kernel::BlendDensity>(scene);
+      return chooseLight<Integrator, kernel::BlendDensity>(scene);
     case BlendMode::max:
-      return chooseLight<Tracker, kernel::BlendMax>(scene);
+      return chooseLight<Integrator, kernel::BlendMax>(scene);
     case BlendMode::mix:
-      return chooseLight<Tracker, kernel::BlendMix>(scene);
+      return chooseLight<Integrator, kernel::BlendMix>(scene);
     case BlendMode::composite:
-      return chooseLight<Tracker, kernel::BlendComposite>(scene);
+      return chooseLight<Integrator, kernel::BlendComposite>(scene);
   }
   return nullptr;
 }
 
-extern template TileFunction chooseTileFunction<kernel::Superposed>(const Scene&);
-extern template TileFunction chooseTileFunction<kernel::Cumulative>(const Scene&);
-extern template TileFunction chooseTileFunction<kernel::SyncDda>(const Scene&);
-extern template TileFunction chooseTileFunction<kernel::NDda>(const Scene&);
+extern template TileFunction chooseTileFunction<kernel::Analog<kernel::Superposed>>(const Scene&);
+extern template TileFunction chooseTileFunction<kernel::Analog<kernel::Cumulative>>(const Scene&);
+extern template TileFunction chooseTileFunction<kernel::Analog<kernel::SyncDda>>(const Scene&);
+extern template TileFunction chooseTileFunction<kernel::Analog<kernel::NDda>>(const Scene&);
+extern template TileFunction chooseTileFunction<kernel::RayMarch>(const Scene&);
 
 }  // namespace scolopax

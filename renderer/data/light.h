@@ -3,14 +3,14 @@
 #pragma once
 #include <glm/vec3.hpp>
 
-#include "renderer/kernel/views.h"
+#include "renderer/data/method.h"
 
 namespace scolopax {
 
 /// directional: `vector` is where the light travels TO; point: its position, without fall-off; headlight:
 /// shines from the eye, `vector` is not used.
 struct Light {
-  kernel::LightKind kind = kernel::LightKind::headlight;
+  LightType type = LightType::headlight;
   glm::dvec3 vector{0, 0, -1};
   glm::dvec3 color{1};   ///< linear RGB, not negative
   double intensity = 1;  ///< not negative

@@ -22,7 +22,14 @@ namespace scolopax {
   X(cumulative, "cumulative",                                                                                \
     "one Poisson process over all channels; all are fetched and tested (5.1); unbiased")                     \
   X(syncDda, "sync-dda", "one traversal, every channel tracked inside each macrocell (Listing 4); unbiased") \
-  X(nDda, "n-dda", "a traversal for every channel, the nearest collision wins (Listing 3, mended); unbiased")
+  X(nDda, "n-dda",                                                                                           \
+    "a traversal for every channel, the nearest collision wins (Listing 3, mended); unbiased")               \
+  X(raymarch, "raymarch", "equal steps along the ray, no noise but that of the jitter; biased by the step")
+
+#define SCOLOPAX_LIGHT_TYPES(X)                                                   \
+  X(directional, "directional", "parallel rays that travel along `direction`")    \
+  X(point, "point", "shines from `position` in all directions, without fall-off") \
+  X(headlight, "headlight", "shines from the eye")
 
 #define SCOLOPAX_PIXEL_FILTERS(X)                              \
   X(box, "box", "samples spread evenly over the pixel's area") \
@@ -42,6 +49,7 @@ struct NamedValue {
 
 SCOLOPAX_DECLARE_ENUM(BlendMode, SCOLOPAX_BLEND_MODES, kBlendModes)
 SCOLOPAX_DECLARE_ENUM(Method, SCOLOPAX_METHODS, kMethods)
+SCOLOPAX_DECLARE_ENUM(LightType, SCOLOPAX_LIGHT_TYPES, kLightTypes)
 SCOLOPAX_DECLARE_ENUM(PixelFilter, SCOLOPAX_PIXEL_FILTERS, kPixelFilters)
 
 #undef SCOLOPAX_ENUM_ENTRY

@@ -39,6 +39,8 @@ void check(const Scene& scene, const Volume& volume) {
   for (const Light& light : scene.lights)
     if (!(light.intensity >= 0) || !(glm::min(light.color.x, glm::min(light.color.y, light.color.z)) >= 0))
       fail("lights: colour and intensity must not be negative");
+  if (!(scene.step >= 0.01 && scene.step <= 100))
+    fail("integrator.step: expected 0.01 to 100, found " + std::to_string(scene.step));
   if (scene.macrocell < 1 || scene.macrocell > 64)
     fail("integrator.macrocell: expected 1 to 64, found " + std::to_string(scene.macrocell));
 }
@@ -46,6 +48,10 @@ void check(const Scene& scene, const Volume& volume) {
 }  // namespace
 
 namespace {
+static_assert(int(LightType::directional) == int(kernel::LightKind::directional) &&
+              int(LightType::point) == int(kernel::LightKind::point) &&
+              int(LightType::headlight) == int(kernel::LightKind::headlight));
+
 /// Lights to voxel space; none when neither shading nor shadows ask for them.
 void placeLights(const Scene& scene, const Grid& grid, kernel::SceneView* view) {
   const glm::dvec3 spacing = grid.spacing();
@@ -60,9 +66,9 @@ void placeLights(const Scene& scene, const Grid& grid, kernel::SceneView* view) 
   const glm::dmat4 voxelFromWorld = glm::inverse(grid.worldFromVoxel);
   for (const Light& light : scene.lights.empty() ? headlight : scene.lights) {
     kernel::LightView& v = view->lights[view->lightCount++];
-    v.kind = light.kind;
+    v.kind = kernel::LightKind(light.type);
     v.intensity = glm::vec3(light.color * light.intensity);
-    if (light.kind == kernel::LightKind::point)
+    if (light.type == LightType::point)
       v.vector = glm::vec3(glm::dvec3(voxelFromWorld * glm::dvec4(light.vector, 1)));
     else
       v.vector = glm::vec3(glm::dmat3(voxelFromWorld) * -glm::normalize(light.vector));
@@ -131,6 +137,7 @@ RebuildStats RenderPlan::update(const Scene& scene) {
     majorants_ = combineMajorants(bounds, std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z),
                                   sumsExtinction(scene.blend));
 
+  placeLights(scene, volume_->grid(), &view_);
   view_.rays = rays;
   view_.width = scene.width;
   view_.height = scene.height;
@@ -139,8 +146,8 @@ RebuildStats RenderPlan::update(const Scene& scene) {
   view_.dims = volume_->grid().dims;
   view_.channelCount = int(channelViews_.size());
   view_.channels = channelViews_.data();
+  view_.step = view_.smallestSpacing * float(scene.step);
   view_.majorants = {cells, float(macrocells_->size), majorants_.data()};
-  placeLights(scene, volume_->grid(), &view_);
   stats.rebuildMs =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   return stats;

@@ -47,6 +47,7 @@ struct Scene {
   std::vector<Light> lights;  ///< at most kernel::kMaxLights; none means one headlight
   Method method = Method::superposed;
   int macrocell = 4;  ///< voxels per macrocell edge
+  double step = 0.5;  ///< of the marcher, in smallest spacings; > 0
   std::uint32_t seed = 0;
   int width = 512, height = 512;
   glm::vec3 background{0};  ///< linear RGB

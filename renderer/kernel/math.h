@@ -82,6 +82,17 @@ SCOLOPAX_HD inline float exp2Of(float x) {
   return p * a * b;
 }
 
+/// 1 - exp(-depth) for depth >= 0: what a stretch of that optical depth absorbs. By its series where the
+/// difference from 1 would lose digits.
+SCOLOPAX_HD inline float absorbed(float depth) {
+  if (depth < 0.25f)
+    return depth *
+           (1.0f - depth * (0.5f - depth * (0.166666667f -
+                                            depth * (0.0416666667f -
+                                                     depth * (0.00833333333f - depth * 0.00138888889f)))));
+  return 1.0f - exp2Of(depth * -1.44269504f);
+}
+
 /// x^exponent for x in [0, 1] and exponent > 0.
 SCOLOPAX_HD inline float power(float x, float exponent) {
   if (!(x > 1.17549435e-38f)) return 0.0f;

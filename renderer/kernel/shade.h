@@ -58,26 +58,14 @@ SCOLOPAX_HD inline glm::vec3 gradientAt(const SceneView& scene, const ChannelVie
 
 /// Which lights reach a collision, as the sums that every channel's material needs.
 struct Visibility {
-  float lights[kMaxLights];  ///< 1 or 0
+  float lights[kMaxLights];  ///< in [0,1]
   glm::vec3 share;           ///< sum I V / sum I, 1 where there is no light
 };
 
-/// Whether a shadow ray meets anything; in separate blend modes, anything of the channel that cast it.
-template <class Tracker, class Blend>
-SCOLOPAX_HD bool isBlocked(const SceneView& scene, const Ray& ray, Interval inside, int channel,
-                           Sampler& sampler, SampleCost* cost) {
-  if constexpr (Blend::kSeparate) {
-    std::optional<Collision> hit;
-    trackChannel<Blend>(scene, channel, ray, inside, sampler, &hit, cost);
-    return hit.has_value();
-  } else {
-    return Tracker::template track<Blend>(scene, ray, inside, sampler, cost).has_value();
-  }
-}
-
-template <class Tracker, class Blend, class Features>
+/// shadow(ray, part of it inside the box) estimates the ray's transmittance, in [0,1].
+template <class Features, class Shadow>
 SCOLOPAX_HD Visibility visibilityAt(const SceneView& scene, const Ray& ray, const Collision& hit,
-                                    Sampler& sampler, SampleCost* cost) {
+                                    Shadow&& shadow) {
   Visibility visibility;
   glm::vec3 all(0.0f), seen(0.0f);
   for (int i = 0; i < scene.lightCount; ++i) {
@@ -87,9 +75,7 @@ SCOLOPAX_HD Visibility visibilityAt(const SceneView& scene, const Ray& ray, cons
       const Ray shadowRay{hit.point, way.direction};
       Interval inside = clipToBox(shadowRay, scene.dims);
       inside.exit = minimum(inside.exit, way.distance);
-      if (inside.enter < inside.exit &&
-          isBlocked<Tracker, Blend>(scene, shadowRay, inside, hit.channel, sampler, cost))
-        visibility.lights[i] = 0.0f;
+      if (inside.enter < inside.exit) visibility.lights[i] = shadow(shadowRay, inside);
       all += scene.lights[i].intensity;
       seen += scene.lights[i].intensity * visibility.lights[i];
     }
@@ -119,12 +105,13 @@ SCOLOPAX_HD glm::vec3 lit(const SceneView& scene, const ChannelView& channel, gl
   glm::vec3 diffuse(0.0f), specular(0.0f);
   for (int i = 0; i < scene.lightCount; ++i) {
     const LightView& light = scene.lights[i];
-    if (!(visibility.lights[i] > 0.0f)) continue;
+    const float seen = visibility.lights[i];
+    if (!(seen > 0.0f)) continue;
     const glm::vec3 l = normalize(toWorld(scene, toLight(scene, light, ray, hit).direction));
     const glm::vec3 h = normalize(l + toViewer);
-    diffuse += light.intensity * maximum(dot(normal, l), 0.0f);
+    diffuse += light.intensity * seen * maximum(dot(normal, l), 0.0f);
     const float highlight = maximum(dot(normal, h), 0.0f);
-    specular += light.intensity * power(highlight, material.shininess);
+    specular += light.intensity * seen * power(highlight, material.shininess);
   }
   return color * ((1.0f - s) * ambient + s * (material.ambient + material.diffuse * diffuse)) +
          s * material.specular * specular;

@@ -69,6 +69,7 @@ struct SceneView {
   int channelCount;
   const ChannelView* channels;
   MajorantView majorants;
+  float step;      ///< of the marcher, world units
   int lightCount;  ///< 0 unless shading or shadows are on
   LightView lights[kMaxLights];
   glm::mat3 worldFromVoxel;  ///< linear part, in units of the smallest spacing: lengths near 1 at any scale

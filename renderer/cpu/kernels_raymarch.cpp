@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/cpu/tile_kernels.h"
+
+namespace scolopax {
+
+template TileFunction chooseTileFunction<kernel::RayMarch>(const Scene&);
+
+}  // namespace scolopax

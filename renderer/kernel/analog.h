@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// A sample by analog tracking: the ray ends at its first collision, and shows what is there, lit. With one of
+// the trackers its expected value is the picture, whatever the light.
+#pragma once
+#include "renderer/kernel/shade.h"
+
+namespace scolopax::kernel {
+
+/// Whether a shadow ray meets anything; in separate blend modes, anything of the channel that cast it.
+template <class Tracker, class Blend>
+SCOLOPAX_HD bool isBlocked(const SceneView& scene, const Ray& ray, Interval inside, int channel,
+                           Sampler& sampler, SampleCost* cost) {
+  if constexpr (Blend::kSeparate) {
+    std::optional<Collision> hit;
+    trackChannel<Blend>(scene, channel, ray, inside, sampler, &hit, cost);
+    return hit.has_value();
+  } else {
+    return Tracker::template track<Blend>(scene, ray, inside, sampler, cost).has_value();
+  }
+}
+
+/// What a collision shows: its channel, or in mix all of them, each lit with its own material before it is
+/// weighted (Eq. 10).
+template <class Tracker, class Blend, class Features>
+SCOLOPAX_HD glm::vec3 radiance(const SceneView& scene, const Ray& ray, const Collision& hit, Sampler& sampler,
+                               SampleCost* cost) {
+  Visibility visibility;
+  if constexpr (Features::kAny)
+    visibility = visibilityAt<Features>(scene, ray, hit, [&](const Ray& shadowRay, Interval part) {
+      return isBlocked<Tracker, Blend>(scene, shadowRay, part, hit.channel, sampler, cost) ? 0.0f : 1.0f;
+    });
+  const auto show = [&](const ChannelView& channel, float position) {
+    const glm::vec3 color = evaluate(channel.color, position);
+    if constexpr (Features::kAny) return lit<Features>(scene, channel, color, ray, hit, visibility, cost);
+    return color;
+  };
+  if constexpr (Blend::kMixes) {
+    glm::vec3 sum(0.0f);
+    float largest = 0.0f;
+    for (int n = 0; n < scene.channelCount; ++n) {
+      const Classified c = classify(scene, n, hit.point, cost);
+      if (!(c.extinction > 0.0f)) continue;
+      largest = maximum(largest, c.extinction);
+      sum += show(scene.channels[n], c.position) * (c.extinction * scene.channels[n].weight);
+    }
+    return sum * (1.0f / largest);
+  } else {
+    return show(scene.channels[hit.channel], hit.position);
+  }
+}
+
+template <class Tracker>
+struct Analog {
+  /// Linear premultiplied RGBA of one sample along a ray.
+  template <class Blend, class Features>
+  SCOLOPAX_HD static glm::vec4 sample(const SceneView& scene, const Ray& ray, Interval inside,
+                                      Sampler& sampler, SampleCost* cost) {
+    if constexpr (Blend::kSeparate) {
+      // Channels draw independent numbers, so 1 - prod(1 - hit_n) has the expected value 1 - prod(1 -
+      // alpha_n).
+      glm::vec4 sum(0.0f);
+      for (int n = 0; n < scene.channelCount; ++n) {
+        std::optional<Collision> hit;
+        trackChannel<Blend>(scene, n, ray, inside, sampler, &hit, cost);
+        if (hit)
+          sum = glm::vec4(
+              glm::vec3(sum) + radiance<Tracker, Blend, Features>(scene, ray, *hit, sampler, cost), 1.0f);
+      }
+      return sum;
+    } else {
+      const auto hit = Tracker::template track<Blend>(scene, ray, inside, sampler, cost);
+      if (!hit) return glm::vec4(0.0f);
+      return glm::vec4(radiance<Tracker, Blend, Features>(scene, ray, *hit, sampler, cost), 1.0f);
+    }
+  }
+};
+
+}  // namespace scolopax::kernel
