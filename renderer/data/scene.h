@@ -32,7 +32,7 @@ struct ChannelAppearance {
   double gamma = 1;                 ///< > 0
   double density = 1;               ///< extinction = opacity * density, per world unit; >= 0
   double weight = 1;                ///< of the colour in blend mode mix; >= 0
-  Material material;
+  Material material{};
   std::vector<OpacityKnot> opacity{{0, 0}, {1, 1}};
   std::vector<ColorKnot> color{{0, {1, 1, 1}}};
   bool operator==(const ChannelAppearance&) const = default;

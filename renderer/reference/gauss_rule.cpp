@@ -47,6 +47,7 @@ GaussRule<N>::GaussRule() {
     }
 }
 
+template struct GaussRule<2>;
 template struct GaussRule<4>;
 template struct GaussRule<8>;
 

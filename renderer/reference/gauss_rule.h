@@ -14,6 +14,7 @@ struct GaussRule {
   GaussRule();
 };
 
+extern template struct GaussRule<2>;
 extern template struct GaussRule<4>;
 extern template struct GaussRule<8>;
 

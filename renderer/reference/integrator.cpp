@@ -2,84 +2,183 @@
 #include "renderer/reference/integrator.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <string>
 
 #include "renderer/core/error.h"
-#include "renderer/reference/cell_scalar.h"
 #include "renderer/reference/gauss_rule.h"
-#include "renderer/reference/ray_cells.h"
 
 namespace scolopax::reference {
 namespace {
 
-constexpr double kOpaqueDepth = 27.7;  // T < 1e-12: what lies behind is not looked at
-constexpr double kMaxPieceDepth = 4;   // a piece of the ray thicker than this is bisected unseen
-constexpr double kFloor = 1e-9;        // of the tolerance: absolute error that a piece may always have
+constexpr double kMaxPieceDepth = 4;  // a piece of the ray thicker than this is bisected unseen
+
+/// What blending makes of the channels at a point.
+struct Blended {
+  double extinction = 0;                     // per world unit
+  std::array<double, kMaxChannels> share{};  // of each channel's radiance in extinction x radiance
+};
+
+/// The blend modes: one case each.
+Blended blended(BlendMode mode, const Stretch& stretch, const ChannelSample* samples) {
+  Blended result;
+  const std::size_t count = stretch.channels.size();
+  std::size_t largest = 0;
+  for (std::size_t n = 1; n < count; ++n)
+    if (samples[n].extinction > samples[largest].extinction) largest = n;
+  switch (mode) {
+    case BlendMode::density:
+    case BlendMode::composite:  // of a single channel, see Integrator::trace
+      for (std::size_t n = 0; n < count; ++n) {
+        result.extinction += samples[n].extinction;
+        result.share[n] = samples[n].extinction;
+      }
+      break;
+    case BlendMode::max:
+      if (count > 0) result.extinction = result.share[largest] = samples[largest].extinction;
+      break;
+    case BlendMode::mix:
+      if (count > 0) result.extinction = samples[largest].extinction;
+      for (std::size_t n = 0; n < count; ++n)
+        result.share[n] = stretch.channels[n].channel->weight * samples[n].extinction;
+      break;
+  }
+  return result;
+}
+
+double largest(const glm::dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
+
+bool isFinite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+}  // namespace
 
 /// What a point of the ray does to the light on its way.
-struct Medium {
+struct Integrator::Medium {
   double extinction = 0;   // per world unit
   glm::dvec3 emission{0};  // extinction times radiance
 };
 
-/// The blend modes: one case each.
-Medium blended(BlendMode mode, const ChannelSample* samples, std::size_t count) {
-  Medium medium;
-  switch (mode) {
-    case BlendMode::max:
-    case BlendMode::mix:
-    case BlendMode::composite:  // TEMP
-    case BlendMode::density:
-      for (std::size_t n = 0; n < count; ++n) {
-        medium.extinction += samples[n].extinction;
-        medium.emission += samples[n].extinction * samples[n].color;
-      }
-  }
-  return medium;
-}
-
-/// A channel along one cell, and the piece of its curves that holds between two neighbouring cuts.
-struct ChannelInCell {
-  const ChannelCurves* curves;
-  CellScalar scalar;
-  std::size_t piece = 0;
-};
-
-/// One cell's stretch of the ray, u in [0,1].
-struct Stretch {
-  BlendMode blend;
-  double length;  // world units
-  std::vector<ChannelInCell> channels;
-
-  Medium at(double u) const {
-    ChannelSample samples[kMaxChannels];
-    for (std::size_t n = 0; n < channels.size(); ++n) {
-      const ChannelInCell& channel = channels[n];
-      samples[n] = channel.curves->sample(channel.piece, channel.curves->position(channel.scalar(u)));
-    }
-    return blended(blend, samples, channels.size());
-  }
-};
-
 /// Light that a piece of the ray adds as seen from its beginning, and how thick it is.
-struct PieceLight {
+struct Integrator::PieceLight {
   glm::dvec3 color{0};
   double opticalDepth = 0;
   glm::dvec3 meanColor{0};  // without regard to what is in front of what
 };
 
-template <int N>
-PieceLight lightOf(const Stretch& stretch, double begin, double end) {
+/// The ray so far, from the front.
+struct Integrator::Path {
+  double opticalDepth = 0;
+  glm::dvec3 color{0};
+  double error = 0;
+
+  void add(const PieceLight& piece, double pieceError) {
+    const double transmittance = std::exp(-opticalDepth);
+    color += transmittance * piece.color;
+    error += transmittance * pieceError;
+    opticalDepth += piece.opticalDepth;
+  }
+};
+
+Integrator::Integrator(const Volume& volume, const Scene& scene, double tolerance)
+    : dims_(volume.grid().dims),
+      blend_(scene.blend),
+      tolerance_(tolerance),
+      worldFromVoxel_(volume.grid().worldFromVoxel),
+      voxelFromWorld_(glm::inverse(worldFromVoxel_)),
+      voxelZero_(volume.grid().worldFromVoxel[3]),
+      lighting_(scene, voxelZero_) {
+  if (scene.channels.size() != volume.channels().size())
+    throw Error(ErrorCode::badInput, "reference: the scene has " + std::to_string(scene.channels.size()) +
+                                         " channels, the volume " + std::to_string(volume.channels().size()));
+  // Jumps inside a piece need a floor that bisection reaches soon when every point costs a ray.
+  floor_ = lighting_.any() ? 1e-2 : 1e-9;
+  opaqueDepth_ = lighting_.any() ? 5 - std::log(tolerance) : 27.7;
+  const glm::dvec3 spacing = volume.grid().spacing();
+  smallestSpacing_ = std::min({spacing.x, spacing.y, spacing.z});
+  for (std::size_t n = 0; n < scene.channels.size(); ++n) {
+    const ChannelAppearance& appearance = scene.channels[n];
+    if (!appearance.visible) continue;
+    if (!std::isfinite(appearance.weight) || appearance.weight < 0)
+      throw Error(ErrorCode::badInput, "reference: a weight must be finite and not negative");
+    ChannelCurves curves(appearance);
+    if (!curves.visible()) continue;
+    channels_.push_back({ScalarField(volume.channels()[n], dims_), std::move(curves), appearance.weight,
+                         appearance.gamma != 1, appearance.material,
+                         std::abs(appearance.rangeHi - appearance.rangeLo)});
+  }
+}
+
+RayResult Integrator::trace(const glm::dvec3& originWorld, const glm::dvec3& directionWorld) const {
+  const double length = glm::length(directionWorld);
+  if (!isFinite(originWorld) || !isFinite(directionWorld) || !(length > 0))
+    throw Error(ErrorCode::badInput, "reference: a ray needs a finite origin and a direction that is not 0");
+  const Ray ray{originWorld - voxelZero_, directionWorld / length};
+  Path all;
+  if (blend_ == BlendMode::composite)
+    for (const ActiveChannel& channel : channels_) {
+      const Path alone = follow(ray, {&channel, 1});
+      all.color += alone.color;
+      all.opticalDepth += alone.opticalDepth;
+      all.error += alone.error;
+    }
+  else
+    all = follow(ray, channels_);
+  return {glm::dvec4(all.color, -std::expm1(-all.opticalDepth)), all.error};
+}
+
+/// What the given channels make of a ray.
+Integrator::Path Integrator::follow(const Ray& ray, Channels channels) const {
+  const RayCells cells = cutAtCells(voxelFromWorld_ * ray.origin, voxelFromWorld_ * ray.direction, dims_);
+  Path path;
+  forEachSmoothPart(cells, dims_, blend_, channels, [&](const Stretch& stretch, double begin, double end) {
+    const auto medium = [&](double u) { return mediumAt(ray, channels, stretch, u); };
+    if (lighting_.any())
+      integrate<4, 2>(medium, stretch.length, begin, end, path);
+    else
+      integrate<8, 4>(medium, stretch.length, begin, end, path);
+    return path.opticalDepth <= opaqueDepth_;
+  });
+  if (path.opticalDepth > opaqueDepth_) path.error += std::exp(-path.opticalDepth);  // what is hidden
+  return path;
+}
+
+/// Adds the part [begin, end] of a stretch.
+template <int kFine, int kCoarse, class MediumAt>
+void Integrator::integrate(const MediumAt& medium, double length, double begin, double end,
+                           Path& path) const {
+  if (path.opticalDepth > opaqueDepth_) return;
+  PieceLight fine = lightOf<kFine>(medium, length, begin, end);
+  if (fine.opticalDepth == 0) return;
+  const double alpha = -std::expm1(-fine.opticalDepth);
+  if (fine.opticalDepth <= kMaxPieceDepth) {
+    const PieceLight coarse = lightOf<kCoarse>(medium, length, begin, end);
+    const double error =
+        std::max(largest(fine.color - coarse.color), std::abs(fine.opticalDepth - coarse.opticalDepth));
+    if (error <= tolerance_ * alpha || error * std::exp(-path.opticalDepth) <= tolerance_ * floor_)
+      return path.add(fine, error);
+  }
+  const double middle = 0.5 * (begin + end);
+  if (middle <= begin || middle >= end) {  // no number in between: what is left is a surface
+    fine.color = fine.meanColor * alpha;
+    const PieceLight coarse = lightOf<kCoarse>(medium, length, begin, end);
+    return path.add(fine, alpha * largest(fine.meanColor - coarse.meanColor));
+  }
+  integrate<kFine, kCoarse>(medium, length, begin, middle, path);
+  integrate<kFine, kCoarse>(medium, length, middle, end, path);
+}
+
+template <int N, class MediumAt>
+Integrator::PieceLight Integrator::lightOf(const MediumAt& mediumAt, double stretchLength, double begin,
+                                           double end) {
   static const GaussRule<N> rule;
-  const double length = (end - begin) * stretch.length;
+  const double length = (end - begin) * stretchLength;
   std::array<Medium, N> medium;
   PieceLight light;
   for (std::size_t i = 0; i < N; ++i) {
-    medium[i] = stretch.at(begin + rule.node[i] * (end - begin));
+    medium[i] = mediumAt(begin + rule.node[i] * (end - begin));
     light.opticalDepth += length * rule.weight[i] * medium[i].extinction;
     light.meanColor += rule.weight[i] * medium[i].emission;
   }
@@ -94,129 +193,70 @@ PieceLight lightOf(const Stretch& stretch, double begin, double end) {
   return light;
 }
 
-/// The ray so far, from the front.
-struct Path {
-  double tolerance;
-  double opticalDepth = 0;
-  glm::dvec3 color{0};
-  double error = 0;
-
-  void add(const PieceLight& piece, double pieceError) {
-    const double transmittance = std::exp(-opticalDepth);
-    color += transmittance * piece.color;
-    error += transmittance * pieceError;
-    opticalDepth += piece.opticalDepth;
+Integrator::Medium Integrator::mediumAt(const Ray& ray, Channels channels, const Stretch& stretch,
+                                        double u) const {
+  ChannelSample samples[kMaxChannels];
+  for (std::size_t n = 0; n < stretch.channels.size(); ++n) samples[n] = stretch.channels[n].at(u);
+  const Blended blend = blended(blend_, stretch, samples);
+  Medium medium{blend.extinction, glm::dvec3(0)};
+  if (!lighting_.any()) {
+    for (std::size_t n = 0; n < stretch.channels.size(); ++n)
+      medium.emission += blend.share[n] * samples[n].color;
+    return medium;
   }
-};
-
-double largest(const glm::dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
-
-/// Adds the part [begin, end] of a stretch, in which every curve is smooth.
-void integrate(const Stretch& stretch, double begin, double end, Path& path) {
-  if (path.opticalDepth > kOpaqueDepth) return;
-  PieceLight fine = lightOf<8>(stretch, begin, end);
-  if (fine.opticalDepth == 0) return;
-  const double alpha = -std::expm1(-fine.opticalDepth);
-  if (fine.opticalDepth <= kMaxPieceDepth) {
-    const PieceLight coarse = lightOf<4>(stretch, begin, end);
-    const double error =
-        std::max(largest(fine.color - coarse.color), std::abs(fine.opticalDepth - coarse.opticalDepth));
-    if (error <= path.tolerance * alpha || error * std::exp(-path.opticalDepth) <= path.tolerance * kFloor)
-      return path.add(fine, error);
+  if (!(medium.extinction > 0)) return medium;
+  const glm::dvec3 pointVoxel = stretch.point(u);
+  std::vector<ArrivingLight> lights = lighting_.arriving(worldFromVoxel_ * pointVoxel, ray.origin);
+  if (lighting_.shadows())
+    for (ArrivingLight& light : lights)
+      light.visibility = transmittance(pointVoxel, light.direction, light.distance, channels);
+  for (std::size_t n = 0; n < stretch.channels.size(); ++n) {
+    if (!(blend.share[n] > 0)) continue;
+    const ActiveChannel& channel = *stretch.channels[n].channel;
+    glm::dvec3 gradient(0);
+    if (lighting_.shading()) gradient = glm::transpose(voxelFromWorld_) * channel.field.gradient(pointVoxel);
+    const double change = glm::length(gradient) * smallestSpacing_;
+    const double steepness = change > 0 ? change / channel.range : 0.0;
+    medium.emission += blend.share[n] * lighting_.radiance(channel.material, samples[n].color, gradient,
+                                                           steepness, -ray.direction, lights);
   }
+  return medium;
+}
+
+/// Of the given channels between a point and a light.
+double Integrator::transmittance(const glm::dvec3& pointVoxel, const glm::dvec3& direction, double distance,
+                                 Channels channels) const {
+  if (!(distance > 0)) return 1;
+  double depth = 0;
+  const double dark = 3 - std::log(tolerance_);  // no light that counts
+  forEachSmoothPart(cutAtCells(pointVoxel, voxelFromWorld_ * direction, dims_, distance), dims_, blend_,
+                    channels, [&](const Stretch& stretch, double begin, double end) {
+                      depth += opticalDepth(stretch, begin, end);
+                      return depth <= dark;
+                    });
+  return depth <= dark ? std::exp(-depth) : 0.0;
+}
+
+/// Of a part of a stretch. Where gamma is 1, extinction is a cubic and the two rules agree at once.
+double Integrator::opticalDepth(const Stretch& stretch, double begin, double end) const {
+  const auto rule = [&]<int N>(const GaussRule<N>& gauss) {
+    ChannelSample samples[kMaxChannels];
+    double sum = 0;
+    for (std::size_t i = 0; i < N; ++i) {
+      for (std::size_t n = 0; n < stretch.channels.size(); ++n)
+        samples[n] = stretch.channels[n].at(begin + gauss.node[i] * (end - begin));
+      sum += gauss.weight[i] * blended(blend_, stretch, samples).extinction;
+    }
+    return sum * (end - begin) * stretch.length;
+  };
+  static const GaussRule<2> two;
+  static const GaussRule<4> four;
+  const double coarse = rule(two), fine = rule(four);
   const double middle = 0.5 * (begin + end);
-  if (middle <= begin || middle >= end) {  // no number in between: what is left is a surface
-    fine.color = fine.meanColor * alpha;
-    return path.add(fine, alpha * largest(fine.meanColor - lightOf<4>(stretch, begin, end).meanColor));
-  }
-  integrate(stretch, begin, middle, path);
-  integrate(stretch, middle, end, path);
-}
-
-/// Data value of a voxel; not finite when the voxel is not.
-double voxel(const Channel& channel, std::size_t index) {
-  const double stored = visitScalarType(
-      channel.voxels.type(), [&](auto zero) { return double(channel.voxels.as<decltype(zero)>()[index]); });
-  return channel.slope * stored + channel.intercept;
-}
-
-/// The eight voxels at the corners of the cell that begins at `cell`, x fastest (where there is one layer
-/// only, it is both); false when one of them is not finite.
-bool fetchCorners(const Channel& channel, const glm::ivec3& dims, const glm::ivec3& cell,
-                  std::array<double, 8>& corners) {
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::ivec3 offset(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
-    const glm::ivec3 p = glm::min(cell + offset, dims - 1);
-    const std::size_t index =
-        std::size_t(p.x) + std::size_t(dims.x) * (std::size_t(p.y) + std::size_t(dims.y) * std::size_t(p.z));
-    corners[std::size_t(corner)] = voxel(channel, index);
-    if (!std::isfinite(corners[std::size_t(corner)])) return false;
-  }
-  return true;
-}
-
-bool isFinite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
-}  // namespace
-
-Integrator::Integrator(const Volume& volume, const Scene& scene, double tolerance)
-    : volume_(volume),
-      blend_(scene.blend),
-      tolerance_(tolerance),
-      voxelFromWorld_(glm::inverse(glm::dmat3(volume.grid().worldFromVoxel))),
-      voxelZero_(volume.grid().worldFromVoxel[3]) {
-  if (scene.channels.size() != volume.channels().size())
-    throw Error(ErrorCode::badInput, "reference: the scene has " + std::to_string(scene.channels.size()) +
-                                         " channels, the volume " + std::to_string(volume.channels().size()));
-  for (std::size_t n = 0; n < scene.channels.size(); ++n) {
-    if (!scene.channels[n].visible) continue;
-    ChannelCurves curves(scene.channels[n]);
-    if (curves.visible()) channels_.push_back({&volume.channels()[n], std::move(curves)});
-  }
-}
-
-RayResult Integrator::trace(const glm::dvec3& originWorld, const glm::dvec3& directionWorld) const {
-  const double length = glm::length(directionWorld);
-  if (!isFinite(originWorld) || !isFinite(directionWorld) || !(length > 0))
-    throw Error(ErrorCode::badInput, "reference: a ray needs a finite origin and a direction that is not 0");
-  const glm::ivec3 dims = volume_.grid().dims;
-  const RayCells ray = cutAtCells(voxelFromWorld_ * (originWorld - voxelZero_),
-                                  voxelFromWorld_ * (directionWorld / length), dims);
-  Path path{tolerance_};
-  std::vector<double> cuts;
-  Stretch stretch{blend_, 0, {}};
-  for (std::size_t i = 0; i + 1 < ray.cuts.size() && path.opticalDepth <= kOpaqueDepth; ++i) {
-    const double begin = ray.cuts[i], end = ray.cuts[i + 1];
-    if (!(begin < end)) continue;
-    // Cell [cell, cell+1) between voxel centres; the outer half voxels, where values are clamped to the edge,
-    // belong to the outermost cells.
-    const glm::dvec3 cell = glm::clamp(glm::floor(ray.origin + 0.5 * (begin + end) * ray.direction),
-                                       glm::dvec3(0), glm::max(glm::dvec3(dims) - 2.0, 0.0));
-    const auto inCell = [&](double t) {
-      return glm::clamp(ray.origin + t * ray.direction - cell, glm::dvec3(0), glm::dvec3(1));
-    };
-    stretch.length = end - begin;
-    stretch.channels.clear();
-    cuts = {0, 1};
-    for (const ActiveChannel& channel : channels_) {
-      std::array<double, 8> corners;
-      if (!fetchCorners(*channel.data, dims, glm::ivec3(cell), corners)) continue;
-      stretch.channels.push_back({&channel.curves, CellScalar(corners, inCell(begin), inCell(end))});
-      for (const double value : channel.curves.breakpoints())
-        stretch.channels.back().scalar.appendCrossings(value, cuts);
-    }
-    std::sort(cuts.begin(), cuts.end());
-    for (std::size_t j = 0; j + 1 < cuts.size(); ++j) {
-      if (!(cuts[j] < cuts[j + 1])) continue;
-      for (ChannelInCell& channel : stretch.channels) {
-        const double middle = channel.scalar(0.5 * (cuts[j] + cuts[j + 1]));
-        channel.piece = channel.curves->pieceAt(channel.curves->position(middle));
-      }
-      integrate(stretch, cuts[j], cuts[j + 1], path);
-    }
-  }
-  const double hidden = path.opticalDepth > kOpaqueDepth ? std::exp(-path.opticalDepth) : 0.0;
-  return {glm::dvec4(path.color, -std::expm1(-path.opticalDepth)), path.error + hidden};
+  // A ray has some hundred parts, and a relative error counts at most depth x exp(-depth) times.
+  if (std::abs(fine - coarse) <= tolerance_ * std::max(1e-3, 1e-2 * fine) || middle <= begin || middle >= end)
+    return fine;
+  return opticalDepth(stretch, begin, middle) + opticalDepth(stretch, middle, end);
 }
 
 RayResult traceReference(const Volume& volume, const Scene& scene, const glm::dvec3& originWorld,

@@ -2,6 +2,7 @@
 // Which cells of a grid a ray passes, and from where to where.
 #pragma once
 #include <glm/vec3.hpp>
+#include <limits>
 #include <vector>
 
 namespace scolopax::reference {
@@ -13,8 +14,9 @@ struct RayCells {
   std::vector<double> cuts;
 };
 
-/// Only t >= 0 of the given ray counts; t of the result is counted from another origin on the same line, near
-/// the volume. A ray along a face of the box counts as inside.
-RayCells cutAtCells(const glm::dvec3& origin, const glm::dvec3& direction, const glm::ivec3& dims);
+/// Only 0 <= t <= `length` of the given ray counts; t of the result is counted from another origin on the
+/// same line, near the volume. A ray along a face of the box counts as inside.
+RayCells cutAtCells(const glm::dvec3& origin, const glm::dvec3& direction, const glm::ivec3& dims,
+                    double length = std::numeric_limits<double>::infinity());
 
 }  // namespace scolopax::reference

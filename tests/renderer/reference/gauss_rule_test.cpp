@@ -25,6 +25,7 @@ void expectExact() {
 }
 
 TEST(GaussRule, IsExactForPolynomialsUpToItsDegree) {
+  expectExact<2>();
   expectExact<4>();
   expectExact<8>();
 }

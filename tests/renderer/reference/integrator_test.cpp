@@ -146,22 +146,6 @@ TEST(Reference, ConstantChannelsShareTheLightByTheirExtinctions) {
   EXPECT_EQ(traceReference(volume, scene, {1, 1, -7}, {0, 0, 1}).rgba, glm::dvec4(0));
 }
 
-/// Figure 3 of the paper: three cubes with linear densities, red falling along x, green along -x, blue along
-/// -y.
-struct Figure3 {
-  static constexpr int n = 8;
-  static constexpr double density = 0.9;
-  Volume volume = makeVolume(makeGrid(glm::ivec3(n)),
-                             {[](int i, int, int) { return n - 1 - i; }, [](int i, int, int) { return i; },
-                              [](int, int j, int) { return j; }});
-  Scene scene = makeScene(
-      {ramp(0, n - 1, density, kRed), ramp(0, n - 1, density, kGreen), ramp(0, n - 1, density, kBlue)});
-  static glm::dvec3 sigma(const glm::dvec3& p) {
-    const double x = std::clamp(p.x / (n - 1), 0.0, 1.0), y = std::clamp(p.y / (n - 1), 0.0, 1.0);
-    return density * glm::dvec3(1 - x, x, y);
-  }
-};
-
 TEST(Reference, Figure3SeenAlongZSplitsTheLightInClosedForm) {
   const Figure3 figure;
   for (const double x : {-0.5, 0.0, 1.25, 3.5, 7.4})

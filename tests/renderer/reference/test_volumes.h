@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Small volumes and appearances from which the tests of the reference compute what they expect.
 #pragma once
+#include <algorithm>
 #include <functional>
 #include <utility>
 #include <vector>
@@ -67,5 +68,21 @@ inline Scene makeScene(std::vector<ChannelAppearance> channels) {
   scene.channels = std::move(channels);
   return scene;
 }
+
+/// Figure 3 of the paper: three cubes with linear densities, red falling along x, green along -x, blue along
+/// -y.
+struct Figure3 {
+  static constexpr int n = 8;
+  static constexpr double density = 0.9;
+  Volume volume = makeVolume(makeGrid(glm::ivec3(n)),
+                             {[](int i, int, int) { return n - 1 - i; }, [](int i, int, int) { return i; },
+                              [](int, int j, int) { return j; }});
+  Scene scene = makeScene({ramp(0, n - 1, density, {1, 0, 0}), ramp(0, n - 1, density, {0, 1, 0}),
+                           ramp(0, n - 1, density, {0, 0, 1})});
+  static glm::dvec3 sigma(const glm::dvec3& p) {
+    const double x = std::clamp(p.x / (n - 1), 0.0, 1.0), y = std::clamp(p.y / (n - 1), 0.0, 1.0);
+    return density * glm::dvec3(1 - x, x, y);
+  }
+};
 
 }  // namespace scolopax::reference

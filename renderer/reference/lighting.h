@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Gradient shading and lights, in double: what matter at a point sends to the eye. Everything is in world
+// space.
+#pragma once
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "renderer/data/scene.h"
+
+namespace scolopax::reference {
+
+/// One light as it arrives at a point.
+struct ArrivingLight {
+  glm::dvec3 direction;  ///< towards the light, length 1; 0 at the light itself
+  double distance;       ///< of what can be in its way
+  glm::dvec3 intensity;  ///< linear RGB
+  double visibility = 1;
+};
+
+class Lighting {
+ public:
+  /// `zero` is where coordinates are counted from. Throws Error(badInput) for lights and materials that
+  /// cannot be.
+  Lighting(const Scene& scene, const glm::dvec3& zero);
+  /// False for plain emission and absorption: then the other functions are not needed.
+  bool any() const { return shading_ || shadows_; }
+  bool shadows() const { return shadows_; }
+  bool shading() const { return shading_; }
+
+  /// All lights at `point` on a ray that begins at `eye`, all of them visible.
+  std::vector<ArrivingLight> arriving(const glm::dvec3& point, const glm::dvec3& eye) const;
+  /// Of matter of emission `color`. `steepness` is |gradient| x smallest spacing / |hi - lo|; `toViewer` has
+  /// length 1.
+  glm::dvec3 radiance(const Material& material, const glm::dvec3& color, const glm::dvec3& gradient,
+                      double steepness, const glm::dvec3& toViewer,
+                      std::span<const ArrivingLight> lights) const;
+
+ private:
+  bool shading_, shadows_;
+  std::vector<Light> lights_;
+};
+
+}  // namespace scolopax::reference

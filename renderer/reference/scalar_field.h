@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// One channel's voxels as data values in double: what is interpolated between, and the gradient.
+#pragma once
+#include <array>
+#include <glm/vec3.hpp>
+#include <optional>
+
+#include "renderer/data/volume.h"
+
+namespace scolopax::reference {
+
+class ScalarField {
+ public:
+  /// Keeps a pointer to `channel`, whose grid has `dims` voxels.
+  ScalarField(const Channel& channel, const glm::ivec3& dims) : channel_(&channel), dims_(dims) {}
+
+  /// The eight voxels at the corners of the cell that begins at voxel `cell`, x fastest (where there is one
+  /// layer only, twice the same); none when one of them is not finite.
+  std::optional<std::array<double, 8>> corners(const glm::ivec3& cell) const;
+  /// Trilinear at voxel coordinates, clamped to the outer voxel centres; NaN in a cell that has no corners.
+  double operator()(const glm::dvec3& point) const;
+  /// Change per voxel along each axis: difference of the values one voxel before and behind, both clamped to
+  /// the outer voxel centres, over their distance. All zero when one of the values is not finite.
+  glm::dvec3 gradient(const glm::dvec3& point) const;
+
+ private:
+  double voxel(const glm::ivec3& at) const;
+  const Channel* channel_;
+  glm::ivec3 dims_;
+};
+
+}  // namespace scolopax::reference

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// A ray's way through one cell, with everything that blending and light need there; and the parts of a ray
+// in which nothing has a kink or a jump.
+#pragma once
+#include <functional>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "renderer/data/scene.h"
+#include "renderer/reference/cell_scalar.h"
+#include "renderer/reference/channel_curves.h"
+#include "renderer/reference/ray_cells.h"
+#include "renderer/reference/scalar_field.h"
+
+namespace scolopax::reference {
+
+/// A channel that can be seen.
+struct ActiveChannel {
+  ScalarField field;
+  ChannelCurves curves;
+  double weight;  ///< in blend mode mix
+  bool bent;      ///< gamma is not 1: extinction is not a piecewise cubic along a ray
+  Material material;
+  double range;  ///< |hi - lo|, data units
+};
+
+/// A channel along one cell, and the piece of its curves that holds.
+struct ChannelInCell {
+  const ActiveChannel* channel;
+  CellScalar scalar;
+  std::size_t piece = 0;
+  ChannelSample at(double u) const {
+    return channel->curves.sample(piece, channel->curves.position(scalar(u)));
+  }
+};
+
+/// One cell's stretch of a ray, u in [0,1].
+struct Stretch {
+  double length = 0;                    ///< world units
+  glm::dvec3 begin{0}, end{0};          ///< voxel coordinates
+  std::vector<ChannelInCell> channels;  ///< those that are finite here
+  glm::dvec3 point(double u) const { return begin + u * (end - begin); }
+};
+
+/// Calls visit(stretch, begin, end) front to back for every part [begin, end] of u in which extinction and
+/// colour of all channels are smooth and, in max and mix, one and the same channel has the largest
+/// extinction; until visit returns false.
+void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, BlendMode blend,
+                       std::span<const ActiveChannel> channels,
+                       const std::function<bool(const Stretch&, double begin, double end)>& visit);
+
+}  // namespace scolopax::reference
