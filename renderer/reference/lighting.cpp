@@ -12,15 +12,13 @@
 namespace scolopax::reference {
 namespace {
 
-using kernel::LightKind;
-
 bool allNotNegative(std::initializer_list<double> values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v) && v >= 0; });
 }
 
 void check(const Light& light) {
   const double length = glm::length(light.vector);
-  if (!std::isfinite(length) || (light.kind == LightKind::directional && !(length > 0)))
+  if (!std::isfinite(length) || (light.type == LightType::directional && !(length > 0)))
     throw Error(ErrorCode::badInput,
                 "reference: a light's position or direction must be finite, a direction not 0");
   if (!allNotNegative({light.color.x, light.color.y, light.color.z, light.intensity}))
@@ -45,7 +43,7 @@ Lighting::Lighting(const Scene& scene, const glm::dvec3& zero)
   if (lights_.empty()) lights_.resize(1);  // a headlight
   for (Light& light : lights_) {
     check(light);
-    if (light.kind == LightKind::point) light.vector -= zero;
+    if (light.type == LightType::point) light.vector -= zero;
   }
   for (const ChannelAppearance& channel : scene.channels) check(channel.material);
 }
@@ -54,14 +52,14 @@ std::vector<ArrivingLight> Lighting::arriving(const glm::dvec3& point, const glm
   std::vector<ArrivingLight> result;
   for (const Light& light : lights_) {
     const glm::dvec3 intensity = light.color * light.intensity;
-    switch (light.kind) {
-      case LightKind::directional:
+    switch (light.type) {
+      case LightType::directional:
         result.push_back({-unit(light.vector), std::numeric_limits<double>::infinity(), intensity});
         break;
-      case LightKind::point:
+      case LightType::point:
         result.push_back({unit(light.vector - point), glm::length(light.vector - point), intensity});
         break;
-      case LightKind::headlight:
+      case LightType::headlight:
         result.push_back({unit(eye - point), glm::length(eye - point), intensity});
         break;
     }

@@ -18,7 +18,7 @@ const glm::dvec3 kColor(0.8, 0.4, 0.2);
 const Material kMaterial{0.1, 0.6, 0.35, 7};
 
 Light directional(const glm::dvec3& to, const glm::dvec3& color = glm::dvec3(1), double intensity = 1) {
-  return {kernel::LightKind::directional, to, color, intensity};
+  return {LightType::directional, to, color, intensity};
 }
 
 /// Value a . world, on a grid with the given columns around the origin; opacity does not depend on it.
@@ -108,13 +108,13 @@ TEST(ReferenceShading, APointLightShinesFromItsPositionWithoutFallOff) {
   LinearField field;
   for (const double far : {40.0, 4e7}) {
     // So far that its direction is the same everywhere in the box.
-    field.scene.lights = {{kernel::LightKind::point, far * 1e6 * glm::dvec3(0.6, 0, 0.8), glm::dvec3(1), 1}};
+    field.scene.lights = {{LightType::point, far * 1e6 * glm::dvec3(0.6, 0, 0.8), glm::dvec3(1), 1}};
     expectNear(field.seenAlong({-1, 0, 0}), shaded(kMaterial, kColor, 0.6, 1.6 / std::sqrt(3.2)), 1e-6);
   }
   // Beside the ray at x = 0.75: the light is grazing there, in front of it what faces the eye sees it not.
   field.scene.channels[0].material = {0, 1, 0, 1};
   field.scene.channels[0].color = {{0, {1, 1, 1}}};
-  field.scene.lights = {{kernel::LightKind::point, {0.75, 2, 0}, glm::dvec3(1), 1}};
+  field.scene.lights = {{LightType::point, {0.75, 2, 0}, glm::dvec3(1), 1}};
   const RayResult found = [&] {
     field.seenAlong({-1, 0, 0});
     return traceReference(field.volume(), field.scene, {20, 0, 0}, {-1, 0, 0});

@@ -14,9 +14,9 @@ namespace {
 constexpr double kTolerance = 1e-4;  // what the integrator aims at with light
 
 Light directional(const glm::dvec3& to, const glm::dvec3& color = glm::dvec3(1), double intensity = 1) {
-  return {kernel::LightKind::directional, to, color, intensity};
+  return {LightType::directional, to, color, intensity};
 }
-Light pointAt(const glm::dvec3& position) { return {kernel::LightKind::point, position, glm::dvec3(1), 1}; }
+Light pointAt(const glm::dvec3& position) { return {LightType::point, position, glm::dvec3(1), 1}; }
 
 /// A box 8 long from z = -0.5 on, seen along +z at (2, 3); extinction 0.35, white, ambient 0.2.
 struct Slab {
@@ -208,8 +208,8 @@ struct LitFigure3 : Figure3 {
     for (const Light& light : scene.lights) {
       glm::dvec3 l = eye - p;
       double distance = glm::length(l);
-      if (light.kind == kernel::LightKind::directional) l = -light.vector, distance = 1e9;
-      if (light.kind == kernel::LightKind::point) l = light.vector - p, distance = glm::length(l);
+      if (light.type == LightType::directional) l = -light.vector, distance = 1e9;
+      if (light.type == LightType::point) l = light.vector - p, distance = glm::length(l);
       l = glm::normalize(l);
       const glm::dvec3 intensity = light.color * light.intensity;
       const glm::dvec3 reaching = intensity * visible(mode, p, l, distance, channel);
