@@ -16,22 +16,31 @@ std::string sizeOf(const Image& image) {
 
 }  // namespace
 
-ImageDifference compareImages(const Image& a, const Image& b) {
+void checkComparable(const Image& a, const Image& b) {
   if (a.width != b.width || a.height != b.height)
     throw Error(ErrorCode::badInput,
                 "compare: the pictures must have one size, found " + sizeOf(a) + " and " + sizeOf(b));
   if (a.pixels.empty() || a.pixels.size() != b.pixels.size())
     throw Error(ErrorCode::badInput, "compare: there must be at least one pixel, found " + sizeOf(a));
-  double sum = 0, maximum = 0;
+}
+
+ImageDifference compareImages(const Image& a, const Image& b) {
+  checkComparable(a, b);
+  double sum = 0, maximum = 0, relative = 0;
   for (std::size_t i = 0; i < a.pixels.size(); ++i)
     for (int c = 0; c < 3; ++c) {
-      const double difference = std::abs(double(a.pixels[i][c]) - double(b.pixels[i][c]));
-      if (std::isnan(difference)) return {difference, difference, difference};
+      const double reference = b.pixels[i][c];
+      const double difference = std::abs(double(a.pixels[i][c]) - reference);
+      if (std::isnan(difference)) return {difference, difference, difference, difference};
       sum += difference * difference;
       maximum = std::max(maximum, difference);
+      relative += std::isinf(difference)
+                      ? difference
+                      : difference * difference / (reference * reference + kRelativeEpsilon);
     }
-  const double rmse = std::sqrt(sum / (3.0 * double(a.pixels.size())));
-  return {rmse, -20 * std::log10(rmse), maximum};
+  const double components = 3.0 * double(a.pixels.size());
+  const double rmse = std::sqrt(sum / components);
+  return {rmse, -20 * std::log10(rmse), maximum, relative / components};
 }
 
 }  // namespace scolopax

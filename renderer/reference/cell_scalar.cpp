@@ -8,10 +8,13 @@
 namespace scolopax::reference {
 namespace {
 
+/// Exact where a and b are equal.
+double lerp(double a, double b, double u) { return a + u * (b - a); }
+
 double trilinear(const std::array<double, 8>& c, double x, double y, double z) {
-  const double near = std::lerp(std::lerp(c[0], c[1], x), std::lerp(c[2], c[3], x), y);
-  const double far = std::lerp(std::lerp(c[4], c[5], x), std::lerp(c[6], c[7], x), y);
-  return std::lerp(near, far, z);
+  const double near = lerp(lerp(c[0], c[1], x), lerp(c[2], c[3], x), y);
+  const double far = lerp(lerp(c[4], c[5], x), lerp(c[6], c[7], x), y);
+  return lerp(near, far, z);
 }
 
 }  // namespace
@@ -28,8 +31,8 @@ CellScalar::CellScalar(const std::array<double, 8>& c, const glm::dvec3& p, cons
 }
 
 double CellScalar::operator()(double u) const {  // de Casteljau: exact where the scalar is constant
-  const double a = std::lerp(b_[0], b_[1], u), b = std::lerp(b_[1], b_[2], u), c = std::lerp(b_[2], b_[3], u);
-  return std::lerp(std::lerp(a, b, u), std::lerp(b, c, u), u);
+  const double a = lerp(b_[0], b_[1], u), b = lerp(b_[1], b_[2], u), c = lerp(b_[2], b_[3], u);
+  return lerp(lerp(a, b, u), lerp(b, c, u), u);
 }
 
 double CellScalar::lower() const { return *std::min_element(b_.begin(), b_.end()); }

@@ -237,7 +237,7 @@ double Integrator::transmittance(const glm::dvec3& pointVoxel, const glm::dvec3&
   return depth <= dark ? std::exp(-depth) : 0.0;
 }
 
-/// Of a part of a stretch. Where gamma is 1, extinction is a cubic and the two rules agree at once.
+/// Of a part of a stretch.
 double Integrator::opticalDepth(const Stretch& stretch, double begin, double end) const {
   const auto rule = [&]<int N>(const GaussRule<N>& gauss) {
     ChannelSample samples[kMaxChannels];
@@ -251,8 +251,11 @@ double Integrator::opticalDepth(const Stretch& stretch, double begin, double end
   };
   static const GaussRule<2> two;
   static const GaussRule<4> four;
-  const double coarse = rule(two), fine = rule(four);
-  const double middle = 0.5 * (begin + end);
+  const double coarse = rule(two);
+  const auto bent = [](const ChannelInCell& channel) { return channel.channel->bent; };
+  if (std::none_of(stretch.channels.begin(), stretch.channels.end(), bent))
+    return coarse;  // of a cubic: exact
+  const double fine = rule(four), middle = 0.5 * (begin + end);
   // A ray has some hundred parts, and a relative error counts at most depth x exp(-depth) times.
   if (std::abs(fine - coarse) <= tolerance_ * std::max(1e-3, 1e-2 * fine) || middle <= begin || middle >= end)
     return fine;

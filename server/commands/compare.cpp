@@ -8,20 +8,26 @@
 #include <nlohmann/json.hpp>
 
 #include "renderer/io/image_file.h"
+#include "renderer/metrics/flip.h"
 #include "renderer/metrics/metrics.h"
 
 namespace scolopax {
 namespace {
 
 struct CompareOptions {
-  std::string a, b;
+  std::string a, b, difference;
   bool json = false;
 };
 
 void compare(const CompareOptions& options) {
-  const ImageDifference difference = compareImages(io::readImage(options.a), io::readImage(options.b));
+  const Image a = io::readImage(options.a), b = io::readImage(options.b);
+  const ImageDifference difference = compareImages(a, b);
+  const Flip flip = flipDifference(a, b);
+  if (!options.difference.empty())
+    io::writeImage(options.difference, flipPicture(flip, a.width, a.height), glm::vec3(0));
   if (!options.json) {
-    std::printf("rmse %.9g\npsnr %.9g dB\nmax  %.9g\n", difference.rmse, difference.psnr, difference.maximum);
+    std::printf("rmse %.9g\npsnr %.9g dB\nmax  %.9g\nrelative %.9g\nflip %.9g\n", difference.rmse,
+                difference.psnr, difference.maximum, difference.relative, flip.mean);
     return;
   }
   // JSON has no infinity: the psnr of equal pictures is null.
@@ -30,7 +36,9 @@ void compare(const CompareOptions& options) {
   };
   const nlohmann::ordered_json out = {{"rmse", number(difference.rmse)},
                                       {"psnr", number(difference.psnr)},
-                                      {"max", number(difference.maximum)}};
+                                      {"max", number(difference.maximum)},
+                                      {"relative", number(difference.relative)},
+                                      {"flip", number(flip.mean)}};
   std::printf("%s\n", out.dump().c_str());
 }
 
@@ -38,12 +46,17 @@ void compare(const CompareOptions& options) {
 
 CLI::App* addCompareCommand(CLI::App& root) {
   CLI::App* command = root.add_subcommand(
-      "compare", "Print RMSE, PSNR (dB, peak 1) and the largest difference of two pictures' linear RGB");
+      "compare",
+      "Print RMSE, PSNR (dB, peak 1), the largest difference and the mean squared relative error of two "
+      "pictures' linear RGB, and their mean FLIP");
   const auto options = std::make_shared<CompareOptions>();
   command->add_option("A", options->a, "First picture (exr, tif, png, jpg)")->required();
-  command->add_option("B", options->b, "Second picture, of the same size")->required();
+  command->add_option("B", options->b, "Second picture, of the same size; the relative error's reference")
+      ->required();
   command->add_flag("--json", options->json,
-                    "Print one JSON object {rmse, psnr, max}; psnr is null if equal");
+                    "Print one JSON object {rmse, psnr, max, relative, flip}; psnr is null if equal");
+  command->add_option("--difference", options->difference,
+                      "Write FLIP of every pixel as a picture, from black (0) to light yellow (1)");
   command->callback([options] { compare(*options); });
   return command;
 }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -60,7 +61,33 @@ TEST_F(Commands, CompareTellsHowFarPicturesAreApart) {
   EXPECT_EQ(json.at("rmse"), 0.25);
   EXPECT_EQ(json.at("max"), 0.25);
   EXPECT_NEAR(json.at("psnr").get<double>(), 12.0411998, 1e-6);
-  EXPECT_EQ(run({"compare", a, b}), "rmse 0.25\npsnr 12.0411998 dB\nmax  0.25\n");
+  EXPECT_NEAR(json.at("relative").get<double>(), 0.0625 / (0.0625 + 0.01),
+              1e-9);  // the second is the reference
+  // L* of 1/2 and 1/4 are 76.0693 and 57.0754: 0.95 x 18.9939^0.7 / (0.4 x 41.2761).
+  EXPECT_NEAR(json.at("flip").get<double>(), 0.45185, 1e-5);
+  EXPECT_EQ(json.size(), 5u);
+  EXPECT_THAT(
+      run({"compare", a, b}),
+      testing::StartsWith("rmse 0.25\npsnr 12.0411998 dB\nmax  0.25\nrelative 0.862068966\nflip 0.45184"));
+}
+
+TEST_F(Commands, CompareWritesThePictureOfTheDifference) {
+  Image gray{40, 30, std::vector<glm::vec4>(40 * 30, glm::vec4(0.5f, 0.5f, 0.5f, 1))}, dark = gray;
+  for (std::size_t i = 0; i < dark.pixels.size(); ++i)
+    if (i % 40 >= 20) dark.pixels[i] = {0, 0, 0, 1};
+  io::writeImage(path("a.exr"), gray, {});
+  io::writeImage(path("b.exr"), dark, {});
+  run({"compare", path("a.exr"), path("b.exr"), "--json", "--difference", path("d.png")});
+  const Image difference = io::readImage(path("d.png"));
+  ASSERT_EQ(difference.width, 40);
+  ASSERT_EQ(difference.height, 30);
+  const auto sum = [&](std::size_t x) {
+    const glm::vec4& p = difference.pixels[15 * 40 + x];
+    return p.x + p.y + p.z;
+  };
+  EXPECT_LT(sum(2), 0.01f);  // equal: black
+  EXPECT_GT(sum(37), 0.9f);  // different: bright
+  EXPECT_THROW(run({"compare", path("a.exr"), path("b.exr"), "--difference", path("none/d.png")}), Error);
 }
 
 TEST_F(Commands, CompareOfEqualPicturesHasNoPsnr) {
@@ -68,6 +95,8 @@ TEST_F(Commands, CompareOfEqualPicturesHasNoPsnr) {
   const auto json = nlohmann::json::parse(run({"compare", a, a, "--json"}));
   EXPECT_EQ(json.at("rmse"), 0);
   EXPECT_EQ(json.at("max"), 0);
+  EXPECT_EQ(json.at("relative"), 0);
+  EXPECT_EQ(json.at("flip"), 0);
   EXPECT_TRUE(json.at("psnr").is_null());
 }
 

@@ -43,6 +43,18 @@ TEST(ImageDifference, OfAUniformTenthIsTwentyDecibels) {
   EXPECT_NEAR(d.maximum, 0.1, 1e-8);
 }
 
+TEST(ImageDifference, RelativeErrorHasTheValueComputedByHand) {
+  Image a = makeImage(2, 1, {0, 0, 0, 0}), b = a;
+  // The second picture is the reference: 0.25 / 0.26, 0.01 / 0.01, 0, and 1 / 4.01, 0, 0.
+  a.pixels[0] = {1.0f, 0.1f, 0.7f, 1};
+  b.pixels[0] = {0.5f, 0.0f, 0.7f, 1};
+  a.pixels[1] = {1.0f, 0.25f, 0.0f, 1};
+  b.pixels[1] = {2.0f, 0.25f, 0.0f, 1};
+  EXPECT_NEAR(compareImages(a, b).relative, (0.9615384615384616 + 1 + 0.24937655860349128) / 6, 1e-7);
+  EXPECT_NEAR(compareImages(b, a).relative, (0.25 / 1.01 + 0.01 / 0.02 + 1 / 1.01) / 6, 1e-7);
+  EXPECT_EQ(compareImages(a, a).relative, 0);
+}
+
 TEST(ImageDifference, DoesNotLookAtAlpha) {
   const ImageDifference d = compareImages(makeImage(2, 2, {0, 0, 0, 0}), makeImage(2, 2, {0, 0, 0, 1}));
   EXPECT_EQ(d.rmse, 0);
@@ -61,9 +73,12 @@ TEST(ImageDifference, NeverPassesOverAPixelThatIsNotFinite) {
   EXPECT_TRUE(std::isnan(compareImages(a, b).rmse));
   EXPECT_TRUE(std::isnan(compareImages(a, b).psnr));
   EXPECT_TRUE(std::isnan(compareImages(a, b).maximum));
+  EXPECT_TRUE(std::isnan(compareImages(a, b).relative));
   a.pixels[1].y = std::numeric_limits<float>::infinity();
   EXPECT_TRUE(std::isinf(compareImages(a, b).rmse));
   EXPECT_TRUE(std::isinf(compareImages(a, b).maximum));
+  EXPECT_TRUE(std::isinf(compareImages(a, b).relative));
+  EXPECT_TRUE(std::isinf(compareImages(b, a).relative));
 }
 
 TEST(ImageDifference, RefusesDifferentSizesAndNamesBoth) {
