@@ -2,6 +2,7 @@
 #include "renderer/reference/stretch.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 
@@ -16,10 +17,13 @@ struct Difference {
   double operator()(double w) const { return a.at(uOf(w)).extinction - b.at(uOf(w)).extinction; }
 };
 
-/// Points between which the difference has no extremum, ascending from 0 to 1: exactly so where it is a
+/// Values at w = 0, 1/3, 2/3 and 1.
+using FourValues = std::array<double, 4>;
+
+/// Points between which the difference d has no extremum, ascending from 0 to 1: exactly so where it is a
 /// cubic; where gamma bends it, sixteen equal steps as well. None when a cubic has one sign throughout.
-std::vector<double> bracketEnds(const Difference& difference, bool bent) {
-  const double d0 = difference(0), d1 = difference(1.0 / 3), d2 = difference(2.0 / 3), d3 = difference(1);
+std::vector<double> bracketEnds(const FourValues& a, const FourValues& b, bool bent) {
+  const double d0 = a[0] - b[0], d1 = a[1] - b[1], d2 = a[2] - b[2], d3 = a[3] - b[3];
   const double c1 = (-11 * d0 + 18 * d1 - 9 * d2 + 2 * d3) / 2,
                c2 = (18 * d0 - 45 * d1 + 36 * d2 - 9 * d3) / 2,
                c3 = (-9 * d0 + 27 * d1 - 27 * d2 + 9 * d3) / 2;
@@ -51,11 +55,16 @@ double bisect(const Difference& difference, double begin, double end) {
 /// another.
 void appendHandovers(const Stretch& stretch, double begin, double end, std::vector<double>& cuts) {
   const auto& channels = stretch.channels;
+  std::array<FourValues, kMaxChannels> extinctions;
+  for (std::size_t n = 0; n < channels.size(); ++n)
+    for (std::size_t k = 0; k < 4; ++k)
+      extinctions[n][k] = channels[n].at(begin + double(k) / 3 * (end - begin)).extinction;
   for (std::size_t i = 0; i < channels.size(); ++i)
     for (std::size_t j = i + 1; j < channels.size(); ++j) {
       const Difference difference{channels[i], channels[j], begin, end};
       double last = 0, lastSign = 0;  // the last point at which the channels differ
-      for (const double w : bracketEnds(difference, channels[i].channel->bent || channels[j].channel->bent)) {
+      const bool bent = channels[i].channel->bent || channels[j].channel->bent;
+      for (const double w : bracketEnds(extinctions[i], extinctions[j], bent)) {
         const double d = difference(w);
         if (d == 0) continue;
         if (d * lastSign < 0) {
