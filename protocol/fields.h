@@ -65,7 +65,8 @@ struct Table<Material> {
       field("ambient", &Material::ambient, "Light that comes from everywhere; also what is left in shadow.",
             {.atLeast = 0, .atMost = 10}),
       field("diffuse", &Material::diffuse, "Matt reflection.", {.atLeast = 0, .atMost = 10}),
-      field("specular", &Material::specular, "Highlight, in the light's colour.", {.atLeast = 0, .atMost = 10}),
+      field("specular", &Material::specular, "Highlight, in the light's colour.",
+            {.atLeast = 0, .atMost = 10}),
       field("shininess", &Material::shininess, "Exponent of the highlight: larger is smaller and sharper.",
             {.above = 0, .atMost = 10000}),
   };
@@ -155,6 +156,8 @@ struct Table<Integrator> {
       field("method", &Integrator::method, "Tracking method.", {.names = &Lists::methods}),
       field("macrocell", &Integrator::macrocell, "Edge of the cells that bound the extinction.",
             {.unit = "voxels", .atLeast = 1, .atMost = 64}),
+      field("step", &Integrator::step, "Step of the ray marcher; trackers have none.",
+            {.unit = "smallest voxel spacing", .atLeast = 0.01, .atMost = 100}),
       field("seed", &Integrator::seed, "Same scene, seed and sample count: the same picture, bit for bit.",
             {.atLeast = 0, .atMost = 4294967295.0}),
   };

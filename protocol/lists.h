@@ -17,6 +17,7 @@ struct Lists {
   std::vector<EnumEntry> methods;  ///< "auto" first
   std::vector<EnumEntry> filters;
   std::vector<EnumEntry> colormaps;
+  std::vector<EnumEntry> lightTypes;
 };
 
 }  // namespace scolopax::protocol

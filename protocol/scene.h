@@ -68,6 +68,7 @@ struct Camera {
 struct Integrator {
   std::string method = "auto";
   std::uint32_t macrocell = 4;
+  double step = 0.5;
   std::uint32_t seed = 0;
 };
 

@@ -59,6 +59,7 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
           {"blendModes", named(lists.blendModes)},
           {"methods", named(lists.methods)},
           {"filters", named(lists.filters)},
+          {"lightTypes", named(lists.lightTypes)},
           {"colormaps", std::move(maps)},
           {"imageFormats", std::move(formats)},
           {"limits",

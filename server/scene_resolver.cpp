@@ -87,6 +87,9 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
     for (const auto& point : wire.opacity) look.opacity.push_back({point.position, point.value});
     look.color = wire.color ? std::vector<ColorKnot>{{0, linearOf(*wire.color)}} : knotsOf(*wire.colormap);
     look.density = *wire.density;
+    look.weight = wire.weight;
+    look.material = {wire.material.ambient, wire.material.diffuse, wire.material.specular,
+                     wire.material.shininess};
   }
 }
 
@@ -106,6 +109,21 @@ void resolveCamera(protocol::Scene& scene, Scene& render, const Grid& grid) {
   }
 }
 
+void resolveLights(const protocol::Scene& scene, Scene& render) {
+  render.shading = scene.shading;
+  render.shadows = scene.shadows;
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    const protocol::Light& wire = scene.lights[i];
+    Light light{valueOf<LightType>(kLightTypes, wire.type), vectorOf(wire.direction), linearOf(wire.color),
+                wire.intensity};
+    if (light.type == LightType::directional && light.vector == glm::dvec3(0))
+      throw ProtocolError(422, "/lights/" + std::to_string(i) + "/direction",
+                          "expected a direction that is not 0");
+    if (light.type == LightType::point) light.vector = vectorOf(wire.position);
+    render.lights.push_back(light);
+  }
+}
+
 /// What of the resolved scene decides the picture at a sample count.
 json pictureOf(json resolved) {
   resolved.erase("stop");
@@ -122,6 +140,7 @@ protocol::Lists rendererLists() {
   lists.methods.insert(lists.methods.begin(), {std::string(kAutoMethod), "chosen by the server"});
   lists.filters = entries(kPixelFilters);
   lists.colormaps = entries(colormaps());
+  lists.lightTypes = entries(kLightTypes);
   return lists;
 }
 
@@ -167,10 +186,12 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
   scene.dataset = result->dataset->id;
   resolveChannels(scene, render, volume);
   resolveCamera(scene, render, volume.grid());
+  resolveLights(scene, render);
   render.blend = valueOf<BlendMode>(kBlendModes, scene.blend.mode);
   render.method = scene.integrator.method == kAutoMethod ? Method::superposed
                                                          : valueOf<Method>(kMethods, scene.integrator.method);
   render.macrocell = int(scene.integrator.macrocell);
+  render.step = scene.integrator.step;
   render.seed = scene.integrator.seed;
   render.width = int(scene.image.width);
   render.height = int(scene.image.height);

@@ -9,8 +9,8 @@
 #include "protocol/patch.h"
 #include "protocol/scene_json.h"
 #include "protocol/schema.h"
+#include "server/scene_resolver.h"
 #include "tests/protocol/fixtures.h"
-#include "tests/protocol/lists.h"
 
 namespace scolopax::protocol {
 namespace {
@@ -43,14 +43,14 @@ TEST(ProtocolDocument, HoldsTheSectionOfTheTable) {
   ASSERT_NE(from, std::string::npos);
   ASSERT_NE(to, std::string::npos);
   expectFile(protocolFile("PROTOCOL.md"),
-             text.substr(0, from) + begin + '\n' + fieldsMarkdown(rendererLists()) + text.substr(to));
+             text.substr(0, from) + begin + '\n' + fieldsMarkdown(server::rendererLists()) + text.substr(to));
 }
 
 TEST(ProtocolDocument, ShowsScenesThatAreTaken) {
   const auto scenes = blocks("json scene");
   EXPECT_EQ(scenes.size(), 2U);
   for (const std::string& text : scenes)
-    EXPECT_NO_THROW(parseScene(parseJson(text), rendererLists())) << text;
+    EXPECT_NO_THROW(parseScene(parseJson(text), server::rendererLists())) << text;
 }
 
 TEST(ProtocolDocument, ShowsPatchesThatAreTaken) {
@@ -58,7 +58,7 @@ TEST(ProtocolDocument, ShowsPatchesThatAreTaken) {
   EXPECT_EQ(patches.size(), 5U);
   const json scene = json::parse(R"({"channels": [{"opacity": [[0, 0], [1, 1]]}]})");
   for (const std::string& text : patches) {
-    EXPECT_NO_THROW(parseScene(applyPatch(scene, parseJson(text), 4), rendererLists())) << text;
+    EXPECT_NO_THROW(parseScene(applyPatch(scene, parseJson(text), 4), server::rendererLists())) << text;
   }
 }
 

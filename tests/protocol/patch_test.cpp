@@ -9,7 +9,7 @@
 
 #include "protocol/problem.h"
 #include "protocol/scene_json.h"
-#include "tests/protocol/lists.h"
+#include "server/scene_resolver.h"
 
 namespace scolopax::protocol {
 namespace {
@@ -212,7 +212,7 @@ TEST(MergePatchBetween, TurnsAnySceneIntoAnyOther) {
   RandomScenes random(1);
   for (int round = 0; round < kRounds; ++round) {
     const json from = random.scene(), to = random.scene();
-    ASSERT_NO_THROW(parseScene(from, rendererLists())) << from;
+    ASSERT_NO_THROW(parseScene(from, server::rendererLists())) << from;
     const json patch = mergePatchBetween(from, to);
     ASSERT_EQ(applyPatch(from, patch, kChannels), to) << from << '\n' << to << '\n' << patch;
   }
@@ -221,8 +221,8 @@ TEST(MergePatchBetween, TurnsAnySceneIntoAnyOther) {
 TEST(MergePatchBetween, WorksOnResolvedScenes) {
   RandomScenes random(2);
   for (int round = 0; round < kRounds / 10; ++round) {
-    const json from = toJson(parseScene(random.scene(), rendererLists()));
-    const json to = toJson(parseScene(random.scene(), rendererLists()));
+    const json from = toJson(parseScene(random.scene(), server::rendererLists()));
+    const json to = toJson(parseScene(random.scene(), server::rendererLists()));
     ASSERT_EQ(applyPatch(from, mergePatchBetween(from, to), kChannels), to) << from << '\n' << to;
   }
 }

@@ -8,14 +8,14 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/problem.h"
-#include "tests/protocol/lists.h"
+#include "server/scene_resolver.h"
 
 namespace scolopax::protocol {
 namespace {
 
 using nlohmann::json;
 
-Scene parsed(const json& document) { return parseScene(document, rendererLists()); }
+Scene parsed(const json& document) { return parseScene(document, server::rendererLists()); }
 
 /// The pointer of the error that reading ends with; "none" when it does not.
 std::string refusedAt(const json& document) {
@@ -205,7 +205,7 @@ TEST(ParseScene, TakesOnlyTheNamesOfTheLists) {
   EXPECT_EQ(refusedAt({{"integrator", {{"method", ""}}}}), "/integrator/method");
   EXPECT_EQ(refusedAt({{"image", {{"filter", "gauss"}}}}), "/image/filter");
   EXPECT_EQ(channelRefusedAt({{"colormap", "jet"}}), "/channels/0/colormap");
-  for (const EnumEntry& entry : rendererLists().colormaps) {
+  for (const EnumEntry& entry : server::rendererLists().colormaps) {
     EXPECT_EQ(channelRefusedAt({{"colormap", entry.name}}), "none") << entry.name;
   }
 }

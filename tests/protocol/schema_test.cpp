@@ -9,8 +9,8 @@
 #include "protocol/problem.h"
 #include "protocol/scene_json.h"
 #include "renderer/data/volume.h"
+#include "server/scene_resolver.h"
 #include "tests/protocol/fixtures.h"
-#include "tests/protocol/lists.h"
 
 namespace scolopax::protocol {
 namespace {
@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 
 const json& schema() {
-  static const json parsed = json::parse(schemaText(rendererLists()));
+  static const json parsed = json::parse(schemaText(server::rendererLists()));
   return parsed;
 }
 
@@ -50,7 +50,7 @@ json sceneWith(const json::json_pointer& path, const json& value) {
 
 bool isTaken(const json::json_pointer& path, const json& value) {
   try {
-    parseScene(sceneWith(path, value), rendererLists());
+    parseScene(sceneWith(path, value), server::rendererLists());
   } catch (const ProtocolError& error) {
     EXPECT_EQ(error.pointer, path.to_string());
     return false;
@@ -59,7 +59,7 @@ bool isTaken(const json::json_pointer& path, const json& value) {
 }
 
 TEST(Schema, IsTheOneInTheRepository) {
-  expectFile(protocolFile("schema.json"), schemaText(rendererLists()));
+  expectFile(protocolFile("schema.json"), schemaText(server::rendererLists()));
 }
 
 TEST(Schema, ListsAsManyChannelsAsAVolumeMayHave) { EXPECT_EQ(std::size_t{kMaxChannels}, kMaxChannelItems); }

@@ -11,6 +11,7 @@
 #include "renderer/data/image.h"
 #include "renderer/reference/render.h"
 #include "renderer/renderer.h"
+#include "tests/support/volumes.h"
 
 namespace scolopax::test {
 
@@ -77,7 +78,7 @@ inline ::testing::AssertionResult isUnbiased(const Image& found, int samples,
 inline void expectTrackersMatch(const reference::ReferenceImage& expected,
                                 const std::shared_ptr<const Volume>& volume, const Scene& scene,
                                 int samples) {
-  for (const Method method : {Method::superposed, Method::cumulative, Method::syncDda, Method::nDda})
+  for (const Method method : kTrackers)
     EXPECT_TRUE(isUnbiased(renderAnalog(volume, scene, method, samples), samples, expected))
         << nameOf(method);
 }

@@ -12,6 +12,9 @@
 
 namespace scolopax::test {
 
+/// The methods whose expected value is the picture.
+inline constexpr Method kTrackers[] = {Method::superposed, Method::cumulative, Method::syncDda, Method::nDda};
+
 /// Voxel (i,j,k) = value(i,j,k), rounded for integer types.
 template <class T, class F>
 ChannelSource channelOf(glm::ivec3 dims, F&& value, double slope = 1, double intercept = 0) {

@@ -49,7 +49,7 @@ Image render(const std::shared_ptr<const Volume>& volume, const Scene& scene, in
 
 TEST(CpuRenderer, GivesTheSameBitsForAnyNumberOfThreads) {
   const auto volume = orbitals();
-  for (const Method method : {Method::superposed, Method::syncDda}) {
+  for (const Method method : kTrackers) {
     Scene scene = orbitalScene(*volume);
     scene.method = method;
     const Image one = render(volume, scene, 5, 1);

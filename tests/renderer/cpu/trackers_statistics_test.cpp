@@ -66,14 +66,11 @@ TEST_P(HomogeneousBox, SharesItsCollisionsAmongChannelsByTheirExtinction) {
                          flat(scene, glm::dvec4(0.1, 0.25, 0.65, 1) * alpha)));
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, HomogeneousBox,
-                         testing::Values(Method::superposed, Method::cumulative, Method::syncDda,
-                                         Method::nDda),
-                         [](const auto& tested) {
-                           std::string name(nameOf(tested.param));
-                           std::erase(name, '-');
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(Methods, HomogeneousBox, testing::ValuesIn(kTrackers), [](const auto& tested) {
+  std::string name(nameOf(tested.param));
+  std::erase(name, '-');
+  return name;
+});
 
 /// Colours of zeros and ones for every channel, so that the pixels are binomial.
 void paintPrimaries(Scene& scene) {

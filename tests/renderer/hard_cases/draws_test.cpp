@@ -21,8 +21,8 @@ struct ScriptedSampler {
 }  // namespace scolopax::kernel
 // The trackers themselves, drawing from the script instead.
 #define Sampler ScriptedSampler
-#include "renderer/kernel/trackers/superposed.h"
-#include "renderer/kernel/trackers/sync_dda.h"
+#include "renderer/kernel/trackers/one_process.h"
+#include "renderer/kernel/trackers/process_per_channel.h"
 #undef Sampler
 
 namespace scolopax::kernel {
@@ -43,13 +43,13 @@ Outcome track(const RenderPlan& plan, RandomBlock block) {
   ScriptedSampler sampler{block};
   Outcome outcome;
   const Interval inside = clipToBox(kAlongZ, plan.view().dims);
-  outcome.hit = Tracker::track(plan.view(), kAlongZ, inside, sampler, &outcome.cost);
+  outcome.hit = Tracker::template track<BlendDensity>(plan.view(), kAlongZ, inside, sampler, &outcome.cost);
   return outcome;
 }
 
 template <class Tracker>
 class Draws : public testing::Test {};
-using Trackers = testing::Types<Superposed, SyncDda>;
+using Trackers = testing::Types<Superposed, Cumulative, SyncDda, NDda>;
 TYPED_TEST_SUITE(Draws, Trackers);
 
 TYPED_TEST(Draws, AtTheirEndsOnlyHitChannelsThatHaveExtinction) {
@@ -73,8 +73,8 @@ TYPED_TEST(Draws, AtTheirEndsOnlyHitChannelsThatHaveExtinction) {
           if (x == kLow || density > 16.7 / 4) {  // within one macrocell of 4 voxels, either tracker's law
             ASSERT_TRUE(found.hit) << density << " " << x << " " << y << " " << z;
             EXPECT_TRUE(found.hit->channel == 1 || found.hit->channel == 2);
-            EXPECT_GE(found.hit->t, 2.5f);
-            EXPECT_LE(found.hit->t, 2.5 + depth / density + 1e-6);
+            EXPECT_GE(found.hit->place.t(), 2.5f);
+            EXPECT_LE(found.hit->place.t(), 2.5 + depth / density + 1e-6);
           } else if (density < 1) {
             EXPECT_FALSE(found.hit);
           }
@@ -99,9 +99,10 @@ TYPED_TEST(Draws, ThatNeverAcceptNorAdvanceEndAtTheBound) {
 TYPED_TEST(Draws, EndTheFlightWhereTheOpticalDepthSaysFromOneMillionthToOneMillion) {
   const glm::ivec3 dims(1, 1, 40);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int) { return 1; }));
-  // Superposed carries one draw across all cells; sync-dda draws in every cell, so it gets only one.
+  // One process carries its draw across all cells; a process per channel draws in every cell, so it gets only
+  // one.
   for (const int macrocell : {1, 7, 64}) {
-    if (std::is_same_v<TypeParam, SyncDda> && macrocell < 64) continue;
+    if ((std::is_same_v<TypeParam, SyncDda> || std::is_same_v<TypeParam, NDda>)&&macrocell < 64) continue;
     for (const double thickness : {1e-6, 1e-5, 1e-3, 0.1, 1.0, 5.0, 15.0, 100.0, 1e3, 1e6}) {
       Scene scene = frontScene(*volume, 1, 1);
       scene.macrocell = macrocell;
@@ -117,7 +118,7 @@ TYPED_TEST(Draws, EndTheFlightWhereTheOpticalDepthSaysFromOneMillionthToOneMilli
           const double depth = -std::log1p(-double(uniformOf(middle)));
           // Half an ulp lost per cell, and a few in the logarithm and t.
           const double tolerance = (40.0 / macrocell + 8) * 43 * 0x1p-24;
-          EXPECT_NEAR(double(hit->t), 2.5 + depth / thickness * 40, tolerance);
+          EXPECT_NEAR(double(hit->place.t()), 2.5 + depth / thickness * 40, tolerance);
           low = middle + 1;
         } else {
           high = middle;

@@ -7,7 +7,6 @@
 namespace scolopax::test {
 
 constexpr glm::dvec3 kRed(1, 0, 0), kGreen(0, 1, 0), kBlue(0, 0, 1), kWhite(1, 1, 1);
-constexpr Method kTrackers[] = {Method::superposed, Method::syncDda};
 
 /// Opacity rises from 0 at lo to 1 at hi.
 inline ChannelAppearance ramp(double lo, double hi, double density, glm::dvec3 color = kWhite) {
