@@ -8,8 +8,9 @@
 namespace scolopax::reference {
 namespace {
 
-/// Exact where a and b are equal.
-double lerp(double a, double b, double u) { return a + u * (b - a); }
+/// Exact where a and b are equal and at both ends: the outer half voxels lie at u = 1, where a huge neighbour
+/// must not wipe out b. (std::lerp is too, and several times slower.)
+double lerp(double a, double b, double u) { return u == 1 ? b : a + u * (b - a); }
 
 double trilinear(const std::array<double, 8>& c, double x, double y, double z) {
   const double near = lerp(lerp(c[0], c[1], x), lerp(c[2], c[3], x), y);

@@ -66,11 +66,13 @@ TEST(ParseScene, ReadsEveryField) {
   const json document = json::parse(R"({
     "dataset": "mri",
     "channels": [{"name": "T1", "visible": false, "range": [10, -2.5], "color": "#Ff8000",
-                  "opacity": [[0, 0], [0.5, 0], [0.5, 1]], "gamma": 2, "density": 0},
+                  "opacity": [[0, 0], [0.5, 0], [0.5, 1]], "gamma": 2, "density": 0, "weight": 0.5,
+                  "material": {"ambient": 0, "diffuse": 1, "specular": 0.5, "shininess": 8}},
                  {"colormap": "fire"}, {"colormap": [[0, "#000000"], [1, "#ffffff"]]}],
-    "blend": {"mode": "density"},
+    "blend": {"mode": "mix"}, "shading": true, "shadows": true,
+    "lights": [{"type": "point", "position": [1, 2, 3], "direction": [0, 0, 1], "color": "#ff0000", "intensity": 2}],
     "camera": {"eye": [1, 2, 3], "target": [4, 5, 6], "up": [0, 0, 1], "fovY": 90, "orthoHeight": 7},
-    "integrator": {"method": "sync-dda", "macrocell": 8, "seed": 4294967295},
+    "integrator": {"method": "sync-dda", "macrocell": 8, "step": 0.25, "seed": 4294967295},
     "image": {"width": 1, "height": 16384, "background": "#102030", "filter": "point"},
     "stop": {"samples": 16777216, "seconds": 1.5, "error": 0.01}})");
   const Scene scene = parsed(document);
@@ -95,7 +97,12 @@ TEST(ParseScene, ReadsEveryField) {
   EXPECT_EQ(scene.stop.error, 0.01);
   // What was set comes back as it was; the other defaults beside it.
   json expected = document;
-  expected["channels"][1].update({{"visible", true}, {"opacity", {{0, 0}, {1, 1}}}, {"gamma", 1}});
+  expected["channels"][1].update(
+      {{"visible", true},
+       {"opacity", {{0, 0}, {1, 1}}},
+       {"gamma", 1},
+       {"weight", 1},
+       {"material", {{"ambient", 0.3}, {"diffuse", 0.7}, {"specular", 0.2}, {"shininess", 20}}}});
   expected["channels"][2].update(expected["channels"][1], false);
   expected["channels"][2]["colormap"] = document["channels"][2]["colormap"];
   EXPECT_EQ(toJson(scene), expected);
@@ -111,7 +118,7 @@ TEST(ParseScene, TakesNullForWhatIsAutomaticAndForNothingElse) {
 }
 
 TEST(ParseScene, NamesUnknownFields) {
-  EXPECT_EQ(refusedAt({{"lights", json::array()}}), "/lights");
+  EXPECT_EQ(refusedAt({{"clip", json::array()}}), "/clip");
   EXPECT_EQ(channelRefusedAt({{"colour", "#ffffff"}}), "/channels/0/colour");
   EXPECT_EQ(refusedAt({{"camera", {{"a/b~c", 1}}}}), "/camera/a~1b~0c") << "RFC 6901 escapes";
   EXPECT_EQ(refusedAt({{"", 1}}), "/");
