@@ -99,9 +99,11 @@ class Description(unittest.TestCase):
     def test_capabilities_hold_what_is_documented(self):
         status, told = call_json(server, "GET", "/api/v1/capabilities")
         self.assertEqual((status, told["protocolVersion"], told["backend"]), (200, 1, "cpu"))
-        self.assertEqual({entry["name"] for entry in told["methods"]}, {"auto", "superposed", "sync-dda"})
-        self.assertEqual({entry["name"] for entry in told["filters"]}, {"box", "point"})
-        self.assertEqual([entry["name"] for entry in told["blendModes"]], ["density"])
+        parts = call_json(server, "GET", "/api/v1/schema.json")[1]["$defs"]
+        for list_name, part, field in (("methods", "Integrator", "method"), ("blendModes", "Blend", "mode"),
+                                       ("filters", "ImageSettings", "filter")):
+            self.assertEqual([entry["name"] for entry in told[list_name]], parts[part]["properties"][field]["enum"])
+            self.assertTrue(all(entry["doc"] for entry in told[list_name]))
         self.assertEqual({entry["name"]: entry["points"] for entry in told["colormaps"]}["gray"][-1], [1, "#ffffff"])
         self.assertEqual(told["imageFormats"], list(PICTURES))
         self.assertEqual((told["limits"]["sessions"], told["limits"]["messageBytes"]), (4, 65536))
