@@ -2,7 +2,10 @@
 // scolopax: the program. Each command is a file of commands/; this one maps failures to exit statuses.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+#include <string>
+#include <vector>
 
 #include "renderer/core/error.h"
 #include "server/commands/compare.h"
@@ -15,6 +18,28 @@ namespace {
 
 constexpr int kFailed = 1;    // what was asked for could not be done
 constexpr int kBadUsage = 2;  // what was asked for is not clear
+
+/// The word that stands where a command is expected; empty when that is not what is wrong.
+std::string unknownCommand(const CLI::App& app) {
+  const CLI::App* last = &app;
+  while (!last->get_subcommands().empty()) last = last->get_subcommands().front();
+  const auto words = last->remaining();
+  return last->get_require_subcommand_min() == 0 || words.empty() ? "" : words.front();
+}
+
+/// Which variable of the environment a bad value came from; empty for none.
+std::string variableAtFault(const CLI::App& app, const std::string& message) {
+  for (const CLI::App* command : app.get_subcommands()) {
+    for (const CLI::Option* option : command->get_options()) {
+      const char* value = std::getenv(option->get_envname().c_str());
+      if (value != nullptr && option->results() == std::vector<std::string>{value} &&
+          (message.find(option->get_name() + ": ") != std::string::npos ||
+           message.find(option->get_name() + " = ") != std::string::npos))
+        return option->get_envname();
+    }
+  }
+  return "";
+}
 
 }  // namespace
 
@@ -34,6 +59,14 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     return 0;
   } catch (const CLI::ParseError& error) {
+    if (const std::string word = unknownCommand(app); error.get_exit_code() != 0 && !word.empty()) {
+      std::fprintf(stderr,
+                   "scolopax: %s is not a command or an option\nRun with --help for more information.\n",
+                   word.c_str());
+      return kBadUsage;
+    }
+    const std::string variable = variableAtFault(app, error.what());
+    if (!variable.empty()) std::fprintf(stderr, "%s: ", variable.c_str());
     return app.exit(error) == 0 ? 0 : kBadUsage;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "scolopax: %s\n", error.what());

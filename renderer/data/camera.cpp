@@ -7,6 +7,7 @@
 #include <glm/matrix.hpp>
 
 #include "renderer/core/error.h"
+#include "renderer/core/short_text.h"
 
 namespace scolopax {
 namespace {
@@ -41,11 +42,11 @@ void checkCamera(const Camera& camera) {
     throw Error(ErrorCode::badInput, "camera: eye, target and up must be finite");
   if (camera.orthoHeight ? !(*camera.orthoHeight > 0 && std::isfinite(*camera.orthoHeight))
                          : !(camera.fovY > 0 && camera.fovY < 180))
-    throw Error(ErrorCode::badInput,
-                camera.orthoHeight
-                    ? "camera.orthoHeight: expected a finite number above 0, found " +
-                          std::to_string(*camera.orthoHeight)
-                    : "camera.fovY: expected above 0 and below 180, found " + std::to_string(camera.fovY));
+    throw Error(
+        ErrorCode::badInput,
+        camera.orthoHeight
+            ? "camera.orthoHeight: expected a finite number above 0, found " + shortText(*camera.orthoHeight)
+            : "camera.fovY: expected above 0 and below 180, found " + shortText(camera.fovY));
 }
 
 glm::dvec3 centreOf(const Grid& grid) {

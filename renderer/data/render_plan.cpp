@@ -7,6 +7,7 @@
 #include <glm/matrix.hpp>
 
 #include "renderer/core/error.h"
+#include "renderer/core/short_text.h"
 
 namespace scolopax {
 namespace {
@@ -40,7 +41,7 @@ void check(const Scene& scene, const Volume& volume) {
     if (!(light.intensity >= 0) || !(glm::min(light.color.x, glm::min(light.color.y, light.color.z)) >= 0))
       fail("lights: colour and intensity must not be negative");
   if (!(scene.step >= 0.01 && scene.step <= 100))
-    fail("integrator.step: expected 0.01 to 100, found " + std::to_string(scene.step));
+    fail("integrator.step: expected 0.01 to 100, found " + shortText(scene.step));
   if (scene.macrocell < 1 || scene.macrocell > 64)
     fail("integrator.macrocell: expected 1 to 64, found " + std::to_string(scene.macrocell));
 }

@@ -9,6 +9,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/io/byte_stream.h"
+#include "renderer/io/output_file.h"
 #include "renderer/io/text.h"
 
 namespace scolopax::io {
@@ -54,21 +55,25 @@ Encoding prepare(const Image& image, glm::vec3 background, const std::string& ex
   return encoding;
 }
 
-/// Writes through `proxy`, or to the file `name` when there is none.
-void write(const std::string& name, const Image& image, const Encoding& encoding,
-           OIIO::Filesystem::IOProxy* proxy) {
+/// The bytes of the file, made in memory: OpenImageIO's own files do not tell of every failure to write.
+std::vector<unsigned char> encode(const Image& image, glm::vec3 background, const std::string& extension) {
+  const Encoding encoding = prepare(image, background, extension);
+  const std::string name = "image." + extension;
+  std::vector<unsigned char> bytes;
+  OIIO::Filesystem::IOVecOutput proxy(bytes);
   const auto output = OIIO::ImageOutput::create(name);
   const auto failed = [&](const std::string& why) {
-    return Error(ErrorCode::io, cleanText(name) + ": cannot be written: " + cleanText(why));
+    return Error(ErrorCode::io, "picture: cannot be encoded as " + extension + ": " + cleanText(why));
   };
   if (!output) throw failed(OIIO::geterror());
-  if (proxy) output->set_ioproxy(proxy);
+  if (!output->set_ioproxy(&proxy)) throw failed("not in memory");
   const bool asFloat = encoding.bytes.rgb.empty();
   const void* pixels = asFloat ? static_cast<const void*>(image.pixels.data()) : encoding.bytes.rgb.data();
   const bool done = output->open(name, encoding.spec) &&
                     output->write_image(asFloat ? OIIO::TypeFloat : OIIO::TypeUInt8, pixels) &&
                     output->close();
   if (!done) throw failed(output->geterror());
+  return bytes;
 }
 
 std::string extensionOf(const fs::path& path) {
@@ -81,17 +86,15 @@ std::string extensionOf(const fs::path& path) {
 void checkImageName(const fs::path& path) { checkExtension(extensionOf(path)); }
 
 void writeImage(const fs::path& path, const Image& image, glm::vec3 background) {
-  write(path.string(), image, prepare(image, background, extensionOf(path)), nullptr);
+  const std::vector<unsigned char> bytes = encode(image, background, extensionOf(path));
+  writeFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 std::vector<unsigned char> encodeImage(const Image& image, glm::vec3 background, std::string_view format) {
   if (format != "png" && format != "exr") {
     throw Error(ErrorCode::unsupported, "image format: expected png or exr, found " + inQuotes(format));
   }
-  std::vector<unsigned char> bytes;
-  OIIO::Filesystem::IOVecOutput proxy(bytes);
-  write("image." + std::string(format), image, prepare(image, background, std::string(format)), &proxy);
-  return bytes;
+  return encode(image, background, std::string(format));
 }
 
 Image readImage(const fs::path& path) {

@@ -11,7 +11,8 @@
 namespace scolopax::io {
 
 /// Writes by extension: .exr and .tif as float32 linear premultiplied RGBA; .png and .jpg as 8-bit sRGB over
-/// `background`. Throws Error(unsupported) for another extension, Error(io) when it cannot be written.
+/// `background`. The file is there whole or not at all. Throws Error(unsupported) for another extension,
+/// Error(io) when it cannot be written.
 void writeImage(const std::filesystem::path& path, const Image& image, glm::vec3 background);
 
 /// Throws Error(unsupported) when writeImage knows no format of that extension.

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "renderer/io/image_file.h"
+#include "renderer/io/output_file.h"
 #include "renderer/metrics/flip.h"
 #include "renderer/metrics/metrics.h"
 
@@ -20,6 +21,10 @@ struct CompareOptions {
 };
 
 void compare(const CompareOptions& options) {
+  if (!options.difference.empty()) {
+    io::checkImageName(options.difference);
+    io::checkWritable(options.difference);
+  }
   const Image a = io::readImage(options.a), b = io::readImage(options.b);
   const ImageDifference difference = compareImages(a, b);
   const Flip flip = flipDifference(a, b);

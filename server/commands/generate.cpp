@@ -7,6 +7,7 @@
 #include "renderer/core/error.h"
 #include "renderer/generate/orbitals.h"
 #include "renderer/io/format.h"
+#include "renderer/io/output_file.h"
 
 namespace scolopax {
 namespace {
@@ -18,6 +19,7 @@ struct OrbitalOptions {
 };
 
 void generateOrbitalFile(const OrbitalOptions& options) {
+  io::checkWritable(options.out);
   const auto size = std::uint64_t(options.size);
   const std::uint64_t bytes = size * size * size * 2 * std::uint64_t(options.channels);
   if (const std::uint64_t limit = io::defaultMemoryLimitBytes(); bytes > limit)

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <fstream>
@@ -15,7 +16,9 @@
 #include "protocol/json_text.h"
 #include "renderer/core/error.h"
 #include "renderer/io/image_file.h"
+#include "renderer/io/output_file.h"
 #include "renderer/renderer.h"
+#include "server/commands/validators.h"
 #include "server/dataset_store.h"
 #include "server/scene_resolver.h"
 
@@ -55,6 +58,10 @@ json patchOf(const std::string& assignment) {
   std::vector<std::string> keys;
   std::stringstream path(assignment.substr(0, equals));
   for (std::string key; std::getline(path, key, '.');) keys.push_back(key);
+  if (assignment[equals - 1] == '.') keys.emplace_back();  // getline drops an empty last part
+  if (std::find(keys.begin(), keys.end(), "") != keys.end())
+    throw CLI::ValidationError("--set",
+                               "expected names between the dots of PATH=VALUE, found '" + assignment + "'");
   for (auto key = keys.rbegin(); key != keys.rend(); ++key) patch = json{{*key, std::move(patch)}};
   return patch;
 }
@@ -69,7 +76,8 @@ class ProgressBar {
     double done = stop_.samples > 0 ? double(samples) / stop_.samples : 0;
     if (stop_.seconds > 0) done = std::max(done, seconds / stop_.seconds);
     const int filled = int(std::min(done, 1.0) * kWidth);
-    fmt::print(stderr, "\r[{:=<{}}{: <{}}] {} samples, {:.1f} s ", "", filled, "", kWidth - filled, samples, seconds);
+    fmt::print(stderr, "\r[{:=<{}}{: <{}}] {} samples, {:.1f} s ", "", filled, "", kWidth - filled, samples,
+               seconds);
     std::fflush(stderr);
   }
   void clear() const {
@@ -100,19 +108,23 @@ void writeStats(const std::filesystem::path& path, const Renderer& renderer, con
                       {"randomBlocks", counts.randomBlocks},
                       {"truncatedRays", counts.truncatedRays},
                       {"scene", scene.resolved}};
-  std::ofstream file(path);
-  if (!(file << stats.dump(2) << '\n')) throw Error(ErrorCode::io, path.string() + ": cannot be written");
+  io::writeFile(path, stats.dump(2) + '\n');
 }
 
 void render(const Options& options) {
-  io::checkImageName(options.out);  // before minutes are spent on a picture that cannot be written
+  // Before minutes are spent on a picture that cannot be written.
+  io::checkImageName(options.out);
+  io::checkWritable(options.out);
+  if (!options.stats.empty()) io::checkWritable(options.stats);
+  std::vector<json> patches;
+  for (const std::string& assignment : options.assignments) patches.push_back(patchOf(assignment));
   json scene = readScene(options.scene);
   const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
   const auto store = std::make_shared<server::DatasetStore>(
       io::loadDatasets(options.data, io::defaultMemoryLimitBytes(), warn));
   const server::SceneResolver resolver(store, {});
   auto resolved = resolver.replace(scene);
-  for (const std::string& assignment : options.assignments) resolved = resolver.patch(*resolved, patchOf(assignment));
+  for (const json& patch : patches) resolved = resolver.patch(*resolved, patch);
   server::StopRule stop = resolved->stop;
   // A rule on the command line replaces the scene's: what is asked for last is what is meant.
   if (options.samples || options.seconds || options.error)
@@ -144,20 +156,28 @@ void render(const Options& options) {
 CLI::App* addRenderCommand(CLI::App& root) {
   CLI::App* command = root.add_subcommand("render", "Render a scene into a picture file");
   const auto o = std::make_shared<Options>();
-  command->add_option("SCENE", o->scene, "Scene file (JSON, see PROTOCOL.md); without one, a good first picture");
+  command->add_option("SCENE", o->scene,
+                      "Scene file (JSON, see PROTOCOL.md); without one, a good first picture");
   command->add_option("--data", o->data, "Volume files; those of one grid are one data set")->required();
-  command->add_option("-o,--output", o->out,
-                      "Picture: .png or .jpg (sRGB, over the background), .exr or .tif (float, linear premultiplied RGBA)")
+  command
+      ->add_option("-o,--output", o->out,
+                   "Picture: .png or .jpg (sRGB, over the background), .exr or .tif (float, linear "
+                   "premultiplied RGBA)")
       ->required();
-  command->add_option("--samples", o->samples, "Stop at so many samples a pixel")->check(CLI::Range(1u, 1u << 24));
-  command->add_option("--seconds", o->seconds, "Stop after this time")->check(CLI::PositiveNumber);
-  command->add_option("--error", o->error, "Stop at this estimated RMSE over linear RGB")->check(CLI::PositiveNumber);
-  command->add_option("--set", o->assignments,
-                      "Set a field of the scene, as channels.0.density=0.1; the value is JSON, else a string")
+  command->add_option("--samples", o->samples, "Stop at so many samples a pixel")
+      ->check(CLI::Range(1u, 1u << 24));
+  command->add_option("--seconds", o->seconds, "Stop after this time")->check(numberUpTo(1e9, false));
+  command->add_option("--error", o->error, "Stop at this estimated RMSE over linear RGB")
+      ->check(numberUpTo(1e9, false));
+  command
+      ->add_option("--set", o->assignments,
+                   "Set a field of the scene, as channels.0.density=0.1; the value is JSON, else a string")
       ->allow_extra_args(false);
   command->add_option("--threads", o->threads, "Threads to use; 0 takes all")->check(CLI::Range(0, 1024));
   command->add_option("--stats", o->stats, "Write counts and times as JSON");
-  command->footer("With several stop rules the first that is met ends the rendering; without any, the scene's (64 samples).");
+  command->footer(
+      "With several stop rules the first that is met ends the rendering; without any, the scene's (64 "
+      "samples).");
   command->callback([o] { render(*o); });
   return command;
 }

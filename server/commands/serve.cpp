@@ -21,6 +21,7 @@
 #include "server/application.h"
 #include "server/auth.h"
 #include "server/command_config.h"
+#include "server/commands/validators.h"
 
 namespace scolopax {
 namespace {
@@ -154,10 +155,11 @@ CLI::App* addServeCommand(CLI::App& root) {
   limit("max-json-depth", config.maxJsonDepth, "Lists and objects within each other")
       ->check(CLI::PositiveNumber);
   limit("keep-session", options->keepSeconds, "Seconds that a session outlives its last client")
-      ->check(CLI::NonNegativeNumber);
+      ->check(numberUpTo(1e9, true));
 
   command->add_option("--config", options->configFile, "File with lines such as: port = 8081")
       ->envname("SCOLOPAX_CONFIG")
+      ->check(CLI::ExistingFile)
       ->type_name("FILE");
   command->footer(
       "Each option can also be set in the environment (--max-body as SCOLOPAX_MAX_BODY) or in the file of "
@@ -165,6 +167,8 @@ CLI::App* addServeCommand(CLI::App& root) {
       "the command line wins over the environment, the environment over the file.\n"
       "The ready line on standard output holds the address with the token that opens the page.\n"
       "SIGTERM and Ctrl-C end the server in order.");
+  // With one, CLI11 reads the environment when this command is parsed; without, whichever command runs.
+  command->parse_complete_callback([] {});
   command->callback([options, command] {
     if (!options->configFile.empty()) applyConfigFile(*command, options->configFile);
     serve(*options);

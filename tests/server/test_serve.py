@@ -47,11 +47,15 @@ def is_final(revision):
     return lambda m: m["type"] == "frame" and m["revision"] == revision and m["flags"] & FINAL
 
 
+def run(*arguments, environment=None):
+    clean = {k: v for k, v in os.environ.items() if not k.startswith("SCOLOPAX_")}
+    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=60,
+                          env={**clean, **(environment or {})})
+
+
 class CommandLine(unittest.TestCase):
     def run_serve(self, *arguments, environment=None):
-        clean = {k: v for k, v in os.environ.items() if not k.startswith("SCOLOPAX_")}
-        return subprocess.run([PROGRAM, "serve", *arguments], capture_output=True, text=True, timeout=60,
-                              env={**clean, **(environment or {})})
+        return run("serve", *arguments, environment=environment)
 
     def test_without_a_path_it_is_bad_usage_with_a_hint(self):
         result = self.run_serve()
@@ -94,6 +98,58 @@ class CommandLine(unittest.TestCase):
             result = self.run_serve("x.nrrd", "--config", config)
         self.assertEqual(result.returncode, 2)
         self.assertIn("max-seshuns", result.stderr)
+
+    def test_the_environment_is_read_only_by_the_command_that_uses_it(self):
+        bad = {"SCOLOPAX_PORT": "abc", "SCOLOPAX_THREADS": "abc", "SCOLOPAX_CONFIG": "/nowhere"}
+        with tempfile.TemporaryDirectory() as folder:
+            volume, picture = os.path.join(folder, "o.nrrd"), os.path.join(folder, "o.png")
+            for arguments in (["generate", "orbitals", volume, "--size", "4"], ["info", volume],
+                              ["render", "--data", volume, "-o", picture, "--samples", "1"],
+                              ["compare", picture, picture]):
+                result = run(*arguments, environment=bad)
+                self.assertEqual((result.returncode, result.stderr), (0, ""), arguments)
+        for name, value in bad.items():
+            result = self.run_serve("x.nrrd", environment={name: value})
+            self.assertEqual(result.returncode, 2)
+            self.assertIn(name, result.stderr)
+
+    def test_bad_usage_names_what_is_wrong(self):
+        with tempfile.TemporaryDirectory() as folder:
+            picture = os.path.join(folder, "a.png")
+            render = ["render", "--data", *write_volume(folder), "-o", picture]
+            for word, *arguments in (
+                    ("bogus", "bogus"), ("bogus", "generate", "bogus"), ("--bogus", "--bogus"),
+                    (folder, "serve", "x.nrrd", "--config", folder),
+                    ("nan", *render, "--error", "nan"), ("inf", *render, "--seconds", "inf"),
+                    ("nan", "serve", "x.nrrd", "--keep-session", "nan"),
+                    ("camera.=1", *render, "--set", "camera.=1"), ("a..b=1", *render, "--set", "a..b=1"),
+                    (".a=1", *render, "--set", ".a=1")):
+                result = run(*arguments)
+                self.assertEqual(result.returncode, 2, arguments)
+                self.assertIn(word, result.stderr)
+            self.assertFalse(os.path.exists(picture))
+
+    def test_a_place_that_cannot_be_written_to_is_refused_before_rendering(self):
+        with tempfile.TemporaryDirectory() as folder:
+            picture = os.path.join(folder, "a.png")
+            data = ["--data", "/nowhere/brain.nrrd"]  # is not even opened
+            for out, place in ((["-o", "/nowhere/x.png"], "/nowhere/x.png"), (["-o", folder + "/x.png/y.png"], "y.png"),
+                               (["-o", picture, "--stats", "/nowhere/s.json"], "/nowhere/s.json"),
+                               (["-o", picture, "--stats", folder], folder)):
+                result = run("render", *data, *out)
+                self.assertEqual(result.returncode, 1)
+                self.assertIn(place, result.stderr)
+                self.assertNotIn("brain.nrrd", result.stderr)
+            self.assertEqual(os.listdir(folder), [])
+
+    def test_a_number_out_of_range_is_said_in_few_digits(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for field in ("integrator.step=1e308", "camera.fovY=1e308", "camera.fovY=-1e308"):
+                result = run("render", "--data", *write_volume(folder), "-o", os.path.join(folder, "a.png"),
+                             "--set", field)
+                self.assertEqual(result.returncode, 1)
+                self.assertIn("1e+308", result.stderr)
+                self.assertLess(len(result.stderr), 200)
 
     def test_the_token_of_a_file_is_used(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -2,6 +2,9 @@
 #include "renderer/io/image_file.h"
 
 #include <gmock/gmock.h>
+#include <sys/resource.h>
+
+#include <csignal>
 
 #include "tests/renderer/io/io_test_support.h"
 
@@ -75,6 +78,49 @@ TEST(ImageFile, EncodingInMemoryGivesTheFilesPicture) {
     EXPECT_EQ(readImage(folder / ("memory." + format)).pixels, readImage(folder / ("file." + format)).pixels);
     EXPECT_EQ(encodeImage(image, glm::vec3(0.5f), format), bytes) << "the same picture gives the same bytes";
   }
+}
+
+TEST(ImageFile, ThatDoesNotFitOnTheDiskIsAnError) {
+  const TempDir folder;
+  for (const char* name : {"a.png", "a.jpg", "a.exr", "a.tif"}) {
+    std::filesystem::create_symlink("/dev/full", folder / name);
+    EXPECT_THAT([&] { writeImage(folder / name, testImage(), glm::vec3(0)); },
+                testing::ThrowsMessage<Error>(HasSubstr(name)));
+  }
+}
+
+TEST(ImageFile, ThatCannotBeWrittenLeavesTheOneBeforeAndNothingElse) {
+  const TempDir folder;
+  const auto file = writeBytes(folder / "a.png", "before");
+  // A limit below the picture's size is a disk that runs full in the middle of it.
+  Image noise{64, 64, {}};
+  std::uint32_t state = 1;
+  for (int i = 0; i < 64 * 64; ++i)
+    noise.pixels.emplace_back(float((state = state * 1664525u + 1013904223u) >> 8) / float(1 << 24));
+  ASSERT_GT(encodeImage(noise, glm::vec3(0), "png").size(), 2048u);
+  rlimit before;
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit small = before;
+  small.rlim_cur = 1024;
+  setrlimit(RLIMIT_FSIZE, &small);
+  EXPECT_THROW(writeImage(file, noise, glm::vec3(0)), Error);
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_EQ(std::filesystem::file_size(file), 6u);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(ImageFile, ReplacesWhatALinkPointsToAndKeepsLinkAndMode) {
+  const TempDir folder;
+  using std::filesystem::perms;
+  const auto file = writeBytes(folder / "a.png", "before");
+  std::filesystem::permissions(file, perms::owner_read | perms::owner_write);
+  std::filesystem::create_symlink("a.png", folder / "link.png");
+  writeImage(folder / "link.png", testImage(), glm::vec3(0));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link.png"));
+  EXPECT_EQ(readImage(file).width, 5);
+  EXPECT_EQ(std::filesystem::status(file).permissions(), perms::owner_read | perms::owner_write);
 }
 
 TEST(ImageFile, DamagedFilesAreNotReadAsPictures) {

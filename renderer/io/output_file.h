@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// Files on their way out: whole or not at all.
+#pragma once
+#include <filesystem>
+#include <string_view>
+
+namespace scolopax::io {
+
+/// Throws Error(io) naming the path when no file can be written there: to be asked before long work. Changes
+/// nothing.
+void checkWritable(const std::filesystem::path& path);
+
+/// Writes a file under a temporary name beside `path` and renames it, so that `path` never holds a half of
+/// it; pipes, devices and files in folders that cannot be written to are written directly. Throws Error(io).
+void writeFile(const std::filesystem::path& path, std::string_view bytes);
+
+}  // namespace scolopax::io
