@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 # make run     build everything, make the demo data if DATA names none, serve it on loopback
-# make test    build and run the tests; make check adds sanitizers, clang-tidy, full statistics and fuzzing
+# make test    build and run the tests; make check adds sanitizers, clang-tidy, fuzzing and four times the samples
+#              in the statistical tests
 DATA ?=
 PORT ?= 8080
 JOBS ?= $(shell nproc)
 DEMO := build/demo/orbitals.nrrd
 SCOLOPAX := build/release/scolopax
 
+# Two recipes would run .ci/install at once; the tools called use all processors on their own.
+.NOTPARALLEL:
+.DELETE_ON_ERROR:
 .PHONY: run build web test check check-asan-ubsan check-tsan check-tidy check-fuzz check-format deps test-deps format clean
 
 run: build web $(if $(strip $(DATA)),,$(DEMO))
@@ -27,15 +31,15 @@ web: deps
 test: test-deps web
 	cmake --preset release > /dev/null
 	cmake --build --preset release -j $(JOBS)
-	ctest --test-dir build/release -LE slow --output-on-failure
+	ctest --test-dir build/release --output-on-failure
 
 check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz
-	ctest --test-dir build/release -L slow --output-on-failure --no-tests=ignore
+	SCOLOPAX_STATISTICS=4 ctest --test-dir build/release -L statistics --output-on-failure
 
 check-asan-ubsan check-tsan: check-%: test-deps
 	cmake --preset $* > /dev/null
 	cmake --build --preset $* -j $(JOBS)
-	ctest --test-dir build/$* -LE 'slow|web|statistics' --output-on-failure
+	ctest --test-dir build/$* -LE 'web|statistics' --output-on-failure
 
 check-fuzz: test-deps
 	cmake --preset fuzz > /dev/null
