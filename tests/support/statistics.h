@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <vector>
 
 #include "renderer/data/image.h"
@@ -15,19 +16,29 @@
 
 namespace scolopax::test {
 
-/// `samples` of the scene with one method.
+/// SCOLOPAX_STATISTICS of the environment, 1 to 1000: by how much every number of samples here is multiplied.
+inline int statisticsFactor() {
+  static const int factor = [] {
+    const char* text = std::getenv("SCOLOPAX_STATISTICS");
+    return text ? std::clamp(std::atoi(text), 1, 1000) : 1;
+  }();
+  return factor;
+}
+
+/// `samples`, times the factor, of the scene with one method.
 inline Image renderAnalog(const std::shared_ptr<const Volume>& volume, Scene scene, Method method,
                           int samples, int threads = 0) {
   scene.method = method;
   const auto renderer = makeCpuRenderer(volume, threads);
   renderer->setScene(scene);
   const std::atomic<bool> cancel = false;
-  for (int i = 0; i < samples; ++i) renderer->renderSample(cancel);
+  for (int i = 0; i < samples * statisticsFactor(); ++i) renderer->renderSample(cancel);
   return renderer->image();
 }
 
-/// Compares per pixel and component. Every sample must be 0 or 1 in every component (colours of the scene's
-/// channels have only zeros and ones): the mean is then binomial and its variance known from the reference.
+/// Compares a picture of `samples`, times the factor, per pixel and component. Every sample must be 0 or 1 in
+/// every component (colours of the scene's channels have only zeros and ones): the mean is then binomial and
+/// its variance known from the reference.
 ///  - the largest deviation against Bernstein's inequality, valid for any distribution on [0,1], split over
 ///  all
 ///    pixels and components: chance of a wrong alarm 1e-9;
@@ -36,7 +47,7 @@ inline Image renderAnalog(const std::shared_ptr<const Volume>& volume, Scene sce
 ///    where components of a pixel may be the same numbers (alpha and the only colour).
 inline ::testing::AssertionResult isUnbiased(const Image& found, int samples,
                                              const reference::ReferenceImage& expected) {
-  const double n = samples;
+  const double n = double(samples) * statisticsFactor();
   const std::size_t pixels = found.pixels.size();
   const double logTerm = std::log(2.0 * 4.0 * double(pixels) / 1e-9);
   const double tolerance = expected.maximumRayError + 1e-6;

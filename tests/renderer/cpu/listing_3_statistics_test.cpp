@@ -57,6 +57,7 @@ struct PrintedNDda {
 
 template <class Tracker>
 Image render(const std::shared_ptr<const Volume>& volume, const Scene& scene, int samples) {
+  samples *= statisticsFactor();
   RenderPlan plan(volume);
   plan.update(scene);
   Image sum{scene.width, scene.height, std::vector<glm::vec4>(std::size_t(scene.width * scene.height))};
