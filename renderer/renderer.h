@@ -3,6 +3,7 @@
 // commands use this; renderer/cpu implements it, cuda/ will.
 #pragma once
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <string_view>
@@ -36,8 +37,11 @@ class Renderer {
   virtual std::string_view backendName() const = 0;
   /// Takes a new scene and redoes what it makes stale. Throws Error(badInput) for a scene that does not fit.
   virtual RebuildStats setScene(const Scene& scene) = 0;
-  /// Adds one sample to every pixel. Returns false, with the film unchanged, when `cancel` became true.
-  virtual bool renderSample(const std::atomic<bool>& cancel) = 0;
+  /// Adds one sample to every pixel. Returns false, with the film unchanged, when `cancel` became true or the
+  /// budget of time was used up; both are looked at between pixels. The next call goes on where this one
+  /// stopped, unless a new scene came in between.
+  virtual bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget = kNoBudget) = 0;
+  static constexpr std::chrono::nanoseconds kNoBudget = std::chrono::hours(24 * 365);
   /// Samples per pixel in the film.
   virtual std::uint32_t samples() const = 0;
   /// Estimated RMSE over linear premultiplied RGB of the picture as it stands; NaN below two samples.

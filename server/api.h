@@ -27,7 +27,8 @@ struct ApiContext {
   Metrics& metrics;
   MakeRenderer makeRenderer;
   Log log;
-  std::atomic<bool>& stopping;  ///< ends what waits or renders
+  std::atomic<bool>& stopping;  ///< ends what waits
+  std::atomic<bool>& cutting;   ///< ends what renders, after the grace
   std::function<nlohmann::json()> capabilities;
 };
 

@@ -2,10 +2,14 @@
 #include "server/application.h"
 
 #include <cmath>
+#include <condition_variable>
 #include <cstdio>
 #include <filesystem>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stop_token>
+#include <thread>
 #include <utility>
 
 #include "protocol/frame_header.h"
@@ -83,7 +87,7 @@ struct Application::Impl {
   Config config;
   Log log;
   MakeRenderer makeRenderer;
-  std::atomic<bool> stopping{false};
+  std::atomic<bool> stopping{false}, cutting{false};
   const Now now = [] { return std::chrono::steady_clock::now(); };
   LoopThread renderThread, encodeThread;
   Metrics metrics;
@@ -115,11 +119,17 @@ struct Application::Impl {
         capabilities(capabilitiesJson(config, sessionResolver->lists())),
         streams(sessions, metrics,
                 {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities}),
-        context{config,         *datasets,
-                renderResolver, sessions,
-                streams,        metrics,
-                makeRenderer,   log,
-                stopping,       [this] { return capabilities; }},
+        context{config,
+                *datasets,
+                renderResolver,
+                sessions,
+                streams,
+                metrics,
+                makeRenderer,
+                log,
+                stopping,
+                cutting,
+                [this] { return capabilities; }},
         authorizer(config.token, isLoopback(config.host)) {
     net::Options options;
     options.host = config.host;
@@ -172,7 +182,14 @@ std::string Application::url() const {
 
 void Application::stop() {
   impl_->stopping = true;
-  // Waiting scripts and running renders end first: the network waits for its last handler.
+  // What waits is released at once; what renders has the grace to end by itself, since the network waits for
+  // its last handler.
+  std::jthread cut([this](std::stop_token stopped) {
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable_any().wait_for(lock, stopped, impl_->config.stopGrace, [] { return false; });
+    impl_->cutting = true;
+  });
   impl_->sessions.closeAll("the server is stopping");
   impl_->server->stop(impl_->config.stopGrace);
   impl_->renderThread.stop();

@@ -56,6 +56,12 @@ bool ProgressiveRender::sceneStale(const RenderRequest& request) const {
   return !scene_ || request.revision != revision_ || (!request.interactive && divisor_ != 1);
 }
 
+/// Whether a pass whose scene is stale goes on all the same: a small one, and one that follows an abandoned
+/// one, for a while. However fast edits come, pictures are shown between them.
+bool ProgressiveRender::keepsPass(const RenderRequest& request) const {
+  return unfinished_ && (request.interactive || abandoned_) && now_() - passBegan_ < options_.shield;
+}
+
 bool ProgressiveRender::finished(const RenderRequest& request) const {
   return stopMet(request.scene->stop, *renderer_, filmSeconds_);
 }
@@ -106,7 +112,16 @@ void ProgressiveRender::takeScene(const RenderRequest& request, PassResult& resu
     secondsPerPixel_.reset();
   }
   const int divisor = wantedDivisor(request);
-  const RebuildStats stats = renderer_->setScene(atDivisor(request.scene->render, divisor));
+  const Scene scene = atDivisor(request.scene->render, divisor);
+  const auto pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height);
+  if (pixels > filmPixels_ && othersPixels_ + pixels > options_.filmPixels)
+    throw Error(ErrorCode::tooLarge, "image: all sessions together may have " +
+                                         std::to_string(options_.filmPixels) + " pixels, " +
+                                         std::to_string(othersPixels_) + " of them are taken");
+  const RebuildStats stats = renderer_->setScene(scene);
+  filmPixels_ = pixels;
+  abandoned_ = unfinished_;
+  unfinished_ = false;
   if (stats.filmReset) filmSeconds_ = 0;
   scene_ = request.scene;
   revision_ = request.revision;
@@ -117,10 +132,14 @@ void ProgressiveRender::takeScene(const RenderRequest& request, PassResult& resu
 
 void ProgressiveRender::addSample(PassResult& result) {
   const TimePoint begin = now_();
-  result.rendered = renderer_->renderSample(session_->cancel());
-  result.cancelled = !result.rendered;
-  if (result.cancelled) return;
-  result.renderSeconds = secondsBetween(begin, now_());
+  if (!unfinished_) passBegan_ = begin, passSeconds_ = 0;
+  result.rendered = renderer_->renderSample(session_->cancel(), options_.slice);
+  result.cancelled = !result.rendered && session_->cancel();
+  passSeconds_ += secondsBetween(begin, now_());
+  unfinished_ = !result.rendered && !result.cancelled;
+  if (!result.rendered) return;
+  abandoned_ = false;
+  result.renderSeconds = passSeconds_;
   const Scene& scene = scene_->render;
   result.pixels = std::uint64_t((scene.width + divisor_ - 1) / divisor_) *
                   std::uint64_t((scene.height + divisor_ - 1) / divisor_);
@@ -149,10 +168,10 @@ PassResult ProgressiveRender::run() {
   const RenderRequest request = session_->startPass();
   if (!request.wanted) return result;
   try {
-    if (sceneStale(request)) takeScene(request, result);
+    if (sceneStale(request) && !keepsPass(request)) takeScene(request, result);
     if (!finished(request)) addSample(result);
     session_->passEnded(result.cancelled);
-    if (!result.cancelled && showDue(request)) show(request);
+    if (!result.cancelled && !unfinished_ && showDue(request)) show(request);
     return result;
   } catch (const Error& error) {
     session_->fail(request.revision, error.what());
@@ -166,6 +185,8 @@ PassResult ProgressiveRender::run() {
   // What an error has left behind is not worth keeping.
   scene_.reset();
   renderer_.reset();
+  filmPixels_ = 0;
+  unfinished_ = false;
   return result;
 }
 

@@ -29,6 +29,9 @@ class ProgressiveRender {
     std::chrono::microseconds frameTarget{40'000};      ///< for one pass while edits arrive
     std::chrono::milliseconds interactiveInterval{33};  ///< between frames while edits arrive
     std::chrono::milliseconds stillInterval{500};       ///< between frames once samples are many
+    std::chrono::milliseconds slice{100};   ///< of a slow pass, before other sessions have their turn
+    std::chrono::milliseconds shield{300};  ///< for so long a pass goes on when its scene is stale
+    std::uint64_t filmPixels = 67'108'864;  ///< of all sessions' films together, at 57 bytes each
   };
   ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer, Options options, Now now,
                     Log log);
@@ -41,9 +44,14 @@ class ProgressiveRender {
   /// One sample pass at most, with the rebuild before it and the submission after it. Never throws: what
   /// cannot be rendered is told to the session.
   PassResult run();
+  /// Memory that the film takes, in pixels.
+  std::uint64_t filmPixels() const { return filmPixels_; }
+  /// What other sessions' films take, told before run().
+  void setOthersPixels(std::uint64_t pixels) { othersPixels_ = pixels; }
 
  private:
   bool sceneStale(const RenderRequest& request) const;
+  bool keepsPass(const RenderRequest& request) const;
   bool finished(const RenderRequest& request) const;
   bool showDue(const RenderRequest& request) const;
   int wantedDivisor(const RenderRequest& request) const;
@@ -61,11 +69,16 @@ class ProgressiveRender {
   std::unique_ptr<Renderer> renderer_;
   std::shared_ptr<const ResolvedScene> scene_;  ///< that the film shows; null before the first
   std::uint32_t revision_ = 0;
+  bool unfinished_ = false;  ///< a pass has used up its slice
+  bool abandoned_ = false;   ///< the pass before it was given up for a newer scene
+  TimePoint passBegan_;
+  double passSeconds_ = 0;                 ///< spent on the pass so far
   int divisor_ = 1;                        ///< of width and height
   double filmSeconds_ = 0;                 ///< spent on the film's samples
   std::optional<double> secondsPerPixel_;  ///< of one sample, from earlier passes
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
 
+  std::uint64_t filmPixels_ = 0, othersPixels_ = 0;
   FrameInfo shown_;  ///< the last frame handed in; revision 0 before the first
   TimePoint shownAt_;
 };

@@ -46,6 +46,10 @@ std::optional<TimePoint> RenderLoop::step() {
   if (turn != renders_.end()) {
     // Behind all others before it runs: a session of slow passes gets one turn in the round as well.
     std::rotate(turn, turn + 1, renders_.end());
+    std::uint64_t others = 0;
+    for (const auto& render : renders_)
+      if (render != renders_.back()) others += render->filmPixels();
+    renders_.back()->setOthersPixels(others);
     onPass_(renders_.back()->run());
     return now_();
   }

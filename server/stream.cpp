@@ -31,6 +31,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
 
   void leave() {
     if (session_) session_->removeViewer(viewer_);
+    if (const auto socket = socket_.lock()) socket->withdrawFrame();
     session_.reset();
   }
 

@@ -15,11 +15,16 @@ namespace {
 
 TileFunction chooseKernel(const Scene& scene) {
   switch (scene.method) {
-    case Method::superposed: return chooseTileFunction<kernel::Analog<kernel::Superposed>>(scene);
-    case Method::cumulative: return chooseTileFunction<kernel::Analog<kernel::Cumulative>>(scene);
-    case Method::syncDda: return chooseTileFunction<kernel::Analog<kernel::SyncDda>>(scene);
-    case Method::nDda: return chooseTileFunction<kernel::Analog<kernel::NDda>>(scene);
-    case Method::raymarch: return chooseTileFunction<kernel::RayMarch>(scene);
+    case Method::superposed:
+      return chooseTileFunction<kernel::Analog<kernel::Superposed>>(scene);
+    case Method::cumulative:
+      return chooseTileFunction<kernel::Analog<kernel::Cumulative>>(scene);
+    case Method::syncDda:
+      return chooseTileFunction<kernel::Analog<kernel::SyncDda>>(scene);
+    case Method::nDda:
+      return chooseTileFunction<kernel::Analog<kernel::NDda>>(scene);
+    case Method::raymarch:
+      return chooseTileFunction<kernel::RayMarch>(scene);
   }
   return nullptr;
 }
@@ -43,22 +48,29 @@ class CpuRenderer final : public Renderer {
       film_ = std::move(resized);
     else if (stats.filmReset)
       film_.reset(scene.width, scene.height);
+    if (stats.filmReset) done_.assign(film_.pixelCount(), 0);
     if (stats.filmReset && counting_) cost_.assign(film_.pixelCount(), {});
     return stats;
   }
 
-  bool renderSample(const std::atomic<bool>& cancel) override {
+  bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
     const kernel::SceneView& scene = plan_.view();
-    const Pass pass{scene, film_.samples(), film_.pass(), counting_ ? cost_.data() : nullptr};
+    const Pass pass{scene,
+                    film_.samples(),
+                    film_.pass(),
+                    counting_ ? cost_.data() : nullptr,
+                    done_.data(),
+                    &cancel,
+                    std::chrono::steady_clock::now() + budget};
     const TileFunction renderTileAt = chooseKernel(plan_.scene());
     const int tilesX = (scene.width + kTile - 1) / kTile, tilesY = (scene.height + kTile - 1) / kTile;
     bool complete = false;
     arena_.execute([&] {
-      tbb::parallel_for(0, tilesX * tilesY, [&](int i) {
-        if (!cancel.load(std::memory_order_relaxed)) renderTileAt(pass, i % tilesX, i / tilesX);
-      });
-      complete = !cancel.load();
-      if (complete) film_.add();
+      tbb::parallel_for(0, tilesX * tilesY, [&](int i) { renderTileAt(pass, i % tilesX, i / tilesX); });
+      complete = std::find(done_.begin(), done_.end(), 0) == done_.end();
+      if (!complete) return;
+      film_.add();
+      std::fill(done_.begin(), done_.end(), std::uint8_t(0));
     });
     return complete;
   }
@@ -87,6 +99,7 @@ class CpuRenderer final : public Renderer {
  private:
   RenderPlan plan_;
   Film film_;
+  std::vector<std::uint8_t> done_;  // pixels that a pass has behind it
   bool counting_ = false;
   std::vector<kernel::SampleCost> cost_;  // one per pixel while counting
   tbb::task_arena arena_;

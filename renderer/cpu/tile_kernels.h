@@ -3,6 +3,8 @@
 // instances are compiled in a file of their own, kernels_*.cpp.
 #pragma once
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 
 #include "renderer/data/scene.h"
 #include "renderer/kernel/analog.h"
@@ -19,6 +21,9 @@ struct Pass {
   std::uint32_t sample;
   glm::vec4* pixels;
   kernel::SampleCost* cost;
+  std::uint8_t* done;  ///< width x height: pixels of this pass that are rendered; the others are still to do
+  const std::atomic<bool>* cancel;
+  std::chrono::steady_clock::time_point deadline;
 };
 
 /// Neighbouring rays share voxels and macrocells.
@@ -33,8 +38,17 @@ void renderTile(const Pass& pass, int tileX, int tileY) {
                                                                 pass.cost};
   const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
   const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
-  for (int y = tileY * kTile; y < endY; ++y)
-    for (int x = tileX * kTile; x < endX; ++x) render(y * pass.scene.width + x);
+  for (int y = tileY * kTile; y < endY; ++y) {
+    // The clock is looked at once a row: it costs about a tenth of a ray.
+    if (std::chrono::steady_clock::now() >= pass.deadline) return;
+    for (int x = tileX * kTile; x < endX; ++x) {
+      const int pixel = y * pass.scene.width + x;
+      if (pass.done[pixel]) continue;
+      if (pass.cancel->load(std::memory_order_relaxed)) return;
+      render(pixel);
+      pass.done[pixel] = 1;
+    }
+  }
 }
 
 template <class Integrator, class Blend>

@@ -138,9 +138,11 @@ void render(const Options& options) {
   const auto start = Clock::now();
   double seconds = 0;
   while (true) {
-    renderer->renderSample(cancel);
+    // In slices, so that the bar moves and --seconds holds also where one sample takes long.
+    renderer->renderSample(cancel, std::chrono::milliseconds(100));
     seconds = std::chrono::duration<double>(Clock::now() - start).count();
     bar.show(renderer->samples(), seconds);
+    if (renderer->samples() == 0) continue;
     if (stop.samples > 0 && renderer->samples() >= stop.samples) break;
     if (stop.seconds > 0 && seconds >= stop.seconds) break;
     // From 16 samples on: fewer can look alike by chance, and the estimate with them.

@@ -20,6 +20,11 @@ void Outbox::offer(Frame frame) {
   stats_.framePending = true;
 }
 
+void Outbox::withdraw() {
+  pending_.reset();
+  stats_.framePending = false;
+}
+
 void Outbox::acknowledge(std::uint32_t number) {
   // Cumulative, so that one lost or omitted acknowledgement does not shrink the window for good.
   const auto found = std::find(unacknowledged_.begin(), unacknowledged_.end(), number);

@@ -24,6 +24,7 @@ class Outbox {
   /// False when the queue is full: the text is dropped, and the caller closes the connection.
   bool pushText(std::string text);
   void offer(Frame frame);
+  void withdraw();
   void acknowledge(std::uint32_t number);
   /// The first one counts. Frames no longer go out, texts still do, unless `dropTexts`.
   void close(CloseMessage message, bool dropTexts);

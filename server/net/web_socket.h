@@ -42,6 +42,8 @@ class WebSocket {
   virtual void sendText(std::string text) = 0;
   /// Takes the one waiting place, replacing a frame that is still there.
   virtual void offerFrame(Frame frame) = 0;
+  /// Takes back a frame that still waits: the client looks at something else now.
+  virtual void withdrawFrame() = 0;
   /// The client has shown `number` and thereby all frames sent before it; anything else is ignored.
   virtual void acknowledge(std::uint32_t number) = 0;
   /// Sends what is queued as text, then the close frame. `reason` is cut to 123 bytes.

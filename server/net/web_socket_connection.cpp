@@ -58,6 +58,10 @@ class WebSocketConnection : public PreparedWebSocket,
     outbox_.offer(std::move(frame));
     wake();
   }
+  void withdrawFrame() override {
+    const std::lock_guard lock(mutex_);
+    outbox_.withdraw();
+  }
   void acknowledge(std::uint32_t number) override {
     const std::lock_guard lock(mutex_);
     outbox_.acknowledge(number);

@@ -28,6 +28,7 @@ struct Api {
   SceneResolver resolver{datasets, {64, 1000}};
   StreamHub streams{workshop.store, metrics, {}};
   std::atomic<bool> stopping{false};
+  std::atomic<bool> cutting{false};
   ApiContext context{config,
                      *datasets,
                      resolver,
@@ -39,6 +40,7 @@ struct Api {
                      },
                      [](const std::string&) {},
                      stopping,
+                     cutting,
                      [] {
                        return json{{"backend", "fake"}};
                      }};
@@ -163,7 +165,7 @@ TEST(Api, RefusesOneRenderTooManyWith503) {
 
 TEST(Api, EndsARenderWhenTheServerStops) {
   Api api;
-  api.workshop.control->duringPass = [&] { api.stopping = true; };
+  api.workshop.control->duringPass = [&] { api.stopping = api.cutting = true; };
   EXPECT_EQ(api.errorOf("POST", "/api/v1/render", kSmallRender).first, 503);
   EXPECT_EQ(api.errorOf("GET", "/readyz").first, 503);
   EXPECT_EQ(api.call("GET", "/healthz").status, 200);

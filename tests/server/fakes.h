@@ -36,6 +36,7 @@ struct FakeControl {
   std::function<void()> duringPass;  ///< called in the middle of each pass
   std::function<double(std::uint32_t samples)> error = [](std::uint32_t) { return 1.0; };
   std::string failure;                     ///< setScene throws it
+  int incompletePasses = 0;                ///< calls that use up their budget before the pass is complete
   std::vector<std::uint32_t> passes;       ///< the seed of the scene of each pass that was not cancelled
   std::vector<std::pair<int, int>> sizes;  ///< of each such pass
   int renderersMade = 0;
@@ -55,7 +56,8 @@ class FakeRenderer : public Renderer {
     scene_ = scene;
     return stats;
   }
-  bool renderSample(const std::atomic<bool>& cancel) override {
+  bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds) override {
+    if (control_->incompletePasses > 0) return --control_->incompletePasses, false;
     const auto pixels = double(scene_.width) * scene_.height;
     if (control_->clock)
       control_->clock->advance(
@@ -142,7 +144,7 @@ struct Workshop {
   RenderLoop render;
   EncodeLoop encode;
 
-  explicit Workshop(SessionStore::Options options = {})
+  explicit Workshop(SessionStore::Options options = {}, ProgressiveRender::Options policy = {})
       : store(resolver, options, hooks),
         render(
             store,
@@ -150,7 +152,7 @@ struct Workshop {
               ++control->renderersMade;
               return std::make_unique<FakeRenderer>(control);
             },
-            {}, clock.now(), [](const std::string&) {}, [](const PassResult&) {}),
+            policy, clock.now(), [](const std::string&) {}, [](const PassResult&) {}),
         encode(store, clock.now(), [](const std::string&) {}) {
     control->clock = &clock;
   }

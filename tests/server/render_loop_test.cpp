@@ -130,6 +130,41 @@ TEST(RenderLoop, KeepsTheFilmOfACancelledPass) {
   EXPECT_EQ(viewer->frames.back().info.revision, 3u);
 }
 
+TEST(RenderLoop, GivesOthersTheirTurnWhileAPassIsTooLongForOneSlice) {
+  Workshop workshop;
+  const auto slow = workshop.store.create(json::object());
+  const auto slowViewer = std::make_shared<FakeViewer>();
+  slow->addViewer(slowViewer);
+  workshop.control->incompletePasses = 3;  // of the first session: it alone is there
+  workshop.steps(3);
+  EXPECT_TRUE(slowViewer->frames.empty());
+  const auto other = workshop.store.create(json::object());
+  const auto otherViewer = std::make_shared<FakeViewer>();
+  other->addViewer(otherViewer);
+  workshop.steps(2);
+  EXPECT_FALSE(slowViewer->frames.empty());  // its pass went on where it had stopped
+  EXPECT_FALSE(otherViewer->frames.empty());
+}
+
+TEST(RenderLoop, RefusesAFilmThatTheMemoryForAllSessionsDoesNotHold) {
+  ProgressiveRender::Options policy;
+  policy.filmPixels = 4 * 64 * 48 + 10;
+  Workshop workshop({}, policy);
+  const json large = {{"image", {{"width", 64}, {"height", 48}}}};
+  std::vector<std::shared_ptr<Session>> sessions;
+  std::vector<std::shared_ptr<FakeViewer>> viewers;
+  for (int i = 0; i < 5; ++i) {
+    sessions.push_back(workshop.store.create(large));
+    viewers.push_back(std::make_shared<FakeViewer>());
+    sessions.back()->addViewer(viewers.back());
+  }
+  workshop.clock.advance(std::chrono::seconds(1));  // no longer interactive: whole pictures
+  workshop.steps(10);
+  int failed = 0;
+  for (const auto& viewer : viewers) failed += !viewer->failures.empty();
+  EXPECT_EQ(failed, 1);
+}
+
 TEST(RenderLoop, ShowsPicturesHoweverFastEditsCome) {
   Workshop workshop;
   workshop.control->secondsPerPixel = 1e-6;

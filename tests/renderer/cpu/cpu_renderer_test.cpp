@@ -92,6 +92,40 @@ TEST(CpuRenderer, LeavesTheFilmAsItWasWhenAPassIsCancelled) {
   EXPECT_TRUE(sameBits(renderer->image(), render(volume, orbitalScene(*volume), 2, 2)));
 }
 
+TEST(CpuRenderer, GoesOnWithAPassThatUsedUpItsBudget) {
+  const auto volume = orbitals();
+  const auto renderer = makeCpuRenderer(volume, 2);
+  renderer->setScene(orbitalScene(*volume));
+  EXPECT_FALSE(renderer->renderSample(kNever, std::chrono::nanoseconds(0)));
+  EXPECT_EQ(renderer->samples(), 0u);
+  int calls = 1;
+  while (!renderer->renderSample(kNever, std::chrono::microseconds(200)) && calls < 100000) ++calls;
+  EXPECT_TRUE(sameBits(renderer->image(), render(volume, orbitalScene(*volume), 1, 2)));
+}
+
+TEST(CpuRenderer, StopsWithinARayOfACancelHoweverDenseTheScene) {
+  // A dense channel over empty space: a ray takes up to a million tentative collisions. The test would time
+  // out if a cancel waited for the end of a tile, let alone of the pass.
+  const glm::ivec3 dims(32, 32, 32);
+  const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int x, int y, int z) {
+                                 return (x + y + z) % 7 == 0 ? 255 : 0;
+                               }));
+  Scene scene = frontScene(*volume, 512, 512);
+  scene.channels[0].rangeLo = 254;
+  scene.channels[0].rangeHi = 255;
+  scene.channels[0].density = 1e6;
+  const auto renderer = makeCpuRenderer(volume, 2);
+  renderer->setScene(scene);
+  std::atomic<bool> cancel = false;
+  std::thread canceller([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    cancel = true;
+  });
+  renderer->renderSample(cancel);
+  canceller.join();
+  EXPECT_EQ(renderer->samples(), 0u);
+}
+
 TEST(CpuRenderer, RebuildsOnlyTheEditedChannelAndNothingForAColour) {
   const auto volume = orbitals();
   const auto renderer = makeCpuRenderer(volume, 2);

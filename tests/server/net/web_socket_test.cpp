@@ -232,6 +232,22 @@ TEST_F(WebSocketTest, SendsTwoFramesUnacknowledgedAndThenTheLatest) {
   EXPECT_FALSE(stats.framePending);
 }
 
+TEST_F(WebSocketTest, SendsNoFrameThatWasWithdrawnWhileItWaited) {
+  start();
+  const auto client = connect();
+  const Payload data = payload(10);
+  for (std::uint32_t number = 1; number <= 3; ++number) socket()->offerFrame(frame(number, data));
+  // Both places of the window are taken, so frame 3 waits (or was 2, replaced); it is of a session just left.
+  socket()->withdrawFrame();
+  socket()->offerFrame(frame(4, data));
+  client->sendText("ack 1");
+  client->sendText("ack 2");
+  std::string last;
+  for (int i = 0; i < 3 && last != "04"; ++i) last = client->message().data.substr(0, 2);
+  EXPECT_EQ(last, "04");
+  EXPECT_FALSE(socket()->stats().framePending);
+}
+
 TEST_F(WebSocketTest, AStalledClientCostsOthersNothing) {
   Options options = quickOptions();
   options.pingTimeout = milliseconds(3'000);
