@@ -187,7 +187,8 @@ void Application::stop() {
   std::jthread cut([this](std::stop_token stopped) {
     std::mutex mutex;
     std::unique_lock lock(mutex);
-    std::condition_variable_any().wait_for(lock, stopped, impl_->config.stopGrace, [] { return false; });
+    std::condition_variable_any().wait_for(lock, stopped, impl_->config.stopGrace * 2 / 3,
+                                           [] { return false; });
     impl_->cutting = true;
   });
   impl_->sessions.closeAll("the server is stopping");
