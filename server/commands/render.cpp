@@ -20,6 +20,7 @@
 #include "renderer/renderer.h"
 #include "server/commands/validators.h"
 #include "server/dataset_store.h"
+#include "server/progressive_render.h"
 #include "server/scene_resolver.h"
 
 namespace scolopax {
@@ -142,11 +143,7 @@ void render(const Options& options) {
     renderer->renderSample(cancel, std::chrono::milliseconds(100));
     seconds = std::chrono::duration<double>(Clock::now() - start).count();
     bar.show(renderer->samples(), seconds);
-    if (renderer->samples() == 0) continue;
-    if (stop.samples > 0 && renderer->samples() >= stop.samples) break;
-    if (stop.seconds > 0 && seconds >= stop.seconds) break;
-    // From 16 samples on: fewer can look alike by chance, and the estimate with them.
-    if (stop.error > 0 && renderer->samples() >= 16 && renderer->estimatedError() <= stop.error) break;
+    if (server::stopMet(stop, *renderer, seconds)) break;
   }
   bar.clear();
   io::writeImage(options.out, renderer->image(), resolved->render.background);
