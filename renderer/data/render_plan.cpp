@@ -130,7 +130,6 @@ RebuildStats RenderPlan::update(const Scene& scene) {
     const ChannelPlan& plan = *channels_[i];
     if (!scene.channels[i].visible || plan.majorants.empty()) continue;
     channelViews_.push_back(plan.transfer.view(volume_->channels()[i]));
-    channelViews_.back().index = int(i);
     bounds.push_back(&plan.majorants);
   }
   const glm::ivec3 cells = macrocells_->cells;

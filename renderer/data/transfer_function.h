@@ -24,7 +24,7 @@ class TransferFunction {
  public:
   /// Throws Error(badInput) naming what is wrong: no knots, positions that decrease, values out of range.
   TransferFunction(const Channel& channel, const ChannelAppearance& appearance);
-  /// Everything but `index`; voxels are the channel's. Valid as long as this object.
+  /// Voxels are the channel's. Valid as long as this object.
   kernel::ChannelView view(const Channel& channel) const;
   /// Least upper bound, in float, of the kernels' extinction over an interval of stored values.
   float majorant(ValueInterval interval) const;

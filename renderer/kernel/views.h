@@ -49,7 +49,6 @@ struct ChannelView {
   float weight;                ///< of the colour in blend mode mix
   MaterialView material;
   float inverseRange;  ///< 1 / |hi - lo| of the range in stored values
-  int index;           ///< of the channel in the volume
 };
 
 /// Bounds of the extinction per macrocell. Cell (i,j,k) covers voxel coordinates [i, i+1] * cellSize; the
