@@ -212,7 +212,7 @@ void addApi(net::Server& server, ApiContext& context) {
     server.route(route.method, regexOf(route.path), guarded(context, route.handler), route.kind);
 
   static constexpr std::string_view kPrefix = "/api/v1/sessions/", kSuffix = "/stream";
-  server.upgrade([&context](const net::Request& request, std::shared_ptr<net::WebSocket> socket)
+  server.upgrade([&context](const net::Request& request, const std::shared_ptr<net::WebSocket>& socket)
                      -> std::variant<net::WebSocketEvents, net::Response> {
     try {
       const std::string_view path = request.path;

@@ -184,7 +184,7 @@ void Application::stop() {
   impl_->stopping = true;
   // What waits is released at once; what renders has the grace to end by itself, since the network waits for
   // its last handler.
-  std::jthread cut([this](std::stop_token stopped) {
+  std::jthread cut([this](const std::stop_token& stopped) {
     std::mutex mutex;
     std::unique_lock lock(mutex);
     std::condition_variable_any().wait_for(lock, stopped, impl_->config.stopGrace * 2 / 3,

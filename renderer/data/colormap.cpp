@@ -4,7 +4,9 @@
 #include <OpenImageIO/imagebuf.h>
 #include <OpenImageIO/imagebufalgo.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 
 #include "renderer/core/error.h"
@@ -47,7 +49,7 @@ constexpr std::array<int, 3> kFire[] = {
 /// The classic hot map: red rises over 3/8 of the range, then green, then blue (in display values).
 std::vector<ColorKnot> hot() {
   std::vector<std::array<int, 3>> colors;
-  const auto ramp = [](double x) { return int(255 * (x < 0 ? 0 : x > 1 ? 1 : x) + 0.5); };
+  const auto ramp = [](double x) { return int(std::lround(255 * std::clamp(x, 0.0, 1.0))); };
   for (int i = 0; i < 257; ++i) {
     const double x = i / 256.0;
     colors.push_back({ramp(x / 0.375), ramp((x - 0.375) / 0.375), ramp((x - 0.75) / 0.25)});
@@ -57,6 +59,7 @@ std::vector<ColorKnot> hot() {
 
 std::vector<ColorKnot> gray() {
   std::vector<std::array<int, 3>> colors;
+  colors.reserve(256);
   for (int i = 0; i < 256; ++i) colors.push_back({i, i, i});
   return fromSrgb8(colors);
 }

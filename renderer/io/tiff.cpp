@@ -261,6 +261,7 @@ LoadedFile loadTiff(const fs::path& path, std::uint64_t memoryLimitBytes, const 
   const std::size_t elementBytes = sizeBytes(layout.type),
                     pixels = std::size_t(first.width) * std::size_t(first.height);
   std::vector<VoxelBuffer> stored;
+  stored.reserve(std::size_t(layout.channels));
   for (int c = 0; c < layout.channels; ++c) {
     stored.push_back(makeStoredBuffer(layout.type, std::size_t(layout.voxelCount())));
   }

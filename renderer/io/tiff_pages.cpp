@@ -38,7 +38,7 @@ TiffPages::TiffPages(const std::filesystem::path& path) : IOProxy(path.string(),
   fileSize_ = std::uint64_t(status.st_size);
 
   std::array<unsigned char, 4> magic{};
-  pread(magic.data(), magic.size(), 0);
+  TiffPages::pread(magic.data(), magic.size(), 0);
   bigEndian_ = magic[0] == 'M';
   const std::uint64_t version = numberFrom(&magic[2], 2, bigEndian_);
   bigTiff_ = version == 43;

@@ -20,8 +20,9 @@ struct RenderPixel {
   SCOLOPAX_HD void operator()(int pixel) const {
     Sampler sampler(std::uint32_t(pixel), sample, scene.seed);
     const RandomBlock jitter = sampler.next();
-    const float x = float(pixel % scene.width) + (scene.filterBox ? uniformOf(jitter.x) : 0.5f);
-    const float y = float(pixel / scene.width) + (scene.filterBox ? uniformOf(jitter.y) : 0.5f);
+    const int column = pixel % scene.width, row = pixel / scene.width;
+    const float x = float(column) + (scene.filterBox ? uniformOf(jitter.x) : 0.5f);
+    const float y = float(row) + (scene.filterBox ? uniformOf(jitter.y) : 0.5f);
     const Ray ray = scene.rays(x, y);
     const Interval inside = clipToBox(ray, scene.dims);
 

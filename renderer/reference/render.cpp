@@ -76,7 +76,8 @@ ReferenceImage renderReference(const Volume& volume, const Scene& scene, int sam
 
   tbb::parallel_for(std::size_t(0), count, [&](std::size_t pixel) {
     const double left = double(pixel % std::size_t(scene.width));
-    const double top = double(pixel / std::size_t(scene.width));
+    const std::size_t row = pixel / std::size_t(scene.width);
+    const double top = double(row);
     if (scene.filter == PixelFilter::point) {
       const RayResult ray = view.look(integrator, left + 0.5, top + 0.5);
       result.image.pixels[pixel] = glm::vec4(ray.rgba);
@@ -86,11 +87,12 @@ ReferenceImage renderReference(const Volume& volume, const Scene& scene, int sam
     // Two independent points a stratum: the variance of their mean is a quarter of the squared difference.
     glm::dvec4 sum(0), variance(0);
     for (int stratum = 0; stratum < n * n; ++stratum) {
+      const int column = stratum % n, line = stratum / n;
       glm::dvec4 rgba[2];
       for (std::uint64_t which = 0; which < 2; ++which) {
         const std::uint64_t ray = (pixel * std::uint64_t(n * n) + std::uint64_t(stratum)) * 2 + which;
-        const RayResult found = view.look(integrator, left + (stratum % n + uniform(key, 2 * ray)) / n,
-                                          top + (stratum / n + uniform(key, 2 * ray + 1)) / n);
+        const RayResult found = view.look(integrator, left + (column + uniform(key, 2 * ray)) / n,
+                                          top + (line + uniform(key, 2 * ray + 1)) / n);
         rgba[which] = found.rgba;
         rayErrors[pixel] = std::max(rayErrors[pixel], found.error);
       }
