@@ -130,13 +130,16 @@ struct Application::Impl {
                 stopping,
                 cutting,
                 [this] { return capabilities; }},
-        authorizer(config.token, isLoopback(config.host)) {
+        authorizer(config.token, isLoopback(config.host), config.allowedOrigins,
+                   !config.certificateFile.empty()) {
     net::Options options;
     options.host = config.host;
     options.port = config.port;
     options.bodyLimit = config.maxBodyBytes;
     options.messageLimit = config.maxMessageBytes;
     options.allowedOrigins = config.allowedOrigins;
+    options.certificateFile = config.certificateFile;
+    options.keyFile = config.keyFile;
     if (std::filesystem::is_directory(config.webRoot)) options.staticRoot = config.webRoot;
     options.authorize = [this](const net::Request& request) { return authorizer(request); };
     options.problem = [](int status, const std::string& detail) {
@@ -175,9 +178,8 @@ void Application::start() {
 std::uint16_t Application::port() const { return impl_->server->port(); }
 
 std::string Application::url() const {
-  const bool v6 = impl_->config.host.find(':') != std::string::npos;
-  return "http://" + (v6 ? "[" + impl_->config.host + "]" : impl_->config.host) + ":" +
-         std::to_string(port()) + "/?token=" + impl_->config.token;
+  const Config& config = impl_->config;
+  return tokenUrl(config.host, port(), config.token, !config.certificateFile.empty());
 }
 
 void Application::stop() {

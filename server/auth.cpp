@@ -90,11 +90,12 @@ net::Response problemResponse(int status, const std::string& detail) {
   return {status, std::string(protocol::kProblemType), protocol::problemJson(status, detail), {}};
 }
 
-Authorizer::Authorizer(std::string token, bool loopback, std::vector<std::string> allowedOrigins)
+Authorizer::Authorizer(std::string token, bool loopback, std::vector<std::string> allowedOrigins, bool tls)
     : token_(std::move(token)),
       cookieName_("scolopax-"),
       loopback_(loopback),
-      allowedOrigins_(std::move(allowedOrigins)) {
+      allowedOrigins_(std::move(allowedOrigins)),
+      tls_(tls) {
   std::array<unsigned char, SHA256_DIGEST_LENGTH> digest{};
   SHA256(reinterpret_cast<const unsigned char*>(token_.data()), token_.size(), digest.data());
   for (int i = 0; i < 4; ++i) {
@@ -152,7 +153,8 @@ net::Response Authorizer::cookieAndRedirect(const net::Request& request) const {
   net::Response response;
   response.status = 303;
   response.headers = {{"Location", location},
-                      {"Set-Cookie", cookieName_ + "=" + token_ + "; HttpOnly; SameSite=Strict; Path=/"},
+                      {"Set-Cookie", cookieName_ + "=" + token_ + "; HttpOnly; SameSite=Strict; Path=/" +
+                                         (tls_ ? "; Secure" : "")},
                       {"Cache-Control", "no-store"},
                       {"Referrer-Policy", "no-referrer"}};
   return response;
@@ -186,11 +188,12 @@ bool isLoopback(std::string_view host) {
          isLoopbackAddress(host);
 }
 
-std::string tokenUrl(std::string_view host, std::uint16_t port, std::string_view token) {
+std::string tokenUrl(std::string_view host, std::uint16_t port, std::string_view token, bool tls) {
   std::string shown(host);
   if (shown == "0.0.0.0" || shown == "::") shown = "127.0.0.1";
   if (shown.find(':') != std::string::npos && shown.front() != '[') shown = "[" + shown + "]";
-  return "http://" + shown + ":" + std::to_string(port) + "/?token=" + net::percentEncodePath(token);
+  return (tls ? "https://" : "http://") + shown + ":" + std::to_string(port) +
+         "/?token=" + net::percentEncodePath(token);
 }
 
 }  // namespace scolopax

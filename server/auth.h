@@ -33,8 +33,10 @@ net::Response problemResponse(int status, const std::string& detail);
 class Authorizer {
  public:
   /// `loopback`: the server is bound to this machine only, so that a Host that is neither this machine nor
-  /// that of an allowed origin (a proxy in front) is DNS rebinding.
-  Authorizer(std::string token, bool loopback, std::vector<std::string> allowedOrigins = {});
+  /// that of an allowed origin (a proxy in front) is DNS rebinding. `tls`: the cookie travels over nothing
+  /// else.
+  Authorizer(std::string token, bool loopback, std::vector<std::string> allowedOrigins = {},
+             bool tls = false);
 
   /// nullopt: go on. Otherwise 401, 403, 421, or the 303 that turns `GET /?token=` into a cookie.
   std::optional<net::Response> operator()(const net::Request& request) const;
@@ -52,11 +54,12 @@ class Authorizer {
   std::string cookieName_;  ///< cookies ignore ports: a hash of the token keeps two servers apart
   bool loopback_;
   std::vector<std::string> allowedOrigins_;
+  bool tls_;
 };
 
 /// Whether `host` (an option's value) can be reached from this machine only.
 bool isLoopback(std::string_view host);
 /// The URL that opens the page, for the ready line; a wildcard address becomes this machine's own.
-std::string tokenUrl(std::string_view host, std::uint16_t port, std::string_view token);
+std::string tokenUrl(std::string_view host, std::uint16_t port, std::string_view token, bool tls);
 
 }  // namespace scolopax

@@ -12,6 +12,7 @@ namespace scolopax::server {
 struct Config {
   std::string host = "127.0.0.1";
   std::uint16_t port = 8080;                ///< 0: any free one
+  std::string certificateFile, keyFile;     ///< PEM; empty: no TLS
   std::string token;                        ///< empty: a new one each start
   int threads = 0;                          ///< for rendering; 0: all
   std::string webRoot;                      ///< folder of the built page; empty: none

@@ -22,6 +22,7 @@
 #include "server/auth.h"
 #include "server/command_config.h"
 #include "server/commands/validators.h"
+#include "server/net/server.h"
 
 namespace scolopax {
 namespace {
@@ -85,9 +86,13 @@ void serve(ServeOptions options) {
   if (!options.tokenFile.empty()) options.config.token = readTokenFile(options.tokenFile);
   options.config.keepSession = std::chrono::milliseconds((long long)(options.keepSeconds * 1000));
   options.config.webRoot = findWebRoot();
-  if (!isLoopback(options.config.host))
-    log->warn("{} can be reached from other machines, and what is sent is not encrypted",
-              options.config.host);
+  const server::Config& config = options.config;
+  if (config.certificateFile.empty() != config.keyFile.empty())
+    throw CLI::ValidationError("serve", "expected --tls-cert and --tls-key together, found only --tls-" +
+                                            std::string(config.keyFile.empty() ? "cert" : "key"));
+  net::checkTlsFiles(config.certificateFile, config.keyFile);
+  if (!isLoopback(config.host) && config.certificateFile.empty())
+    log->warn("{} can be reached from other machines, and what is sent is not encrypted", config.host);
 
   auto datasets = io::loadDatasets(server::pathsBelowRoot(options.paths, options.dataRoot),
                                    io::defaultMemoryLimitBytes(), warn);
@@ -130,6 +135,10 @@ CLI::App* addServeCommand(CLI::App& root) {
   add("port", config.port, "Port to listen on; 0 takes any free one")->type_name("PORT");
   add("token-file", options->tokenFile,
       "File with the token that opens the server; without it, a new one each start")
+      ->type_name("FILE");
+  add("tls-cert", config.certificateFile, "Certificate (PEM, with its chain): https instead of http")
+      ->type_name("FILE");
+  add("tls-key", config.keyFile, "Private key of that certificate (PEM, without a password)")
       ->type_name("FILE");
   add("data-root", options->dataRoot, "Folder that every PATH is below and relative to")->type_name("FOLDER");
   add("threads", config.threads, "Threads that render; 0 is all there are")

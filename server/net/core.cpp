@@ -8,6 +8,7 @@ namespace scolopax::net {
 Core::Core(Options given)
     : options(std::move(given)),
       files(options.staticRoot),
+      tls(loadTls(options.certificateFile, options.keyFile)),
       workers(static_cast<std::size_t>(std::max(1, options.workers))),
       slowWorkers(static_cast<std::size_t>(std::max(1, options.longRequests))) {}
 

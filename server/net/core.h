@@ -18,6 +18,7 @@
 #include "server/net/router.h"
 #include "server/net/server.h"
 #include "server/net/static_files.h"
+#include "server/net/tls.h"
 
 namespace scolopax::net {
 
@@ -56,6 +57,7 @@ class Core {
   Options options;
   Router router;
   StaticFiles files;
+  const std::unique_ptr<asio::ssl::context> tls;  ///< null: plain
   UpgradeHandler upgradeHandler;
   /// Shared with WebSocket handles, which may outlive the server.
   std::shared_ptr<asio::io_context> io = std::make_shared<asio::io_context>();

@@ -14,6 +14,7 @@
 #include <variant>
 
 #include "server/net/head_rules.h"
+#include "server/net/transport.h"
 #include "server/net/url.h"
 #include "server/net/web_socket_connection.h"
 
@@ -29,7 +30,6 @@ using Parser = http::request_parser<http::string_body>;
 
 constexpr std::size_t kBufferSlack = 64 << 10;
 constexpr Milliseconds kLingerTime{2'000};
-constexpr std::size_t kLingerBytes = 64 << 20;
 
 auto into(error_code& error) { return asio::redirect_error(asio::use_awaitable, error); }
 
@@ -91,8 +91,8 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
  public:
   HttpConnection(Core& core, tcp::socket socket, bool full)
       : core_(core),
-        socket_(std::move(socket)),
-        executor_(socket_.get_executor()),
+        transport_(std::move(socket), core.tls.get()),
+        executor_(transport_.get_executor()),
         buffer_(core.options.headerLimit + kBufferSlack),
         full_(full) {}
 
@@ -108,10 +108,12 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
   static awaitable<void> run(std::shared_ptr<HttpConnection> self) {
     try {
       error_code ignored;
-      const auto peer = self->socket_.remote_endpoint(ignored);
+      const auto peer = self->transport_.socket().remote_endpoint(ignored);
       self->remoteAddress_ = peer.address().to_string();
       Milliseconds patience = self->core_.options.headTimeout;
-      while (co_await self->exchange(patience)) patience = self->core_.options.idleTimeout;
+      if (co_await self->secure()) {
+        while (co_await self->exchange(patience)) patience = self->core_.options.idleTimeout;
+      }
       if (self->linger_) co_await self->linger();
     } catch (const std::exception& error) {
       self->core_.log(std::string("connection: ") + error.what());
@@ -121,6 +123,18 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
   }
 
  private:
+  /// The handshake of TLS, where it is spoken. False when there is none to be had.
+  awaitable<bool> secure() {
+    if (!transport_.tls()) co_return true;
+    idle_ = true;
+    if (core_.stopping()) co_return false;
+    const Deadline deadline(transport_.socket(), core_.options.headTimeout);
+    error_code error;
+    co_await transport_.tls()->async_handshake(asio::ssl::stream_base::server, into(error));
+    idle_ = false;
+    co_return !error;
+  }
+
   /// One request and its answer; false when the connection ends.
   awaitable<bool> exchange(Milliseconds patience) {
     if (!co_await waitForByte(patience)) co_return false;
@@ -130,8 +144,8 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     parser.body_limit(std::numeric_limits<std::uint64_t>::max());
     error_code error;
     {
-      const Deadline deadline(socket_, core_.options.headTimeout);
-      co_await http::async_read_header(socket_, buffer_, parser, into(error));
+      const Deadline deadline(transport_.socket(), core_.options.headTimeout);
+      co_await http::async_read_header(transport_, buffer_, parser, into(error));
       if (error && deadline.expired())
         co_return co_await refuse(408, "The head of the request took too long.");
     }
@@ -176,9 +190,9 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     if (buffer_.size() > 0) co_return true;  // pipelined
     idle_ = true;
     if (core_.stopping()) co_return false;
-    const Deadline deadline(socket_, patience);
+    const Deadline deadline(transport_.socket(), patience);
     error_code error;
-    const std::size_t count = co_await socket_.async_read_some(buffer_.prepare(4096), into(error));
+    const std::size_t count = co_await transport_.async_read_some(buffer_.prepare(4096), into(error));
     buffer_.commit(count);
     idle_ = false;
     co_return !error;
@@ -188,12 +202,12 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
   awaitable<bool> readBody(Parser& parser, Request& request) {
     parser.body_limit(core_.options.bodyLimit);
     error_code error;
-    const Deadline deadline(socket_, core_.options.bodyTimeout);
+    const Deadline deadline(transport_.socket(), core_.options.bodyTimeout);
     if (request.header("Expect") && version_ >= 11 && buffer_.size() == 0) {
       static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
-      co_await asio::async_write(socket_, asio::buffer(kContinue), into(error));
+      co_await asio::async_write(transport_, asio::buffer(kContinue), into(error));
     }
-    if (!error) co_await http::async_read(socket_, buffer_, parser, into(error));
+    if (!error) co_await http::async_read(transport_, buffer_, parser, into(error));
     if (!error) {
       request.body = std::move(parser.get().body());
       co_return true;
@@ -271,7 +285,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
       socket->abandon();
       co_return co_await write(std::move(*refused), keepAlive_);
     }
-    socket->start(std::move(socket_), parser.release(), std::move(std::get<WebSocketEvents>(answer)));
+    socket->start(std::move(transport_), parser.release(), std::move(std::get<WebSocketEvents>(answer)));
     co_return false;
   }
 
@@ -305,35 +319,26 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     error_code error;
     while (!error && !(head_ ? serializer.is_header_done() : serializer.is_done())) {
       // Per piece: a slow reader may take its time over a large answer, a stalled one may not.
-      const Deadline deadline(socket_, core_.options.bodyTimeout);
-      co_await http::async_write_some(socket_, serializer, into(error));
+      const Deadline deadline(transport_.socket(), core_.options.bodyTimeout);
+      co_await http::async_write_some(transport_, serializer, into(error));
     }
     linger_ = !error && !keepAlive;
     co_return !error && keepAlive;
   }
 
-  /// Reads on after the last answer: closing with unread bytes would reset the connection, and the client
-  /// might never see why it was refused.
+  /// Reads on after the last answer, so that the client sees it.
   awaitable<void> linger() {
     idle_ = true;
     if (core_.stopping()) co_return;
     error_code error;
-    socket_.shutdown(tcp::socket::shutdown_send, error);
-    const Deadline deadline(socket_, kLingerTime);
-    buffer_.consume(buffer_.size());
-    std::size_t total = 0;
-    while (!error && total < kLingerBytes) {
-      total += co_await socket_.async_read_some(buffer_.prepare(kBufferSlack), into(error));
-    }
+    const Deadline deadline(transport_.socket(), kLingerTime);
+    co_await transport_.async_discard(into(error));
   }
 
-  void closeSocket() {
-    error_code ignored;
-    socket_.close(ignored);
-  }
+  void closeSocket() { transport_.close(); }
 
   Core& core_;
-  tcp::socket socket_;
+  Transport transport_;
   asio::any_io_executor executor_;  ///< kept apart: cut() may come when the socket has moved on
   boost::beast::flat_buffer buffer_;
   std::string remoteAddress_;

@@ -43,6 +43,9 @@ struct Options {
   std::vector<std::string> allowedOrigins;  ///< beside the own one, e.g. "https://lab.example"
   std::string staticRoot;                   ///< folder of the page; empty: none
 
+  /// PEM: the certificate with its chain, and its key. With both only TLS is spoken, with neither none.
+  std::string certificateFile, keyFile;
+
   /// Called first for every request and upgrade, on an I/O thread, before the body is read: must be quick and
   /// thread-safe. A Response refuses.
   std::function<std::optional<Response>(const Request&)> authorize;
@@ -54,13 +57,17 @@ struct Options {
   std::function<void(const std::string&)> log;
 };
 
+/// Throws NetError unless files can serve as Options::certificateFile and keyFile: to be asked before long
+/// work.
+void checkTlsFiles(const std::string& certificateFile, const std::string& keyFile);
+
 /// slow: may wait or compute for long (long poll, render); has threads of its own, so that it delays nobody.
 enum class RouteKind { quick, slow };
 
 class Server {
  public:
-  explicit Server(Options options);
-  ~Server();  ///< stops at once
+  explicit Server(Options options);  ///< throws NetError for files that cannot be used
+  ~Server();                         ///< stops at once
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 

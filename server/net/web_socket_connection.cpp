@@ -6,7 +6,6 @@
 #include <boost/asio/strand.hpp>
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/websocket/stream.hpp>
 #include <optional>
 
@@ -21,7 +20,7 @@ using asio::ip::tcp;
 using boost::system::error_code;
 
 /// Compression is compiled out: pictures are compressed already, and it would cost memory per client.
-using Stream = websocket::stream<beast::tcp_stream, false>;
+using Stream = websocket::stream<Transport, false>;
 
 constexpr std::chrono::seconds kHandshakeTimeout{5};
 constexpr int kSendBufferBytes = 128 << 10;  ///< a large one hides stale frames in the kernel
@@ -98,14 +97,14 @@ class WebSocketConnection : public PreparedWebSocket,
     core_.leave(this);
   }
 
-  void start(tcp::socket socket, UpgradeRequest request, WebSocketEvents events) override {
+  void start(Transport transport, UpgradeRequest request, WebSocketEvents events) override {
     request_ = std::move(request);
     events_ = std::move(events);
     error_code ignored;
-    socket.set_option(tcp::no_delay(true), ignored);
-    socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
-    const auto executor = socket.get_executor();
-    stream_.emplace(std::move(socket));
+    transport.socket().set_option(tcp::no_delay(true), ignored);
+    transport.socket().set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+    const auto executor = transport.get_executor();
+    stream_.emplace(std::move(transport));
     closeTimer_.emplace(executor);
     stream_->set_option(websocket::stream_base::timeout{kHandshakeTimeout, core_.options.pingTimeout, true});
     stream_->read_message_max(core_.options.messageLimit);
@@ -216,7 +215,7 @@ class WebSocketConnection : public PreparedWebSocket,
   }
 
   void closeSocket() {
-    if (stream_) beast::get_lowest_layer(*stream_).close();
+    if (stream_) stream_->next_layer().close();
   }
 
   /// The read has ended, and with it the connection, once the write has too.

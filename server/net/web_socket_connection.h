@@ -3,10 +3,11 @@
 #pragma once
 #include "server/net/core.h"
 
-#include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/string_body.hpp>
 #include <memory>
+
+#include "server/net/transport.h"
 
 namespace scolopax::net {
 
@@ -16,7 +17,7 @@ using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_bo
 class PreparedWebSocket : public WebSocket {
  public:
   /// Answers the handshake and takes over. Exactly one of start and abandon is called.
-  virtual void start(asio::ip::tcp::socket socket, UpgradeRequest request, WebSocketEvents events) = 0;
+  virtual void start(Transport transport, UpgradeRequest request, WebSocketEvents events) = 0;
   /// The upgrade was refused.
   virtual void abandon() = 0;
 };

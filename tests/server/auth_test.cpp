@@ -57,6 +57,16 @@ TEST_F(AuthorizerTest, RefusesWithoutATokenAndSaysHow) {
   }
 }
 
+TEST_F(AuthorizerTest, MakesTheCookieForTlsAloneWhereTlsIsSpoken) {
+  for (const bool tls : {false, true}) {
+    Request asked = request("GET", "/");
+    asked.query.emplace("token", kToken);
+    const auto answer = Authorizer(kToken, true, {}, tls)(asked);
+    ASSERT_TRUE(answer);
+    EXPECT_EQ(headerOf(*answer, "Set-Cookie").find("; Secure") != std::string::npos, tls);
+  }
+}
+
 TEST_F(AuthorizerTest, LeavesHealthAndReadinessOpenForReading) {
   for (const char* path : {"/healthz", "/readyz"}) {
     EXPECT_EQ(status(request("GET", path)), 0);
@@ -212,9 +222,9 @@ TEST_F(TokenFile, IsRefusedByNameWhenItIsShortLongOrHoldsAnythingElse) {
 }
 
 TEST(TokenUrl, CanBeOpenedAsItStands) {
-  EXPECT_EQ(tokenUrl("127.0.0.1", 8080, "a+/="), "http://127.0.0.1:8080/?token=a%2B/%3D");
-  EXPECT_EQ(tokenUrl("::1", 1, "a"), "http://[::1]:1/?token=a");
-  EXPECT_EQ(tokenUrl("0.0.0.0", 1, "a"), "http://127.0.0.1:1/?token=a");
+  EXPECT_EQ(tokenUrl("127.0.0.1", 8080, "a+/=", false), "http://127.0.0.1:8080/?token=a%2B/%3D");
+  EXPECT_EQ(tokenUrl("::1", 1, "a", true), "https://[::1]:1/?token=a");
+  EXPECT_EQ(tokenUrl("0.0.0.0", 1, "a", false), "http://127.0.0.1:1/?token=a");
 }
 
 TEST(Loopback, IsThisMachineAlone) {

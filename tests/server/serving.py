@@ -32,9 +32,11 @@ def write_volume(folder, name="blob", size=16, channels=("a", "b")):
 
 
 class Server:
-    """`with Server("--max-sessions", "2") as server:` on a free loopback port, ended by SIGTERM."""
+    """`with Server("--max-sessions", "2") as server:` on a free loopback port, ended by SIGTERM. `tls`: the context for
+    a server that is given a certificate."""
 
-    def __init__(self, *options, environment=None, paths=None, port=True):
+    def __init__(self, *options, environment=None, paths=None, port=True, tls=None):
+        self.tls = tls
         self.folder = tempfile.TemporaryDirectory()
         paths = write_volume(self.folder.name) if paths is None else paths
         command = [PROGRAM, "serve", *paths, *(["--port", "0"] if port else []), *options]
@@ -43,13 +45,13 @@ class Server:
         self.process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=self.log, text=True, env={**clean, **(environment or {})})
         self.ready = self.process.stdout.readline()
-        found = re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", self.ready)
+        found = re.search(("https" if tls else "http") + r"://127\.0\.0\.1:(\d+)/\?token=(\S+)", self.ready)
         if not found:
             self.process.wait()
             self.log.seek(0)
             raise AssertionError(f"no ready line but {self.ready!r}, log {self.log.read()!r}")
         self.port, self.token = int(found[1]), found[2]
-        self.base = f"http://127.0.0.1:{self.port}"
+        self.base = f"{'https' if tls else 'http'}://127.0.0.1:{self.port}"
 
     def __enter__(self):
         return self
@@ -76,7 +78,7 @@ class Server:
             headers.setdefault("Content-Type", "application/json")
         request = urllib.request.Request(self.base + path, data=body, method=method, headers=headers)
         try:
-            with urllib.request.urlopen(request, timeout=60) as response:
+            with urllib.request.urlopen(request, timeout=60, context=self.tls) as response:
                 return response.status, response.headers, response.read()
         except urllib.error.HTTPError as error:
             with error:

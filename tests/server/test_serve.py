@@ -151,6 +151,13 @@ class CommandLine(unittest.TestCase):
                 self.assertIn("1e+308", result.stderr)
                 self.assertLess(len(result.stderr), 200)
 
+    def test_an_allowed_origin_may_be_the_name_of_a_proxy_in_front(self):
+        name = {"Host": "lab.example"}
+        with Server() as server:
+            self.assertEqual(server.call("GET", "/api/v1/datasets", headers=name)[0], 421)
+        with Server("--allow-origin", "https://lab.example") as server:
+            self.assertEqual(server.call("GET", "/api/v1/datasets", headers=name)[0], 200)
+
     def test_the_token_of_a_file_is_used(self):
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "token")

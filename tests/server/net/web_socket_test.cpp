@@ -195,6 +195,18 @@ TEST_F(WebSocketTest, ClosesOnMessagesItDoesNotTake) {
   EXPECT_TRUE(eventually([&] { return closed_ == 5; }));
 }
 
+TEST_F(WebSocketTest, SaysWhyItClosesToAClientThatGoesOnSending) {
+  start();
+  for (const std::string& first :
+       {TestClient::frame(1, std::string(8 << 20, 'x')), TestClient::frame(2, "x")}) {
+    const auto client = connect();
+    // More than the sockets' buffers hold: sent whole only when somebody reads it.
+    EXPECT_TRUE(client->send(first));
+    EXPECT_TRUE(client->send(TestClient::frame(1, std::string(8 << 20, 'x'))));
+    EXPECT_EQ(client->closeCode(), first.size() > 1000 ? 1009 : 1003);
+  }
+}
+
 TEST_F(WebSocketTest, SendsWhatIsQueuedBeforeItCloses) {
   start();
   const auto client = connect();
