@@ -158,6 +158,8 @@ struct Table<Integrator> {
             {.unit = "voxels", .atLeast = 1, .atMost = 64}),
       field("step", &Integrator::step, "Step of the ray marcher; trackers have none.",
             {.unit = "smallest voxel spacing", .atLeast = 0.01, .atMost = 100}),
+      field("sampling", &Integrator::sampling, "How the numbers of a pixel's samples are drawn.",
+            {.names = &Lists::samplings}),
       field("seed", &Integrator::seed, "Same scene, seed and sample count: the same picture, bit for bit.",
             {.atLeast = 0, .atMost = 4294967295.0}),
   };

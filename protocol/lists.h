@@ -16,6 +16,7 @@ struct Lists {
   std::vector<EnumEntry> blendModes;
   std::vector<EnumEntry> methods;  ///< "auto" first
   std::vector<EnumEntry> filters;
+  std::vector<EnumEntry> samplings;
   std::vector<EnumEntry> colormaps;
   std::vector<EnumEntry> lightTypes;
 };

@@ -69,6 +69,7 @@ struct Integrator {
   std::string method = "auto";
   std::uint32_t macrocell = 4;
   double step = 0.5;
+  std::string sampling = "low-discrepancy";
   std::uint32_t seed = 0;
 };
 

@@ -139,6 +139,7 @@ protocol::Lists rendererLists() {
   lists.methods = entries(kMethods);
   lists.methods.insert(lists.methods.begin(), {std::string(kAutoMethod), "chosen by the server"});
   lists.filters = entries(kPixelFilters);
+  lists.samplings = entries(kSamplings);
   lists.colormaps = entries(colormaps());
   lists.lightTypes = entries(kLightTypes);
   return lists;
@@ -192,6 +193,7 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
                                                          : valueOf<Method>(kMethods, scene.integrator.method);
   render.macrocell = int(scene.integrator.macrocell);
   render.step = scene.integrator.step;
+  render.sampling = valueOf<Sampling>(kSamplings, scene.integrator.sampling);
   render.seed = scene.integrator.seed;
   render.width = int(scene.image.width);
   render.height = int(scene.image.height);

@@ -8,6 +8,7 @@
 #include "renderer/cpu/tile_kernels.h"
 #include "renderer/data/film.h"
 #include "renderer/data/render_plan.h"
+#include "renderer/data/sampling.h"
 #include "renderer/renderer.h"
 
 namespace scolopax {
@@ -56,7 +57,7 @@ class CpuRenderer final : public Renderer {
   bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
     const kernel::SceneView& scene = plan_.view();
     const Pass pass{scene,
-                    film_.samples(),
+                    sampleNumber(plan_.scene().sampling, film_.samples()),
                     film_.pass(),
                     counting_ ? cost_.data() : nullptr,
                     done_.data(),

@@ -18,7 +18,7 @@ namespace scolopax {
 /// One sample of every pixel; pixels and cost as in kernel::RenderPixel.
 struct Pass {
   kernel::SceneView scene;
-  std::uint32_t sample;
+  kernel::SampleNumber number;
   glm::vec4* pixels;
   kernel::SampleCost* cost;
   std::uint8_t* done;  ///< width x height: pixels of this pass that are rendered; the others are still to do
@@ -34,7 +34,7 @@ using TileFunction = void (*)(const Pass&, int tileX, int tileY);
 
 template <class Integrator, class Blend, class Features>
 void renderTile(const Pass& pass, int tileX, int tileY) {
-  const kernel::RenderPixel<Integrator, Blend, Features> render{pass.scene, pass.sample, pass.pixels,
+  const kernel::RenderPixel<Integrator, Blend, Features> render{pass.scene, pass.number, pass.pixels,
                                                                 pass.cost};
   const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
   const int endY = std::min((tileY + 1) * kTile, pass.scene.height);

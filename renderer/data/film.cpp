@@ -10,8 +10,14 @@
 #include <new>
 
 #include "renderer/core/error.h"
+#include "renderer/kernel/rng.h"
 
 namespace scolopax {
+namespace {
+
+double squaredLength(const glm::dvec3& v) { return v.r * v.r + v.g * v.g + v.b * v.b; }
+
+}  // namespace
 
 void Film::reset(int width, int height) {
   const std::size_t count = std::size_t(width) * std::size_t(height);
@@ -22,6 +28,8 @@ void Film::reset(int width, int height) {
     pass_.resize(count);
     sum_.assign(count, glm::dvec4(0));
     squares_.assign(count, 0);
+    replicate_.assign(count, glm::dvec3(0));
+    replicateSquares_.assign(count, 0);
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::tooLarge,
                 "image: no memory for " + std::to_string(width) + "x" + std::to_string(height));
@@ -29,12 +37,17 @@ void Film::reset(int width, int height) {
 }
 
 void Film::add() {
+  const bool replicateEnds = (samples_ + 1) % kernel::kReplicateSamples == 0;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pass_.size(), 1 << 14),
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       for (std::size_t i = range.begin(); i < range.end(); ++i) {
                         const glm::dvec4 v(pass_[i]);
                         sum_[i] += v;
-                        squares_[i] += v.r * v.r + v.g * v.g + v.b * v.b;
+                        squares_[i] += squaredLength(glm::dvec3(v));
+                        replicate_[i] += glm::dvec3(v);
+                        if (!replicateEnds) continue;
+                        replicateSquares_[i] += squaredLength(replicate_[i]);
+                        replicate_[i] = glm::dvec3(0);
                       }
                     });
   ++samples_;
@@ -49,13 +62,19 @@ Image Film::image() const {
 
 double Film::estimatedError() const {
   if (samples_ < 2) return std::numeric_limits<double>::quiet_NaN();
-  const double n = samples_;
-  double variance = 0;  // of the means, summed over pixels and components
+  const std::uint32_t replicates = samples_ / kernel::kReplicateSamples;
+  const bool enough = replicates >= kEnoughReplicates;
+  // Parts of a pixel's sum that are independent of each other, and their number.
+  const double n = enough ? replicates : samples_;
+  double deviations = 0;  // squared, of the parts, over pixels and components
   for (std::size_t i = 0; i < sum_.size(); ++i) {
-    const glm::dvec4& s = sum_[i];
-    variance += std::max(0.0, squares_[i] - (s.r * s.r + s.g * s.g + s.b * s.b) / n);
+    const glm::dvec3 whole = glm::dvec3(sum_[i]) - (enough ? replicate_[i] : glm::dvec3(0));
+    const double squares = enough ? replicateSquares_[i] : squares_[i];
+    deviations += std::max(0.0, squares - squaredLength(whole) / n);
   }
-  return std::sqrt(variance / (n * (n - 1)) / (3.0 * double(sum_.size())));
+  const double samplesPerPart = enough ? kernel::kReplicateSamples : 1;
+  const double varianceOfMeans = deviations / (n - 1) / (samplesPerPart * samples_);
+  return std::sqrt(varianceOfMeans / (3.0 * double(sum_.size())));
 }
 
 }  // namespace scolopax

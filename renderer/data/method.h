@@ -35,6 +35,11 @@ namespace scolopax {
   X(box, "box", "samples spread evenly over the pixel's area") \
   X(point, "point", "every sample at the pixel's centre")
 
+#define SCOLOPAX_SAMPLINGS(X)                                                                        \
+  X(lowDiscrepancy, "low-discrepancy",                                                               \
+    "the first numbers of a pixel's samples are spread evenly (scrambled Sobol points): less noise") \
+  X(independent, "independent", "every number is drawn on its own, as textbook error estimates assume")
+
 struct NamedValue {
   std::string_view name;
   std::string_view doc;
@@ -51,6 +56,7 @@ SCOLOPAX_DECLARE_ENUM(BlendMode, SCOLOPAX_BLEND_MODES, kBlendModes)
 SCOLOPAX_DECLARE_ENUM(Method, SCOLOPAX_METHODS, kMethods)
 SCOLOPAX_DECLARE_ENUM(LightType, SCOLOPAX_LIGHT_TYPES, kLightTypes)
 SCOLOPAX_DECLARE_ENUM(PixelFilter, SCOLOPAX_PIXEL_FILTERS, kPixelFilters)
+SCOLOPAX_DECLARE_ENUM(Sampling, SCOLOPAX_SAMPLINGS, kSamplings)
 
 #undef SCOLOPAX_ENUM_ENTRY
 #undef SCOLOPAX_NAMED_ENTRY

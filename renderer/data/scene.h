@@ -48,6 +48,7 @@ struct Scene {
   Method method = Method::superposed;
   int macrocell = 4;  ///< voxels per macrocell edge
   double step = 0.5;  ///< of the marcher, in smallest spacings; > 0
+  Sampling sampling = Sampling::lowDiscrepancy;
   std::uint32_t seed = 0;
   int width = 512, height = 512;
   glm::vec3 background{0};  ///< linear RGB

@@ -13,12 +13,12 @@ namespace scolopax::kernel {
 template <class Integrator, class Blend, class Features>
 struct RenderPixel {
   SceneView scene;
-  std::uint32_t sample;
+  SampleNumber number;
   glm::vec4* pass;   ///< width x height: this sample's linear premultiplied RGBA
   SampleCost* cost;  ///< the same shape, or null where nobody counts
 
   SCOLOPAX_HD void operator()(int pixel) const {
-    Sampler sampler(std::uint32_t(pixel), sample, scene.seed);
+    Sampler sampler(std::uint32_t(pixel), number, scene.seed);
     const RandomBlock jitter = sampler.next();
     const int column = pixel % scene.width, row = pixel / scene.width;
     const float x = float(column) + (scene.filterBox ? uniformOf(jitter.x) : 0.5f);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Random numbers by counting: a bijection of (pixel, sample, block, seed), so that no two draws share a
-// state and none depends on threads, tiles or processes. Integer only until the last step.
+// state and none depends on threads, tiles or processes; the first ones of low discrepancy. Integer only
+// until the last step.
 #pragma once
 #include <cstdint>
 
@@ -33,17 +34,63 @@ SCOLOPAX_HD inline float uniformOf(std::uint32_t k) {
   return u < 0x1.fffffep-1f ? u : 0x1.fffffep-1f;
 }
 
+/// Blocks of a sample whose words x, y, z come from a Sobol sequence.
+inline constexpr std::uint32_t kLowDiscrepancyBlocks = 3;
+/// Consecutive samples of a pixel that share a scrambling. Between replicates samples are independent, so the
+/// error of a picture can be estimated from them.
+inline constexpr std::uint32_t kReplicateSamples = 64;
+
+/// The part of a sample's numbers that all pixels share (data/sampling.h makes it).
+struct SampleNumber {
+  std::uint32_t sample;
+  bool lowDiscrepancy;  ///< false: all draws independent
+  /// Point sample % kReplicateSamples of the Sobol sequence, bits of each coordinate reversed.
+  std::uint32_t point[kLowDiscrepancyBlocks][3];
+};
+
+SCOLOPAX_HD inline std::uint32_t reverseBits(std::uint32_t x) {
+  x = (x >> 16) | (x << 16);
+  x = ((x & 0x00ff00ffu) << 8) | ((x >> 8) & 0x00ff00ffu);
+  x = ((x & 0x0f0f0f0fu) << 4) | ((x >> 4) & 0x0f0f0f0fu);
+  x = ((x & 0x33333333u) << 2) | ((x >> 2) & 0x33333333u);
+  return ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
+}
+
+/// Owen's nested uniform scrambling of a coordinate whose bits come reversed (Burley, "Practical Hash-based
+/// Owen Scrambling", JCGT 9(4), 2020): every bit is flipped by a hash of the bits before it.
+SCOLOPAX_HD inline std::uint32_t owenScramble(std::uint32_t reversed, std::uint32_t seed) {
+  // The seed's lowest bit flips the coordinate's highest, and pcg4d's lowest bits are not random enough.
+  std::uint32_t x = reversed + (seed ^ (seed >> 16));
+  x ^= x * 0x6c50b47cu;
+  x ^= x * 0xb82f1e52u;
+  x ^= x * 0xc7afe638u;
+  x ^= x * 0x8d22f6e6u;
+  return reverseBits(x);
+}
+
 /// The draws of one sample of one pixel. Block 0 places the sample in the pixel; every tentative collision
 /// takes the next block: x its optical depth, y the channel, z acceptance.
 class Sampler {
  public:
-  SCOLOPAX_HD Sampler(std::uint32_t pixel, std::uint32_t sample, std::uint32_t seed)
-      : pixel_(pixel), sample_(sample), seed_(seed) {}
-  SCOLOPAX_HD RandomBlock next() { return pcg4d(pixel_, sample_, block_++, seed_); }
+  /// Borrows `number`.
+  SCOLOPAX_HD Sampler(std::uint32_t pixel, const SampleNumber& number, std::uint32_t seed)
+      : number_(number), pixel_(pixel), seed_(seed) {}
+  SCOLOPAX_HD RandomBlock next() {
+    const std::uint32_t block = block_++;
+    if (!number_.lowDiscrepancy || block >= kLowDiscrepancyBlocks)
+      return pcg4d(pixel_, number_.sample, block, seed_);
+    // Samples stay below 2^31, so no other draw has this counter.
+    const std::uint32_t replicate = 0x80000000u | (number_.sample / kReplicateSamples);
+    const RandomBlock scrambling = pcg4d(pixel_, replicate, block, seed_);
+    const std::uint32_t* point = number_.point[block];
+    return {owenScramble(point[0], scrambling.x), owenScramble(point[1], scrambling.y),
+            owenScramble(point[2], scrambling.z), scrambling.w};
+  }
   SCOLOPAX_HD std::uint32_t blocks() const { return block_; }
 
  private:
-  std::uint32_t pixel_, sample_, seed_;
+  const SampleNumber& number_;
+  std::uint32_t pixel_, seed_;
   std::uint32_t block_ = 0;
 };
 

@@ -42,6 +42,7 @@ TEST(ParseScene, TakesTheEmptyObjectAndGivesTheDefaultsOfTheDesign) {
   EXPECT_EQ(scene.camera.fovY, 35);
   EXPECT_EQ(scene.integrator.method, "auto");
   EXPECT_EQ(scene.integrator.macrocell, 4U);
+  EXPECT_EQ(scene.integrator.sampling, "low-discrepancy");
   EXPECT_EQ(scene.integrator.seed, 0U);
   EXPECT_EQ(scene.image.width, 512U);
   EXPECT_EQ(scene.image.height, 512U);
@@ -72,7 +73,8 @@ TEST(ParseScene, ReadsEveryField) {
     "blend": {"mode": "mix"}, "shading": true, "shadows": true,
     "lights": [{"type": "point", "position": [1, 2, 3], "direction": [0, 0, 1], "color": "#ff0000", "intensity": 2}],
     "camera": {"eye": [1, 2, 3], "target": [4, 5, 6], "up": [0, 0, 1], "fovY": 90, "orthoHeight": 7},
-    "integrator": {"method": "sync-dda", "macrocell": 8, "step": 0.25, "seed": 4294967295},
+    "integrator": {"method": "sync-dda", "macrocell": 8, "step": 0.25, "sampling": "independent",
+                   "seed": 4294967295},
     "image": {"width": 1, "height": 16384, "background": "#102030", "filter": "point"},
     "stop": {"samples": 16777216, "seconds": 1.5, "error": 0.01}})");
   const Scene scene = parsed(document);
@@ -90,6 +92,7 @@ TEST(ParseScene, ReadsEveryField) {
   EXPECT_EQ(scene.camera.eye, (std::array<double, 3>{1, 2, 3}));
   EXPECT_EQ(scene.camera.orthoHeight, 7.0);
   EXPECT_EQ(scene.integrator.method, "sync-dda");
+  EXPECT_EQ(scene.integrator.sampling, "independent");
   EXPECT_EQ(scene.integrator.seed, 4294967295U);
   EXPECT_EQ(scene.image.height, 16384U);
   EXPECT_EQ(scene.image.filter, "point");

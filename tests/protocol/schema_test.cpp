@@ -73,7 +73,7 @@ TEST(Schema, GivesEveryFieldADescriptionAndADefaultThatIsTaken) {
     EXPECT_TRUE(isTaken(path, field["default"]));
     ++fields;
   });
-  EXPECT_EQ(fields, 34);
+  EXPECT_EQ(fields, 35);
 }
 
 TEST(Schema, SaysTheSameOfBoundsAsReadingDoes) {

@@ -25,15 +25,22 @@ inline int statisticsFactor() {
   return factor;
 }
 
-/// `samples`, times the factor, of the scene with one method.
-inline Image renderAnalog(const std::shared_ptr<const Volume>& volume, Scene scene, Method method,
-                          int samples, int threads = 0) {
-  scene.method = method;
+/// `samples`, times the factor, of the scene.
+inline Image renderSamples(const std::shared_ptr<const Volume>& volume, const Scene& scene, int samples,
+                           int threads = 0) {
   const auto renderer = makeCpuRenderer(volume, threads);
   renderer->setScene(scene);
   const std::atomic<bool> cancel = false;
   for (int i = 0; i < samples * statisticsFactor(); ++i) renderer->renderSample(cancel);
   return renderer->image();
+}
+
+/// The same with one method and samples that are independent of each other.
+inline Image renderAnalog(const std::shared_ptr<const Volume>& volume, Scene scene, Method method,
+                          int samples, int threads = 0) {
+  scene.method = method;
+  scene.sampling = Sampling::independent;
+  return renderSamples(volume, scene, samples, threads);
 }
 
 /// Compares a picture of `samples`, times the factor, per pixel and component. Every sample must be 0 or 1 in

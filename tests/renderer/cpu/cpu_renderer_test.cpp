@@ -6,6 +6,8 @@
 
 #include "renderer/core/error.h"
 #include "renderer/generate/orbitals.h"
+#include "renderer/metrics/metrics.h"
+#include "renderer/reference/render.h"
 #include "renderer/renderer.h"
 #include "tests/support/volumes.h"
 
@@ -242,20 +244,24 @@ TEST(CpuRenderer, SpendsNothingOnChannelsThatCannotBeSeen) {
 }
 
 TEST(CpuRenderer, EstimatesTheErrorThatIsThere) {
-  // Against a picture of 64 times the samples; over 1850 pixels the two agree to a few percent.
+  // Over 1850 pixels, estimate and true error agree to a few percent: independent samples, and replicates
+  // of dependent ones.
   const auto volume = orbitals();
-  const Scene scene = orbitalScene(*volume);
-  const auto renderer = makeCpuRenderer(volume, 2);
-  renderer->setScene(scene);
-  for (int i = 0; i < 16; ++i) renderer->renderSample(kNever);
-  Scene other = scene;
-  other.seed = 99;
-  const Image truth = render(volume, other, 1024, 2), found = renderer->image();
-  double squares = 0;
-  for (std::size_t i = 0; i < truth.pixels.size(); ++i)
-    for (int c = 0; c < 3; ++c) squares += std::pow(double(found.pixels[i][c] - truth.pixels[i][c]), 2);
-  const double rmse = std::sqrt(squares / (3.0 * double(truth.pixels.size())));
-  EXPECT_NEAR(renderer->estimatedError() / rmse, 1, 0.1);
+  Scene scene = orbitalScene(*volume);
+  scene.filter = PixelFilter::point;  // where the reference is exact
+  const Image truth = reference::renderReference(*volume, scene, 1).image;
+  const auto ratioAt = [&](Sampling sampling, int samples) {
+    scene.sampling = sampling;
+    const auto renderer = makeCpuRenderer(volume, 2);
+    renderer->setScene(scene);
+    for (int i = 0; i < samples; ++i) renderer->renderSample(kNever);
+    return renderer->estimatedError() / compareImages(renderer->image(), truth).rmse;
+  };
+  EXPECT_NEAR(ratioAt(Sampling::independent, 16), 1, 0.1);
+  EXPECT_NEAR(ratioAt(Sampling::lowDiscrepancy, 1024), 1, 0.1);
+  EXPECT_NEAR(ratioAt(Sampling::lowDiscrepancy, 1024 + 40), 1, 0.1);
+  // Too few replicates: more error is claimed than there is, never less.
+  EXPECT_GT(ratioAt(Sampling::lowDiscrepancy, 64), 1);
   EXPECT_TRUE(std::isnan(makeCpuRenderer(volume, 1)->estimatedError()));
 }
 

@@ -60,10 +60,11 @@ struct Replicates {
 };
 Replicates replicate(const std::shared_ptr<const Volume>& volume, Scene scene, Method method) {
   constexpr int kReplicates = 64, kSamples = 8;
+  scene.method = method;
   Replicates result;
   for (int r = 0; r < kReplicates; ++r) {
     scene.seed = std::uint32_t(1000 + r);
-    const Image image = renderAnalog(volume, scene, method, kSamples);
+    const Image image = renderSamples(volume, scene, kSamples);
     result.mean.resize(image.pixels.size(), glm::dvec4(0));
     result.varianceOfMean.resize(image.pixels.size(), glm::dvec4(0));
     for (std::size_t i = 0; i < image.pixels.size(); ++i) {
@@ -133,10 +134,11 @@ TEST_P(LitTrackers, AreApproachedByTheMarcherAsItsStepShrinks) {
   const auto volume = lumpyVolume();
   for (const bool lit : {false, true}) {
     Scene scene = litScene(*volume, GetParam(), lit, lit);
+    scene.method = Method::raymarch;
     const Image expected = reference::renderReference(*volume, scene, 1).image;
     const auto errorAt = [&](double step) {
       scene.step = step;
-      return compareImages(renderAnalog(volume, scene, Method::raymarch, 96), expected).rmse;
+      return compareImages(renderSamples(volume, scene, 96), expected).rmse;
     };
     const double coarse = errorAt(2), middle = errorAt(1), fine = errorAt(0.25);
     // The jittered mean converges with order 2 where the integrand is smooth; the jitter's own noise, of 96

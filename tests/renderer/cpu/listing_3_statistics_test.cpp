@@ -65,7 +65,7 @@ Image render(const std::shared_ptr<const Volume>& volume, const Scene& scene, in
   for (int s = 0; s < samples; ++s) {
     const kernel::RenderPixel<kernel::Analog<Tracker>, kernel::BlendDensity,
                               kernel::LightFeatures<false, false>>
-        pixel{plan.view(), std::uint32_t(s), pass.data(), nullptr};
+        pixel{plan.view(), {std::uint32_t(s), false, {}}, pass.data(), nullptr};
     for (int i = 0; i < int(pass.size()); ++i) {
       pixel(i);
       sum.pixels[std::size_t(i)] += pass[std::size_t(i)] / float(samples);

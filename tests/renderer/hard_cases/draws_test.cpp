@@ -137,7 +137,8 @@ TEST(Counters, StayDifferentWhereCountersWrapAround) {
   for (const std::uint32_t pixel : ends)
     for (const std::uint32_t sample : ends)
       for (const std::uint32_t seed : ends) {
-        Sampler sampler(pixel, sample, seed);
+        const SampleNumber number{sample, false, {}};
+        Sampler sampler(pixel, number, seed);
         for (int block = 0; block < 4; ++block) {
           const RandomBlock r = sampler.next();
           seen.push_back({r.x, r.y, r.z, r.w});

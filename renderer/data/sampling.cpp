@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/data/sampling.h"
+
+#include <array>
+
+namespace scolopax {
+namespace {
+
+/// A primitive polynomial over GF(2), inner coefficients as bits, and the first odd numbers m_i.
+struct Polynomial {
+  int degree;
+  std::uint32_t inner;
+  std::uint32_t m[5];
+};
+constexpr Polynomial kPolynomials[] = {
+    {1, 0, {1}},          {2, 1, {1, 3}},        {3, 1, {1, 3, 1}},        {3, 2, {1, 1, 1}},
+    {4, 1, {1, 1, 3, 3}}, {4, 4, {1, 3, 5, 13}}, {5, 2, {1, 1, 5, 5, 17}}, {5, 4, {1, 1, 5, 5, 5}}};
+static_assert(std::size(kPolynomials) + 1 == kSobolDimensions);
+
+/// What bit k of the index adds to each coordinate.
+using Columns = std::array<std::array<std::uint32_t, 32>, kSobolDimensions>;
+constexpr Columns kColumns = [] {
+  Columns columns{};
+  for (int k = 0; k < 32; ++k) columns[0][std::size_t(k)] = 1u << (31 - k);
+  for (int d = 1; d < kSobolDimensions; ++d) {
+    const Polynomial& p = kPolynomials[d - 1];
+    auto& column = columns[std::size_t(d)];
+    for (int k = 0; k < 32; ++k) {
+      std::uint32_t& v = column[std::size_t(k)];
+      if (k < p.degree) {
+        v = p.m[k] << (31 - k);
+        continue;
+      }
+      v = column[std::size_t(k - p.degree)] ^ (column[std::size_t(k - p.degree)] >> p.degree);
+      for (int j = 1; j < p.degree; ++j)
+        if ((p.inner >> (p.degree - 1 - j)) & 1) v ^= column[std::size_t(k - j)];
+    }
+  }
+  return columns;
+}();
+
+/// The sequence's dimensions of a block's words, the best ones where most depends on them: the place in the
+/// pixel, then the first collision.
+constexpr int kDimensions[kernel::kLowDiscrepancyBlocks][3] = {{0, 1, 8}, {2, 3, 4}, {5, 6, 7}};
+
+}  // namespace
+
+std::uint32_t sobol(int dimension, std::uint32_t index) {
+  std::uint32_t coordinate = 0;
+  for (std::size_t k = 0; index != 0; index >>= 1, ++k)
+    if (index & 1) coordinate ^= kColumns[std::size_t(dimension)][k];
+  return coordinate;
+}
+
+kernel::SampleNumber sampleNumber(Sampling sampling, std::uint32_t sample) {
+  kernel::SampleNumber number{sample, sampling == Sampling::lowDiscrepancy, {}};
+  for (std::uint32_t block = 0; block < kernel::kLowDiscrepancyBlocks; ++block)
+    for (int i = 0; i < 3; ++i)
+      number.point[block][i] =
+          kernel::reverseBits(sobol(kDimensions[block][i], sample % kernel::kReplicateSamples));
+  return number;
+}
+
+}  // namespace scolopax

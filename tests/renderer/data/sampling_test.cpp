@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/data/sampling.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+namespace scolopax {
+namespace {
+
+using kernel::kReplicateSamples;
+using kernel::RandomBlock;
+using kernel::Sampler;
+
+/// The words of the first blocks of one sample of one pixel.
+std::vector<std::uint32_t> words(std::uint32_t pixel, std::uint32_t sample, std::uint32_t seed = 7) {
+  const kernel::SampleNumber number = sampleNumber(Sampling::lowDiscrepancy, sample);
+  Sampler sampler(pixel, number, seed);
+  std::vector<std::uint32_t> all;
+  for (std::uint32_t block = 0; block < kernel::kLowDiscrepancyBlocks; ++block) {
+    const RandomBlock random = sampler.next();
+    all.insert(all.end(), {random.x, random.y, random.z});
+  }
+  return all;
+}
+
+TEST(Sobol, BeginsAsPublished) {
+  // The first points in two dimensions, as every text on the sequence prints them.
+  const double expected[8][2] = {{0, 0},         {0.5, 0.5},     {0.25, 0.75},   {0.75, 0.25},
+                                 {0.125, 0.625}, {0.625, 0.125}, {0.375, 0.375}, {0.875, 0.875}};
+  for (std::uint32_t i = 0; i < 8; ++i)
+    for (int d = 0; d < 2; ++d) EXPECT_EQ(double(sobol(d, i)) * 0x1p-32, expected[i][d]) << i << " " << d;
+}
+
+TEST(Sobol, EveryCoordinateVisitsEveryInterval) {
+  // Of the first 2^m points one lies in each of the 2^m intervals of a coordinate: fails for any m_i or
+  // polynomial that is not a proper one.
+  for (int d = 0; d < kSobolDimensions; ++d)
+    for (const std::uint32_t m : {1u, 4u, 10u}) {
+      std::vector<int> counts(1u << m);
+      for (std::uint32_t i = 0; i < 1u << m; ++i) ++counts[sobol(d, i) >> (32 - m)];
+      EXPECT_EQ(std::count(counts.begin(), counts.end(), 1), 1 << m) << "dimension " << d << " m " << m;
+    }
+}
+
+TEST(Sobol, CoordinatesAreNotCopiesOfEachOther) {
+  // Two that use one polynomial or one set of m_i twice would lie on a line; these fill cells of 1/16.
+  for (int a = 0; a < kSobolDimensions; ++a)
+    for (int b = 0; b < a; ++b) {
+      std::map<std::uint32_t, int> cells;
+      for (std::uint32_t i = 0; i < 1024; ++i) ++cells[(sobol(a, i) >> 28) * 16 + (sobol(b, i) >> 28)];
+      EXPECT_EQ(cells.size(), 256u) << a << " and " << b;
+    }
+}
+
+TEST(Sampling, SpreadsEveryWordOfAReplicateEvenly) {
+  for (const std::uint32_t pixel : {0u, 1u, 99999u})
+    for (const std::uint32_t replicate : {0u, 1u, 5000u}) {
+      std::vector<std::vector<int>> counts(9, std::vector<int>(kReplicateSamples));
+      std::vector<int> places(kReplicateSamples);
+      for (std::uint32_t i = 0; i < kReplicateSamples; ++i) {
+        const auto w = words(pixel, replicate * kReplicateSamples + i);
+        for (std::size_t d = 0; d < w.size(); ++d) ++counts[d][w[d] >> 26];
+        ++places[(w[0] >> 29) * 8 + (w[1] >> 29)];
+      }
+      for (const auto& one : counts) EXPECT_EQ(std::count(one.begin(), one.end(), 1), 64);
+      // The place in the pixel: one sample in every cell of 1/8 x 1/8.
+      EXPECT_EQ(std::count(places.begin(), places.end(), 1), 64);
+    }
+}
+
+TEST(Sampling, LeavesEverySampleUniform) {
+  // Over pixels, and over replicates of one pixel, the word of a fixed sample is uniform: what makes the
+  // estimator unbiased. Chi-square with 255 degrees of freedom exceeds 347 with probability 1e-4; 36 tables.
+  for (const std::uint32_t sample : {0u, 37u})
+    for (const bool overPixels : {true, false}) {
+      std::vector<std::vector<int>> counts(9, std::vector<int>(256));
+      constexpr int kDraws = 1 << 15;
+      for (std::uint32_t i = 0; i < kDraws; ++i) {
+        const auto w = overPixels ? words(i, sample) : words(3, i * kReplicateSamples + sample);
+        for (std::size_t d = 0; d < w.size(); ++d) ++counts[d][w[d] >> 24];
+      }
+      for (const auto& one : counts) {
+        double chiSquare = 0;
+        for (const int c : one) chiSquare += std::pow(c - kDraws / 256.0, 2) / (kDraws / 256.0);
+        EXPECT_LT(chiSquare, 347) << "sample " << sample
+                                  << (overPixels ? " over pixels" : " over replicates");
+      }
+    }
+}
+
+/// Correlation of two lists of words; for independent uniform ones its standard deviation is 1/sqrt(size).
+double correlation(const std::vector<std::uint32_t>& a, const std::vector<std::uint32_t>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    sum += 12 * (double(a[i]) * 0x1p-32 - 0.5) * (double(b[i]) * 0x1p-32 - 0.5);
+  return sum / double(a.size());
+}
+
+TEST(Sampling, IsIndependentBetweenPixelsReplicatesSeedsAndWords) {
+  constexpr std::uint32_t kDraws = 1 << 14;
+  const double limit = 5.0 / std::sqrt(double(kDraws));  // 5 sigma: 6e-7 each, 36 comparisons
+  for (std::size_t d = 0; d < 9; ++d) {
+    std::vector<std::uint32_t> here, right, later, otherSeed, otherWord;
+    for (std::uint32_t i = 0; i < kDraws; ++i) {
+      here.push_back(words(2 * i, 5)[d]);
+      right.push_back(words(2 * i + 1, 5)[d]);
+      later.push_back(words(2 * i, 5 + kReplicateSamples)[d]);
+      otherSeed.push_back(words(2 * i, 5, 8)[d]);
+      otherWord.push_back(words(2 * i, 5)[(d + 1) % 9]);
+    }
+    EXPECT_LT(std::abs(correlation(here, right)), limit) << "word " << d;
+    EXPECT_LT(std::abs(correlation(here, later)), limit) << "word " << d;
+    EXPECT_LT(std::abs(correlation(here, otherSeed)), limit) << "word " << d;
+    EXPECT_LT(std::abs(correlation(here, otherWord)), limit) << "word " << d;
+  }
+}
+
+TEST(Sampling, OfIndependentDrawsIsPlainCounting) {
+  const kernel::SampleNumber number = sampleNumber(Sampling::independent, 70);
+  Sampler sampler(11, number, 3);
+  for (std::uint32_t block = 0; block < 5; ++block) {
+    const RandomBlock found = sampler.next(), expected = kernel::pcg4d(11, 70, block, 3);
+    EXPECT_EQ(found.x, expected.x);
+    EXPECT_EQ(found.w, expected.w);
+  }
+}
+
+}  // namespace
+}  // namespace scolopax
