@@ -4,12 +4,16 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/problem.h"
+#include "renderer/core/short_text.h"
 #include "server/api.h"
 
 namespace scolopax::server {
 namespace {
 
 using protocol::ProtocolError;
+
+/// How long a pass goes on before it is asked whether anybody still waits for the picture.
+constexpr std::chrono::nanoseconds kSlice = std::chrono::milliseconds(100);
 
 /// A place among the renders that may run at once.
 class RenderPlace {
@@ -46,9 +50,8 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
   const double limit = context.config.maxRenderSeconds;
   const auto scene = context.renderResolver.replace(jsonBody(request, context.config));
   if (scene->stop.seconds > limit)
-    throw ProtocolError(
-        422, "/stop/seconds",
-        "expected at most " + std::to_string(limit) + ", found " + std::to_string(scene->stop.seconds));
+    throw ProtocolError(422, "/stop/seconds",
+                        "expected at most " + shortText(limit) + ", found " + shortText(scene->stop.seconds));
   const RenderPlace place(running, context.config.maxRenders);
 
   const auto begin = std::chrono::steady_clock::now();
@@ -63,13 +66,15 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
     const bool timed = scene->stop.seconds > 0 && renderer->samples() > 0;
     const double until = timed ? std::min(scene->stop.seconds, limit) : limit;
     const auto budget = std::chrono::duration<double>(std::max(until - seconds(), 0.0));
-    if (renderer->renderSample(context.cutting, std::chrono::duration_cast<std::chrono::nanoseconds>(budget)))
-      continue;
+    const auto slice = std::min(std::chrono::duration_cast<std::chrono::nanoseconds>(budget), kSlice);
+    if (renderer->renderSample(context.cutting, slice)) continue;
     if (context.cutting) throw ProtocolError(503, "", "the server is stopping");
+    if (request.gone && *request.gone) throw ProtocolError(503, "", "the client has gone");
+    if (seconds() < until) continue;
     if (timed && until < limit) break;
     // A picture that depends on the machine's speed is only for those who asked for it.
     throw ProtocolError(422, "/stop",
-                        "expected to end within " + std::to_string(limit) + " seconds, found " +
+                        "expected to end within " + shortText(limit) + " seconds, found " +
                             std::to_string(renderer->samples()) +
                             " samples done by then; ask for less, or set stop.seconds");
   }

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "renderer/core/error.h"
+#include "renderer/core/short_text.h"
 #include "renderer/kernel/classify.h"
 
 namespace scolopax {
@@ -34,7 +35,7 @@ void checkPositions(const std::vector<Knot>& knots, const char* what) {
     if (!(knot.position >= last && knot.position <= 1))
       throw Error(ErrorCode::badInput, std::string(what) +
                                            ": positions must lie in [0,1] and not decrease, found " +
-                                           std::to_string(knot.position));
+                                           shortText(knot.position));
     last = knot.position;
   }
 }
@@ -58,8 +59,7 @@ TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearan
                                          "': weight and material must not be negative, shininess above 0");
   for (const OpacityKnot& knot : a.opacity) {
     if (!(knot.value >= 0 && knot.value <= 1))
-      throw Error(ErrorCode::badInput,
-                  "opacity: values must lie in [0,1], found " + std::to_string(knot.value));
+      throw Error(ErrorCode::badInput, "opacity: values must lie in [0,1], found " + shortText(knot.value));
     opacity_.positions.push_back(float(knot.position));
     opacity_.values.push_back(float(knot.value));
   }

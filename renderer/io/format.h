@@ -21,6 +21,7 @@ using Warn = std::function<void(const std::string&)>;
 struct LoadedFile {
   Grid grid;
   std::vector<ChannelSource> channels;
+  std::filesystem::path dataFile;  ///< where the voxels are, when the file is only their header; else empty
 };
 
 struct Format {
@@ -42,12 +43,13 @@ LoadedFile loadFile(const std::filesystem::path& path, std::uint64_t memoryLimit
 /// A data set: files whose grids agree become the channels of one volume, in the order given.
 struct LoadedDataset {
   std::string id;     ///< slug of the first file's stem, made unique among the data sets by a suffix
-  std::string title;  ///< the first file's name
+  std::string title;  ///< the first file's name, and how many more there are: "a.nrrd +2"
   std::vector<std::filesystem::path> files;
   std::shared_ptr<const Volume> volume;
 };
 
-/// Loads the files and groups those whose grids agree (sameGrid), keeping the order of first appearance.
+/// Loads the files and groups those whose grids agree (sameGrid), keeping the order of first appearance. A
+/// file whose header is among them is loaded with that alone.
 std::vector<LoadedDataset> loadDatasets(std::span<const std::filesystem::path> paths,
                                         std::uint64_t memoryLimitBytes, const Warn& warn);
 

@@ -35,6 +35,17 @@ std::string slugOf(const std::string& text) {
   return slug.empty() ? "volume" : slug;
 }
 
+bool isHeader(const fs::path& path) {
+  return std::ranges::any_of(std::array{".hdr", ".hdr.gz", ".nhdr", ".dat", ".ivf"},
+                             [&](const char* ending) { return hasEnding(path, ending); });
+}
+
+bool isAmong(const std::vector<fs::path>& files, const fs::path& path) {
+  std::error_code ignored;
+  return std::ranges::any_of(files,
+                             [&](const fs::path& file) { return fs::equivalent(file, path, ignored); });
+}
+
 /// Files of one grid while they are gathered.
 struct Group {
   Grid grid;
@@ -59,13 +70,25 @@ LoadedFile loadFile(const fs::path& path, std::uint64_t memoryLimitBytes, const 
 
 std::vector<LoadedDataset> loadDatasets(std::span<const fs::path> paths, std::uint64_t memoryLimitBytes,
                                         const Warn& warn) {
-  std::vector<Group> groups;
+  // Headers first: they tell which of the other files are theirs.
+  std::vector<LoadedFile> files(paths.size());
+  std::vector<fs::path> dataFiles;
   std::uint64_t left = memoryLimitBytes;
-  for (const fs::path& path : paths) {
-    LoadedFile loaded = loadFile(path, left, warn);
-    for (const ChannelSource& channel : loaded.channels) {
-      left -= std::min<std::uint64_t>(left, channel.voxels.sizeBytes());
+  for (const bool headers : {true, false}) {
+    for (std::size_t i = 0; i < paths.size(); ++i) {
+      if (isHeader(paths[i]) != headers || isAmong(dataFiles, paths[i])) continue;
+      files[i] = loadFile(paths[i], left, warn);
+      if (!files[i].dataFile.empty()) dataFiles.push_back(files[i].dataFile);
+      for (const ChannelSource& channel : files[i].channels)
+        left -= std::min<std::uint64_t>(left, channel.voxels.sizeBytes());
     }
+  }
+
+  std::vector<Group> groups;
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    const fs::path& path = paths[i];
+    LoadedFile& loaded = files[i];
+    if (loaded.channels.empty()) continue;
     auto group = std::ranges::find_if(groups, [&](const Group& g) { return sameGrid(g.grid, loaded.grid); });
     if (group == groups.end()) group = groups.insert(groups.end(), Group{loaded.grid, {}, {}});
     const std::size_t channels = group->channels.size() + loaded.channels.size();
@@ -86,6 +109,7 @@ std::vector<LoadedDataset> loadDatasets(std::span<const fs::path> paths, std::ui
     std::string id = slug;
     for (int suffix = 2; taken(id); ++suffix) id = slug + "-" + std::to_string(suffix);
     std::string title = cleanText(group.files.front().filename().string());
+    if (group.files.size() > 1) title += " +" + std::to_string(group.files.size() - 1);
     try {
       auto volume = std::make_shared<const Volume>(group.grid, std::move(group.channels));
       datasets.push_back({std::move(id), std::move(title), std::move(group.files), std::move(volume)});

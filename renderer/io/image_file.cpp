@@ -43,6 +43,8 @@ Encoding prepare(const Image& image, glm::vec3 background, const std::string& ex
     encoding.spec = OIIO::ImageSpec(image.width, image.height, 4, OIIO::TypeFloat);
     encoding.spec.attribute("oiio:ColorSpace", "Linear");
     encoding.spec.attribute("compression", "zip");
+    // Else OpenImageIO writes the time of writing, and equal pictures would not be equal bytes.
+    encoding.spec.attribute("DateTime", "1970:01:01 00:00:00");
   } else {
     encoding.bytes = toSrgb8(image, background);
     encoding.spec = OIIO::ImageSpec(image.width, image.height, 3, OIIO::TypeUInt8);

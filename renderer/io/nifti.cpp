@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 
 #include "renderer/core/error.h"
+#include "renderer/core/short_text.h"
 #include "renderer/io/convert.h"
 #include "renderer/io/format.h"
 #include "renderer/io/text.h"
@@ -63,7 +64,7 @@ void setDataOffset(NiftiHeader& header, double offset, std::size_t headerBytes) 
   const double smallest = header.pair ? 0.0 : double(headerBytes) + 4;
   if (!(offset >= smallest && offset < 0x1p53 && offset == std::floor(offset))) {
     throw badField(header, "vox_offset", "a whole number, at least " + std::to_string(int(smallest)),
-                   std::to_string(offset));
+                   shortText(offset));
   }
   header.dataOffset = std::uint64_t(offset);
 }
@@ -330,7 +331,8 @@ LoadedFile loadNifti(const fs::path& path, std::uint64_t memoryLimitBytes, const
   LoadedFile loaded;
   loaded.grid = {layout.dims, worldFromVoxel(header, warn)};
   if (header.pair) {
-    ByteStream stream(isImage ? path : sibling(path, ".img"), ByteStream::Encoding::detect);
+    if (!isImage) loaded.dataFile = sibling(path, ".img");
+    ByteStream stream(isImage ? path : loaded.dataFile, ByteStream::Encoding::detect);
     loaded.channels = readChannels(stream, header.dataOffset, layout, memoryLimitBytes, warn);
   } else {
     loaded.channels = readChannels(headerStream, header.dataOffset, layout, memoryLimitBytes, warn);

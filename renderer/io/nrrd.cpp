@@ -345,6 +345,7 @@ LoadedFile loadNrrd(const fs::path& path, std::uint64_t memoryLimitBytes, const 
     offset = stream.largestSize() - layout.sizeBytes();
   }
   LoadedFile loaded;
+  if (data != path) loaded.dataFile = data;
   loaded.grid = grid;
   loaded.channels = readChannels(stream, offset, layout, memoryLimitBytes, warn);
   describeChannels(header, stemOf(path), loaded.channels);

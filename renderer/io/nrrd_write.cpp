@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // NRRD out (teem.sourceforge.net/nrrd/format.html): what nrrd.cpp reads back exactly, names included.
 #include <charconv>
-#include <fstream>
+#include <sstream>
 
 #include "renderer/core/error.h"
 #include "renderer/io/format.h"
+#include "renderer/io/output_file.h"
 #include "renderer/io/text.h"
 
 namespace scolopax::io {
@@ -81,14 +82,13 @@ void writeNrrd(const std::filesystem::path& path, const Grid& grid, std::span<co
                                            ": expected the first channel's type and the grid's size");
     }
   }
-  std::ofstream file(path, std::ios::binary);
-  writeHeader(file, grid, channels);
-  for (const ChannelSource& channel : channels) {
-    file.write(reinterpret_cast<const char*>(channel.voxels.data()),
-               std::streamsize(channel.voxels.sizeBytes()));
-  }
-  file.close();
-  if (!file) throw Error(ErrorCode::io, shown(path) + ": cannot be written");
+  std::ostringstream stream;
+  writeHeader(stream, grid, channels);
+  const std::string header = stream.str();
+  std::vector<std::string_view> parts{header};
+  for (const ChannelSource& channel : channels)
+    parts.emplace_back(reinterpret_cast<const char*>(channel.voxels.data()), channel.voxels.sizeBytes());
+  writeFile(path, parts);
 }
 
 }  // namespace scolopax::io

@@ -27,14 +27,16 @@ fs::path folderOf(const fs::path& path) {
 bool folderIsWritable(const fs::path& path) { return access(folderOf(path).c_str(), W_OK | X_OK) == 0; }
 
 /// Writes all of it to an open file and closes that. Returns the number of the error, 0 for none.
-int writeAndClose(int file, std::string_view bytes) {
+int writeAndClose(int file, std::span<const std::string_view> parts) {
   int error = 0;
-  while (!bytes.empty() && error == 0) {
-    const ssize_t count = ::write(file, bytes.data(), bytes.size());
-    if (count >= 0)
-      bytes.remove_prefix(std::size_t(count));
-    else if (errno != EINTR)
-      error = errno;
+  for (std::string_view bytes : parts) {
+    while (!bytes.empty() && error == 0) {
+      const ssize_t count = ::write(file, bytes.data(), bytes.size());
+      if (count >= 0)
+        bytes.remove_prefix(std::size_t(count));
+      else if (errno != EINTR)
+        error = errno;
+    }
   }
   if (close(file) != 0 && error == 0) error = errno;  // network file systems tell only now
   return error;
@@ -54,7 +56,9 @@ void checkWritable(const fs::path& path) {
   }
 }
 
-void writeFile(const fs::path& path, std::string_view bytes) {
+void writeFile(const fs::path& path, std::string_view bytes) { writeFile(path, std::span(&bytes, 1)); }
+
+void writeFile(const fs::path& path, std::span<const std::string_view> parts) {
   checkWritable(path);
   std::error_code ignored;
   // Beside the file itself, not beside a link to it, which stays.
@@ -64,7 +68,7 @@ void writeFile(const fs::path& path, std::string_view bytes) {
   if (target.empty() || (exists && !S_ISREG(old.st_mode)) || !folderIsWritable(target)) {
     const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (file < 0) throw failed(path, errno);
-    if (const int error = writeAndClose(file, bytes)) throw failed(path, error);
+    if (const int error = writeAndClose(file, parts)) throw failed(path, error);
     return;
   }
   const fs::path temporary = folderOf(target) / (".scolopax-" + std::to_string(getpid()) + ".part");
@@ -72,7 +76,7 @@ void writeFile(const fs::path& path, std::string_view bytes) {
   if (file < 0) throw failed(path, errno);
   if (exists) [[maybe_unused]]
     const int kept = fchmod(file, old.st_mode & 07777);
-  int error = writeAndClose(file, bytes);
+  int error = writeAndClose(file, parts);
   if (error == 0 && rename(temporary.c_str(), target.c_str()) != 0) error = errno;
   if (error == 0) return;
   unlink(temporary.c_str());

@@ -2,6 +2,7 @@
 // Files on their way out: whole or not at all.
 #pragma once
 #include <filesystem>
+#include <span>
 #include <string_view>
 
 namespace scolopax::io {
@@ -13,5 +14,7 @@ void checkWritable(const std::filesystem::path& path);
 /// Writes a file under a temporary name beside `path` and renames it, so that `path` never holds a half of
 /// it; pipes, devices and files in folders that cannot be written to are written directly. Throws Error(io).
 void writeFile(const std::filesystem::path& path, std::string_view bytes);
+/// The same for bytes that lie apart: one part after the other.
+void writeFile(const std::filesystem::path& path, std::span<const std::string_view> parts);
 
 }  // namespace scolopax::io

@@ -220,6 +220,7 @@ LoadedFile loadRaw(const fs::path& path, std::uint64_t memoryLimitBytes, const W
                                          std::to_string(stream.largestSize()));
   }
   LoadedFile loaded;
+  if (raw.data != path) loaded.dataFile = raw.data;
   loaded.channels = readChannels(stream, raw.byteOffset, raw.layout, memoryLimitBytes, warn);
   if (!raw.mayHoldMore && !stream.atEnd()) {
     throw Error(ErrorCode::badInput, file + ": " + raw.layout.description() + ": expected data of " +

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "renderer/core/error.h"
+#include "renderer/core/short_text.h"
 #include "renderer/data/colormap.h"
 #include "renderer/metrics/metrics.h"
 
@@ -206,7 +207,7 @@ Flip flipDifference(const Image& a, const Image& b, double pixelsPerDegree) {
   checkComparable(a, b);
   if (!(pixelsPerDegree >= 1 && pixelsPerDegree <= 1000))
     throw Error(ErrorCode::badInput,
-                "flip: pixels per degree must be from 1 to 1000, found " + std::to_string(pixelsPerDegree));
+                "flip: pixels per degree must be from 1 to 1000, found " + shortText(pixelsPerDegree));
   const Planes planesA = ycxczOf(a), planesB = ycxczOf(b);
   const Features featuresA = detectFeatures(planesA, pixelsPerDegree),
                  featuresB = detectFeatures(planesB, pixelsPerDegree);

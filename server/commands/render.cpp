@@ -18,6 +18,7 @@
 #include "renderer/io/image_file.h"
 #include "renderer/io/output_file.h"
 #include "renderer/renderer.h"
+#include "server/commands/interrupt.h"
 #include "server/commands/validators.h"
 #include "server/dataset_store.h"
 #include "server/progressive_render.h"
@@ -134,7 +135,7 @@ void render(const Options& options) {
   const auto renderer = makeCpuRenderer(resolved->dataset->volume, options.threads);
   if (!options.stats.empty()) renderer->countCosts();
   const RebuildStats rebuild = renderer->setScene(resolved->render);
-  const std::atomic<bool> cancel = false;
+  const std::atomic<bool>& cancel = catchInterrupts();
   ProgressBar bar(stop);
   const auto start = Clock::now();
   double seconds = 0;
@@ -143,11 +144,17 @@ void render(const Options& options) {
     renderer->renderSample(cancel, std::chrono::milliseconds(100));
     seconds = std::chrono::duration<double>(Clock::now() - start).count();
     bar.show(renderer->samples(), seconds);
-    if (server::stopMet(stop, *renderer, seconds)) break;
+    if (cancel || server::stopMet(stop, *renderer, seconds)) break;
   }
   bar.clear();
+  if (cancel) {
+    fmt::print(stderr, "scolopax: interrupted after {} samples; {}\n", renderer->samples(),
+               renderer->samples() > 0 ? "the picture is written with these" : "no picture is written");
+    if (renderer->samples() == 0) endByInterrupt();
+  }
   io::writeImage(options.out, renderer->image(), resolved->render.background);
   if (!options.stats.empty()) writeStats(options.stats, *renderer, rebuild, seconds, *resolved);
+  if (cancel) endByInterrupt();
 }
 
 }  // namespace
@@ -172,11 +179,18 @@ CLI::App* addRenderCommand(CLI::App& root) {
       ->add_option("--set", o->assignments,
                    "Set a field of the scene, as channels.0.density=0.1; the value is JSON, else a string")
       ->allow_extra_args(false);
-  command->add_option("--threads", o->threads, "Threads to use; 0 takes all")->check(CLI::Range(0, 1024));
+  command->add_option("--threads", o->threads, "Threads to use; 0 takes all")
+      ->envname("SCOLOPAX_THREADS")
+      ->check(CLI::Range(0, 1024));
   command->add_option("--stats", o->stats, "Write counts and times as JSON");
   command->footer(
       "With several stop rules the first that is met ends the rendering; without any, the scene's (64 "
-      "samples).");
+      "samples).\n"
+      "Ctrl-C and SIGTERM end it as well: the picture is written as it stands, and the status is 130 or 143. "
+      "A "
+      "second one ends at once.");
+  // With one, CLI11 reads the environment when this command is parsed; without, whichever command runs.
+  command->parse_complete_callback([] {});
   command->callback([o] { render(*o); });
   return command;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/net/http_connection.h"
 
+#include <poll.h>
+
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/redirect_error.hpp>
@@ -30,6 +32,7 @@ using Parser = http::request_parser<http::string_body>;
 
 constexpr std::size_t kBufferSlack = 64 << 10;
 constexpr Milliseconds kLingerTime{2'000};
+constexpr Milliseconds kWatchInterval{100};
 
 auto into(error_code& error) { return asio::redirect_error(asio::use_awaitable, error); }
 
@@ -81,6 +84,39 @@ class SlowSlot {
  private:
   Core& core_;
   bool taken_;
+};
+
+/// While it lives, notices within kWatchInterval that the client has closed its end. Asked of the system:
+/// reading would take bytes of the next request.
+class ClientWatch {
+ public:
+  explicit ClientWatch(tcp::socket& socket) : state_(std::make_shared<State>(socket)) { State::wait(state_); }
+  ~ClientWatch() {
+    state_->alive = false;
+    state_->timer.cancel();
+  }
+  ClientWatch(const ClientWatch&) = delete;
+  ClientWatch& operator=(const ClientWatch&) = delete;
+  std::shared_ptr<const std::atomic<bool>> gone() const { return {state_, &state_->gone}; }
+
+ private:
+  struct State {
+    explicit State(tcp::socket& s) : socket(s), timer(s.get_executor()) {}
+    static void wait(const std::shared_ptr<State>& state) {
+      state->timer.expires_after(kWatchInterval);
+      state->timer.async_wait([state](const error_code&) {
+        if (!state->alive) return;
+        pollfd asked{state->socket.native_handle(), POLLRDHUP, 0};
+        state->gone = poll(&asked, 1, 0) > 0;
+        if (!state->gone) wait(state);
+      });
+    }
+    tcp::socket& socket;
+    asio::steady_timer timer;
+    bool alive = true;
+    std::atomic<bool> gone{false};
+  };
+  std::shared_ptr<State> state_;
 };
 
 bool isSafeHeader(const std::string& name, const std::string& value) {
@@ -249,13 +285,15 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     return response;
   }
 
-  awaitable<Response> handle(const Route& route, const Request& request) {
+  awaitable<Response> handle(const Route& route, Request& request) {
     if (route.kind == RouteKind::quick) {
       co_return co_await runOn<Response>(core_.workers,
                                          [&] { return core_.guarded(route.handler, request); });
     }
     const SlowSlot slot(core_);
     if (!slot.taken()) co_return withRetry(core_.problem(503, "Too many long requests at once."));
+    const ClientWatch watch(transport_.socket());
+    request.gone = watch.gone();
     co_return co_await runOn<Response>(core_.slowWorkers,
                                        [&] { return core_.guarded(route.handler, request); });
   }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // One HTTP request as handlers see it, already checked and decoded, and the response they return.
 #pragma once
+#include <atomic>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -26,6 +28,8 @@ struct Request {
   std::string body;                  ///< whole and within the limit; empty in authorize and upgrades
   std::vector<std::string> matches;  ///< regex groups of the route; [0] is the whole path
   std::string remoteAddress;         ///< numeric, without the port
+  /// For RouteKind::slow: becomes true when the client has closed without waiting for the answer. Else null.
+  std::shared_ptr<const std::atomic<bool>> gone;
 
   /// First header (query value) of that name, or nullptr.
   const std::string* header(std::string_view name) const;

@@ -171,6 +171,16 @@ TEST(Api, EndsARenderWhenTheServerStops) {
   EXPECT_EQ(api.call("GET", "/healthz").status, 200);
 }
 
+TEST(Api, NamesALimitInFewDigits) {
+  Api api;
+  try {
+    api.call("POST", "/api/v1/render", R"({"stop": {"seconds": 1e300}, "image": {"width": 9, "height": 9}})");
+    FAIL() << "was not refused";
+  } catch (const ProtocolError& error) {
+    EXPECT_STREQ(error.what(), "expected at most 60, found 1e+300");
+  }
+}
+
 TEST(Api, EditsASessionsScene) {
   Api api;
   const auto created = api.call("POST", "/api/v1/sessions", R"({"scene": {"integrator": {"seed": 3}}})");

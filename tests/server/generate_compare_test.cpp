@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -53,6 +55,22 @@ class Commands : public testing::Test {
 
   std::filesystem::path folder_;
 };
+
+TEST_F(Commands, GenerateLeavesTheFileBeforeWhenItCannotWriteAll) {
+  const std::string file = path("a.nrrd");
+  std::ofstream(file) << "before";
+  rlimit before;
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit small = before;
+  small.rlim_cur = 1024;  // as a disk that runs full
+  setrlimit(RLIMIT_FSIZE, &small);
+  EXPECT_THROW(run({"generate", "orbitals", file, "--size", "8"}), Error);
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_EQ(std::filesystem::file_size(file), 6u);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), 1);
+}
 
 TEST_F(Commands, CompareTellsHowFarPicturesAreApart) {
   const std::string a = writePicture("a.exr", 3, {0.5f, 0.5f, 0.5f, 1}),

@@ -5,7 +5,6 @@ that is slow. Only counts decide, no times; the volume is serving.py's: channel 
 import asyncio
 import json
 import os
-import re
 import sys
 import unittest
 
@@ -20,7 +19,6 @@ FIXTURES = os.path.join(os.path.dirname(__file__), "..", "..", "protocol", "fixt
 SMALL = {"width": 64, "height": 48}
 ENDLESS = {"samples": 1 << 24}
 PICTURES = {"image/jpeg": b"\xff\xd8\xff", "image/png": b"\x89PNG\r\n\x1a\n", "image/x-exr": b"\x76\x2f\x31\x01"}
-EXR_DATE = re.compile(rb"capDate\0string\0\x13\0\0\0.{19}", re.DOTALL)  # when it was made, to the second
 server = None
 
 
@@ -164,8 +162,7 @@ class Rendering(unittest.TestCase):
                 self.assertEqual((headers["Scolopax-Samples"], headers["Scolopax-Seed"], headers["Scolopax-Method"]),
                                  ("3", "5", "sync-dda"))
                 self.assertGreater(float(headers["Scolopax-Error"]), 0)
-            first, second = (EXR_DATE.sub(b"", body) for _, _, body in answers)
-            self.assertEqual(first, second, kind)
+            self.assertEqual(answers[0][2], answers[1][2], kind)
             self.assertEqual(answers[0][1]["Scolopax-Scene"], answers[1][1]["Scolopax-Scene"])
         headers = call(server, "POST", "/api/v1/render", self.SCENE, accept=None)[1]
         self.assertEqual(headers["Content-Type"], "image/jpeg")

@@ -5,6 +5,7 @@ import asyncio
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -106,8 +107,15 @@ class CommandLine(unittest.TestCase):
             for arguments in (["generate", "orbitals", volume, "--size", "4"], ["info", volume],
                               ["render", "--data", volume, "-o", picture, "--samples", "1"],
                               ["compare", picture, picture]):
-                result = run(*arguments, environment=bad)
+                used = bad if arguments[0] != "render" else {**bad, "SCOLOPAX_THREADS": "1"}
+                result = run(*arguments, environment=used)
                 self.assertEqual((result.returncode, result.stderr), (0, ""), arguments)
+            # The flag wins over the environment.
+            render = ["render", "--data", volume, "-o", picture, "--samples", "1"]
+            result = run(*render, environment={"SCOLOPAX_THREADS": "abc"})
+            self.assertEqual(result.returncode, 2)
+            self.assertIn("SCOLOPAX_THREADS", result.stderr)
+            self.assertEqual(run(*render, "--threads", "1", environment={"SCOLOPAX_THREADS": "abc"}).returncode, 0)
         for name, value in bad.items():
             result = self.run_serve("x.nrrd", environment={name: value})
             self.assertEqual(result.returncode, 2)
@@ -141,6 +149,50 @@ class CommandLine(unittest.TestCase):
                 self.assertIn(place, result.stderr)
                 self.assertNotIn("brain.nrrd", result.stderr)
             self.assertEqual(os.listdir(folder), [])
+
+    def wait_until_it_catches(self, process, how):
+        while process.poll() is None:
+            with open(f"/proc/{process.pid}/status", encoding="utf-8") as file:
+                caught = next(line for line in file if line.startswith("SigCgt"))
+            if int(caught.split()[1], 16) >> (how - 1) & 1:
+                return
+            threading.Event().wait(0.02)
+        self.fail(process.communicate()[1])
+
+    def test_a_signal_ends_a_render_with_the_picture_as_it_stands(self):
+        for how in (signal.SIGINT, signal.SIGTERM):
+            with tempfile.TemporaryDirectory() as folder:
+                picture, stats = os.path.join(folder, "a.png"), os.path.join(folder, "s.json")
+                process = subprocess.Popen(
+                    [PROGRAM, "render", "--data", *write_volume(folder), "-o", picture, "--stats", stats, "--seconds", "600",
+                     "--set", "image.width=16", "--set", "image.height=16"], stderr=subprocess.PIPE, text=True)
+                self.wait_until_it_catches(process, how)
+                threading.Event().wait(0.5)
+                process.send_signal(how)
+                _, said = process.communicate(timeout=60)
+                self.assertEqual(process.returncode, -how, said)
+                with open(stats, encoding="utf-8") as file:
+                    samples = json.load(file)["samples"]
+                self.assertGreater(samples, 0)
+                self.assertIn(f"interrupted after {samples} samples", said)
+                with open(picture, "rb") as file:
+                    self.assertTrue(file.read().startswith(b"\x89PNG"))
+
+    def test_a_signal_before_the_first_sample_leaves_no_picture(self):
+        with tempfile.TemporaryDirectory() as folder:
+            picture = os.path.join(folder, "a.png")
+            with open(picture, "w", encoding="utf-8") as file:
+                file.write("before")
+            process = subprocess.Popen(
+                [PROGRAM, "render", "--data", *write_volume(folder, size=32), "-o", picture, "--threads", "1",
+                 "--set", "image.width=4096", "--set", "image.height=4096"], stderr=subprocess.PIPE, text=True)
+            self.wait_until_it_catches(process, signal.SIGINT)
+            process.send_signal(signal.SIGINT)
+            _, said = process.communicate(timeout=60)
+            self.assertEqual(process.returncode, -signal.SIGINT)
+            self.assertIn("no picture is written", said)
+            with open(picture, encoding="utf-8") as file:
+                self.assertEqual(file.read(), "before")
 
     def test_a_number_out_of_range_is_said_in_few_digits(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -258,6 +310,28 @@ class Http(unittest.TestCase):
         self.assertNotEqual(other, picture)
         self.assertEqual(self.server.call("DELETE", path)[0], 204)
         self.assertEqual(self.problem("GET", path)[0], 404)
+
+    def test_a_render_ends_when_its_client_goes(self):
+        endless = json.dumps({"stop": {"seconds": 60}, "image": {"width": 100, "height": 100}}).encode()
+        head = (f"POST /api/v1/render HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {self.server.token}\r\n"
+                f"Content-Type: application/json\r\nContent-Length: {len(endless)}\r\n\r\n").encode()
+        clients = [socket.create_connection(("127.0.0.1", self.server.port)) for _ in range(2)]
+        for client in clients:
+            client.sendall(head + endless)
+        call = ("POST", "/api/v1/render", RENDER)
+        for _ in range(600):
+            if self.server.call(*call)[0] == 503:  # both places are taken
+                break
+            threading.Event().wait(0.05)
+        else:
+            self.fail("the renders never began")
+        for client in clients:
+            client.close()
+        for _ in range(200):
+            if self.server.call(*call)[0] == 200:
+                return
+            threading.Event().wait(0.05)
+        self.fail("the renders go on")
 
     def test_sessions_are_limited(self):
         made = [self.server.json("POST", "/api/v1/sessions", {"scene": RENDER})[1]["id"] for _ in range(3)]

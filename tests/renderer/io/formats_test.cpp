@@ -22,7 +22,7 @@ TEST(LoadDatasets, FilesOfOneGridBecomeOneDataSetInOrderOfAppearance) {
   const auto datasets = loadDatasets(paths, kTestLimit, {});
   ASSERT_EQ(datasets.size(), 2u);
   EXPECT_EQ(datasets[0].id, "b-2x2x2-uint8");
-  EXPECT_EQ(datasets[0].title, "b_2x2x2_uint8.raw");
+  EXPECT_EQ(datasets[0].title, "b_2x2x2_uint8.raw +1");
   EXPECT_THAT(datasets[0].files, ElementsAre(paths[0], paths[2]));
   ASSERT_EQ(datasets[0].volume->channels().size(), 2u);
   EXPECT_EQ(datasets[0].volume->channels()[0].name, "b_2x2x2_uint8");
@@ -67,6 +67,34 @@ TEST(LoadDatasets, TheMemoryLimitHoldsForAllFilesTogether) {
   EXPECT_EQ(loadDatasets(paths, 128, {}).size(), 1u);
   EXPECT_THAT(errorOf([&] { loadDatasets(paths, 127, {}); }),
               HasSubstr("take 64 bytes of memory, the limit is 63 bytes"));
+}
+
+TEST(LoadDatasets, AFileGivenWithItsHeaderIsLoadedOnceWhicheverComesFirst) {
+  const TempDir folder;
+  const auto raw = cube(folder, "a", 2), other = cube(folder, "b", 2);
+  const auto dat =
+      writeBytes(folder / "a.dat", "ObjectFileName: a_2x2x2_uint8.raw\nFormat: UCHAR\nResolution: 2 2 2\n");
+  const auto nhdr = writeBytes(folder / "a.nhdr",
+                               "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n"
+                               "data file: a_2x2x2_uint8.raw\n");
+  for (const auto& header : {dat, nhdr}) {
+    for (const auto& paths : {std::vector{header, raw, other}, std::vector{raw, header, other},
+                              std::vector{raw, other, folder / "." / header.filename().string()}}) {
+      const auto datasets = loadDatasets(paths, 2 * 8, {});
+      ASSERT_EQ(datasets.size(), 1u);
+      EXPECT_EQ(datasets[0].volume->channels().size(), 2u);
+      EXPECT_EQ(datasets[0].files.size(), 2u);
+    }
+  }
+  // Twice the same file is meant: one may look at a channel in two ways.
+  EXPECT_EQ(loadDatasets(std::vector{raw, raw}, kTestLimit, {})[0].volume->channels().size(), 2u);
+}
+
+TEST(LoadDatasets, ADataSetOfSeveralFilesSaysSoInItsTitle) {
+  const TempDir folder;
+  const std::vector<std::filesystem::path> paths{cube(folder, "a", 2), cube(folder, "b", 2),
+                                                 cube(folder, "c", 2)};
+  EXPECT_EQ(loadDatasets(paths, kTestLimit, {})[0].title, "a_2x2x2_uint8.raw +2");
 }
 
 TEST(LoadDatasets, NoFilesAreNoDataSets) { EXPECT_TRUE(loadDatasets({}, kTestLimit, {}).empty()); }

@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
+#include <chrono>
 #include <csignal>
+#include <thread>
 
 #include "tests/renderer/io/io_test_support.h"
 
@@ -24,6 +26,11 @@ Image testImage() {
     image.pixels.emplace_back(alpha * 0.1234567f, alpha * float(i) * 0.3f, alpha * 1e-6f, alpha);
   }
   return image;
+}
+
+std::string contentOf(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 TEST(ImageFile, FloatFormatsComeBackBitForBit) {
@@ -65,6 +72,21 @@ TEST(ImageFile, JpegKeepsColourAtFullResolution) {
   for (std::size_t i = 0; i < back.pixels.size(); ++i) {
     EXPECT_NEAR(back.pixels[i].r, image.pixels[i].r, 0.15f);
     EXPECT_NEAR(back.pixels[i].g, image.pixels[i].g, 0.15f);
+  }
+}
+
+TEST(ImageFile, EqualPicturesAreEqualBytesWheneverTheyAreWritten) {
+  const TempDir folder;
+  const std::vector<std::string> names{"a.png", "a.jpg", "a.exr", "a.tif"};
+  std::vector<std::string> before;
+  for (const std::string& name : names) {
+    writeImage(folder / name, testImage(), glm::vec3(0));
+    before.push_back(contentOf(folder / name));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // dates in files are to the second
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    writeImage(folder / names[i], testImage(), glm::vec3(0));
+    EXPECT_TRUE(contentOf(folder / names[i]) == before[i]) << names[i];
   }
 }
 

@@ -396,6 +396,12 @@ TEST(NiftiFiles, PairsNeedBothFiles) {
   writeBytes(folder / "a.img.gz", gzipped(bytesOf(voxels)));
   EXPECT_EQ(valuesOf(loadFile(folder / "a.hdr", kTestLimit, {}).channels[0]), asDoubles(voxels));
   EXPECT_EQ(valuesOf(loadFile(folder / "a.img.gz", kTestLimit, {}).channels[0]), asDoubles(voxels));
+  for (const auto& paths : {std::vector{folder / "a.hdr", folder / "a.img.gz"},
+                            std::vector{folder / "a.img.gz", folder / "a.hdr"}}) {
+    const auto datasets = loadDatasets(paths, kTestLimit, {});
+    ASSERT_EQ(datasets.size(), 1u);
+    EXPECT_EQ(datasets[0].volume->channels().size(), 1u);
+  }
   writeBytes(folder / "b.img", "x");
   EXPECT_THAT(loadError(folder / "b.img"), HasSubstr("expected the other file of the pair"));
 }

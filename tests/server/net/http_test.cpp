@@ -427,6 +427,37 @@ TEST_F(HttpTest, LongRequestsNeitherDelayOthersNorGrowWithoutBound) {
   EXPECT_EQ(third.request("GET /poll HTTP/1.1").status, 200);
 }
 
+TEST_F(HttpTest, TellsALongRequestThatItsClientHasGone) {
+  Server server(quickOptions());
+  std::atomic<int> running{0}, gone{0};
+  std::atomic<bool> release{false};
+  server.route(
+      "POST", "/long",
+      [&](const Request& request) {
+        ++running;
+        eventually([&] { return release || *request.gone; });
+        if (*request.gone) ++gone;
+        return Response{};
+      },
+      RouteKind::slow);
+  server.start();
+  // Who waits, also with the next request sent already, is not gone.
+  TestClient patient(server.port());
+  patient.send(
+      "POST /long HTTP/1.1\r\nHost: a\r\nContent-Length: 1\r\n\r\nxPOST /long HTTP/1.1\r\nHost: a\r\n\r\n");
+  for (const bool reset : {false, true}) {
+    TestClient leaving(server.port());
+    leaving.send("POST /long HTTP/1.1\r\nHost: a\r\n\r\n");
+    ASSERT_TRUE(eventually([&] { return running == (reset ? 3 : 2); }));
+    if (reset) leaving.reset();
+  }
+  EXPECT_TRUE(eventually([&] { return gone == 2; }));
+  release = true;
+  EXPECT_EQ(patient.answer().status, 200);
+  EXPECT_EQ(patient.answer().status, 200);
+  EXPECT_EQ(gone, 2);
+}
+
 TEST_F(HttpTest, StopLetsARequestFinishWithinTheGrace) {
   Gate gate;
   Server server(quickOptions());
