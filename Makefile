@@ -50,10 +50,10 @@ check-tidy: build
 	git ls-files 'renderer/*.cpp' 'protocol/*.cpp' 'server/*.cpp' | xargs -P $(JOBS) -n 4 clang-tidy --quiet -p build/release
 
 check-format: test-deps
-	git ls-files '*.cpp' '*.h' | xargs clang-format --dry-run --Werror
+	git ls-files '*.cpp' '*.h' '*.cu' | xargs clang-format --dry-run --Werror
 
 format:
-	git ls-files '*.cpp' '*.h' | xargs clang-format -i
+	git ls-files '*.cpp' '*.h' '*.cu' | xargs clang-format -i
 
 deps:
 	@.ci/install build

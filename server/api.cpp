@@ -62,6 +62,7 @@ int statusOf(ErrorCode code) {
     case ErrorCode::tooLarge:
       return 422;
     case ErrorCode::io:
+    case ErrorCode::device:
       return 500;
   }
   return 500;

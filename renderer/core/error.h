@@ -13,6 +13,7 @@ enum class ErrorCode {
   notFound,
   tooLarge,  ///< beyond a stated limit or the memory there is
   io,        ///< reading or writing failed
+  device,    ///< a GPU or its driver failed
 };
 
 /// `what()` is one line a user can act on: file or field, what was expected, what was found.

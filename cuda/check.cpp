@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cuda/check.h"
+
+#include "renderer/core/error.h"
+
+namespace scolopax::cuda {
+
+void check(cudaError_t result, const char* doing) {
+  if (result == cudaSuccess) return;
+  cudaGetLastError();  // else the next call would report this failure again
+  throw Error(result == cudaErrorMemoryAllocation ? ErrorCode::tooLarge : ErrorCode::device,
+              std::string("CUDA: ") + doing + " failed: " + cudaGetErrorString(result));
+}
+
+int deviceCount() {
+  int count = 0;  // a failing call leaves it as it is
+  if (cudaGetDeviceCount(&count) == cudaSuccess) return count;
+  cudaGetLastError();
+  return 0;
+}
+
+}  // namespace scolopax::cuda

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cuda/device_scene.h"
+
+namespace scolopax::cuda {
+
+template <class T>
+void DeviceScene::moveToDevice(const T** array, std::size_t count) {
+  buffers_.emplace_back(std::as_bytes(std::span(*array, count)));
+  *array = reinterpret_cast<const T*>(buffers_.back().data());
+}
+
+template <class Value>
+void DeviceScene::moveToDevice(kernel::CurveView<Value>* curve) {
+  moveToDevice(&curve->positions, std::size_t(curve->count));
+  moveToDevice(&curve->values, std::size_t(curve->count));
+  moveToDevice(&curve->buckets, std::size_t(kernel::kCurveBuckets + 1));
+}
+
+DeviceScene::DeviceScene(const kernel::SceneView& host) : view_(host) {
+  const glm::ivec3 dims = host.dims, cells = host.majorants.cells;
+  const std::size_t voxels = std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z);
+  std::vector<kernel::ChannelView> channels(host.channels, host.channels + host.channelCount);
+  for (kernel::ChannelView& channel : channels) {
+    auto bytes = static_cast<const std::byte*>(channel.voxels);
+    moveToDevice(&bytes, voxels * sizeBytes(channel.type));
+    channel.voxels = bytes;
+    moveToDevice(&channel.opacity);
+    moveToDevice(&channel.color);
+  }
+  view_.channels = channels.data();
+  moveToDevice(&view_.channels, channels.size());
+  moveToDevice(&view_.majorants.values, std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z) *
+                                            std::size_t(1 + host.channelCount));
+}
+
+}  // namespace scolopax::cuda

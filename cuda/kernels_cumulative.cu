@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cuda/pixel_kernels.h"
+
+namespace scolopax::cuda {
+
+template LaunchFunction chooseLaunch<kernel::Analog<kernel::Cumulative>>(const Scene&);
+
+}  // namespace scolopax::cuda

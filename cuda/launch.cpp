@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cuda/launch.h"
+
+#include "renderer/data/instances.h"
+
+namespace scolopax::cuda {
+
+Passes::Passes(const Scene& scene, const kernel::SceneView& view, bool counting)
+    : launch_(
+          visitIntegrator(scene, [&](auto integrator) { return chooseLaunch<decltype(integrator)>(scene); })),
+      scene_(view),
+      pixels_(std::size_t(view.width) * std::size_t(view.height)),
+      cost_(counting ? pixels_.count() : 0) {
+  cost_.fillWithZeros();
+}
+
+void Passes::render(const kernel::SampleNumber& number, std::span<glm::vec4> pixels) {
+  check(launch_({scene_.view(), number, pixels_.data(), cost_.data()}), "starting a kernel");
+  check(cudaDeviceSynchronize(), "rendering");
+  pixels_.copyTo(pixels);
+}
+
+std::vector<kernel::SampleCost> Passes::cost() const {
+  std::vector<kernel::SampleCost> cost(cost_.count());
+  cost_.copyTo(cost);
+  return cost;
+}
+
+}  // namespace scolopax::cuda

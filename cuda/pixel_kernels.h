@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// The kernels as CUDA runs them: a thread for every pixel, an instance for every combination that a scene can
+// ask for. An integrator's instances are compiled in a file of their own, kernels_*.cu.
+#pragma once
+#include <cuda_runtime.h>
+
+#include "cuda/launch.h"
+#include "renderer/data/instances.h"
+#include "renderer/kernel/render_pixel.h"
+
+namespace scolopax::cuda {
+
+/// A warp is a tile of 8x4 pixels: neighbouring rays share voxels and macrocells.
+inline constexpr unsigned kBlockWidth = 8, kBlockHeight = 16;
+
+template <class Integrator, class Blend, class Features>
+__global__ void __launch_bounds__(kBlockWidth* kBlockHeight)
+    renderPixels(kernel::RenderPixel<Integrator, Blend, Features> render) {
+  const int x = int(blockIdx.x * blockDim.x + threadIdx.x);
+  const int y = int(blockIdx.y * blockDim.y + threadIdx.y);
+  if (x < render.scene.width && y < render.scene.height) render(y * render.scene.width + x);
+}
+
+template <class Integrator, class Blend, class Features>
+cudaError_t launch(const DevicePass& pass) {
+  kernel::RenderPixel<Integrator, Blend, Features> render{pass.scene, pass.number, pass.pixels, pass.cost};
+  const dim3 block(kBlockWidth, kBlockHeight);
+  const dim3 grid((unsigned(pass.scene.width) + block.x - 1) / block.x,
+                  (unsigned(pass.scene.height) + block.y - 1) / block.y);
+  void* arguments[] = {&render};
+  return cudaLaunchKernel(renderPixels<Integrator, Blend, Features>, grid, block, arguments, 0, nullptr);
+}
+
+template <class Integrator>
+LaunchFunction chooseLaunch(const Scene& scene) {
+  return visitBlendAndLight(scene, [](auto blend, auto features) -> LaunchFunction {
+    return launch<Integrator, decltype(blend), decltype(features)>;
+  });
+}
+
+}  // namespace scolopax::cuda

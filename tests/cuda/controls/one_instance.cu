@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// One instance of the kernels, for builds that are wrong on purpose.
+#include "tests/cuda/controls/one_instance.h"
+
+#include "cuda/pixel_kernels.h"
+
+namespace scolopax::test {
+
+cuda::LaunchFunction oneInstance() {
+  return cuda::launch<kernel::Analog<kernel::SyncDda>, kernel::BlendDensity,
+                      kernel::LightFeatures<true, true>>;
+}
+
+}  // namespace scolopax::test

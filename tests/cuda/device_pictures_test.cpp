@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// The device path draws what the CPU backend draws, bit for bit, in every instance of the kernels.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "renderer/renderer.h"
+#include "tests/cuda/device_scenes.h"
+
+namespace scolopax {
+namespace {
+
+using namespace test;
+
+const std::atomic<bool> kNever = false;
+
+std::size_t differentPixels(const Image& a, const Image& b) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i)
+    count += std::memcmp(&a.pixels[i], &b.pixels[i], sizeof a.pixels[i]) != 0;
+  return count;
+}
+
+/// Fraction of the pixels that show anything.
+double coverage(const Image& image) {
+  const auto shown = std::count_if(image.pixels.begin(), image.pixels.end(),
+                                   [](const glm::vec4& pixel) { return pixel.a > 0; });
+  return double(shown) / double(image.pixels.size());
+}
+
+/// Renders on both, compares pictures and counts.
+void expectSameOnBoth(const std::shared_ptr<const Volume>& volume, const Scene& scene, int samples) {
+  const auto cpu = makeCpuRenderer(volume, 1);
+  cpu->countCosts();
+  cpu->setScene(scene);
+  for (int i = 0; i < samples; ++i) ASSERT_TRUE(cpu->renderSample(kNever));
+  const Image expected = cpu->image();
+  const DevicePicture found = renderOnDevice(volume, scene, std::uint32_t(samples));
+  ASSERT_EQ(found.image.pixels.size(), expected.pixels.size());
+  EXPECT_EQ(differentPixels(found.image, expected), 0u);
+  EXPECT_GT(coverage(expected), 0.1);
+
+  const RenderStats stats = cpu->stats();
+  RenderStats counted;
+  for (const kernel::SampleCost& cost : found.cost) {
+    counted.fetches += cost.fetches;
+    counted.cellSteps += cost.cellSteps;
+    counted.randomBlocks += cost.randomBlocks;
+    counted.truncatedRays += cost.truncated;
+  }
+  EXPECT_EQ(counted.fetches, stats.fetches);
+  EXPECT_EQ(counted.cellSteps, stats.cellSteps);
+  EXPECT_EQ(counted.randomBlocks, stats.randomBlocks);
+  EXPECT_EQ(counted.truncatedRays, stats.truncatedRays);
+  EXPECT_GT(stats.fetches, 0u);
+}
+
+class DevicePictures : public testing::TestWithParam<Method> {};
+
+TEST_P(DevicePictures, AreThoseOfTheCpuInEveryBlendModeAndLight) {
+  const auto mixed = mixedVolume(), withSign = signedVolume();
+  for (const BlendMode blend : {BlendMode::density, BlendMode::max, BlendMode::mix, BlendMode::composite})
+    for (const bool shading : {false, true})
+      for (const bool shadows : {false, true}) {
+        SCOPED_TRACE(std::string(nameOf(blend)) + (shading ? ", shading" : "") +
+                     (shadows ? ", shadows" : ""));
+        // Sizes that fill the last blocks of threads and sizes that do not.
+        Scene scene = obliqueScene(*mixed, 24, 24);
+        scene.method = GetParam();
+        scene.blend = blend;
+        scene.shading = shading;
+        scene.shadows = shadows;
+        expectSameOnBoth(mixed, scene, 3);
+        scene = obliqueScene(*withSign, 19, 13);
+        scene.method = GetParam();
+        scene.blend = blend;
+        scene.shading = shading;
+        scene.shadows = shadows;
+        scene.filter = PixelFilter::point;
+        scene.sampling = Sampling::independent;
+        expectSameOnBoth(withSign, scene, 2);
+      }
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, DevicePictures,
+                         testing::Values(Method::superposed, Method::cumulative, Method::syncDda,
+                                         Method::nDda, Method::raymarch),
+                         [](const auto& instance) {
+                           std::string name(nameOf(instance.param));
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
+                         });
+
+TEST(DevicePicture, OfOnePixelAndOfThinStripsIsThatOfTheCpu) {
+  const auto volume = mixedVolume();
+  for (const glm::ivec2 size : {glm::ivec2(1, 1), glm::ivec2(40, 1), glm::ivec2(1, 40), glm::ivec2(9, 17)}) {
+    Scene scene = obliqueScene(*volume, size.x, size.y);
+    scene.camera.eye = scene.camera.target + 0.1 * (scene.camera.eye - scene.camera.target);  // inside
+    expectSameOnBoth(volume, scene, 4);
+  }
+}
+
+TEST(DevicePicture, OfASceneWithoutVisibleChannelsIsTransparent) {
+  const auto volume = mixedVolume();
+  Scene scene = obliqueScene(*volume, 8, 8);
+  for (ChannelAppearance& channel : scene.channels) channel.visible = false;
+  const DevicePicture picture = renderOnDevice(volume, scene, 1);
+  EXPECT_EQ(coverage(picture.image), 0);
+}
+
+}  // namespace
+}  // namespace scolopax

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// What translated PTX (ptx_to_cpp.py) is built from: registers, instructions with a meaning of their own, and
+// memory of which every access is checked.
+#pragma once
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace ptx {
+
+// Untyped registers: every instruction says what it reads their bits as.
+union Register16 {
+  std::uint8_t u8;
+  std::int8_t s8;
+  std::uint16_t u16;
+  std::int16_t s16;
+};
+union Register32 {
+  std::uint8_t u8;
+  std::int8_t s8;
+  std::uint16_t u16;
+  std::int16_t s16;
+  std::uint32_t u32;
+  std::int32_t s32;
+  float f32;
+};
+union Register64 {
+  std::uint8_t u8;
+  std::int8_t s8;
+  std::uint16_t u16;
+  std::int16_t s16;
+  std::uint32_t u32;
+  std::int32_t s32;
+  float f32;
+  std::uint64_t u64;
+  std::int64_t s64;
+  double f64;
+};
+
+struct Index {
+  unsigned x, y, z;
+};
+
+/// A stretch of memory that a thread may use.
+struct Range {
+  std::uint64_t begin, end;
+  bool holds(std::uint64_t address, std::size_t size) const {
+    return address >= begin && address < end && size <= end - address;
+  }
+};
+
+struct Frame;
+
+/// One thread of a grid: where it stands, and what it may touch.
+struct Thread {
+  Index tid, ntid, ctaid, nctaid;
+  std::span<const Range> global;      ///< allocations and tables, by address
+  std::span<const Range> parameters;  ///< of the kernel; read only
+  const Frame* local = nullptr;
+};
+
+/// A variable in local memory, while the function that declares it runs.
+struct Frame {
+  template <std::size_t kSize>
+  Frame(Thread& owner, std::byte (&bytes)[kSize])
+      : thread(owner),
+        range{reinterpret_cast<std::uint64_t>(bytes), reinterpret_cast<std::uint64_t>(bytes) + kSize},
+        outer(owner.local) {
+    std::memset(bytes, 0xa5, kSize);  // what is read before it is written shows in the picture
+    thread.local = this;
+  }
+  Frame(const Frame&) = delete;
+  ~Frame() { thread.local = outer; }
+  Thread& thread;
+  Range range;
+  const Frame* outer;
+};
+
+/// An access outside of what the thread may use, or not aligned.
+struct Fault : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+using Function = void (*)(Thread& thread, std::byte* result, const std::byte* const* arguments);
+
+/// Makes itself known under its name when the program starts.
+struct Kernel {
+  Kernel(const char* name, Function run, std::vector<std::size_t> parameterSizes, unsigned maxThreads);
+  std::string name;
+  Function run;
+  std::vector<std::size_t> parameterSizes;
+  unsigned maxThreads;  ///< in a block
+};
+
+/// Mangled names of the kernels that are linked into the program.
+std::vector<std::string> kernelNames();
+
+/// Constant memory of a module.
+struct Table {
+  template <class T, std::size_t kCount>
+  explicit Table(const T (&values)[kCount]) : Table(values, sizeof values) {}
+  Table(const void* values, std::size_t size);
+};
+
+enum class Access { load, store };
+/// Throws Fault unless the thread may make this access.
+void checkAccess(const Thread& thread, std::uint64_t address, std::size_t size, Access access);
+
+inline std::uint64_t addressOf(const void* pointer) { return reinterpret_cast<std::uint64_t>(pointer); }
+
+template <class T>
+T read(std::uint64_t address) {
+  T value;
+  std::memcpy(&value, reinterpret_cast<const void*>(address), sizeof value);
+  return value;
+}
+template <class T>
+void write(std::uint64_t address, T value) {
+  std::memcpy(reinterpret_cast<void*>(address), &value, sizeof value);
+}
+template <class T>
+T load(const Thread& thread, std::uint64_t address) {
+  checkAccess(thread, address, sizeof(T), Access::load);
+  return read<T>(address);
+}
+template <class T>
+void store(const Thread& thread, std::uint64_t address, T value) {
+  checkAccess(thread, address, sizeof(T), Access::store);
+  write(address, value);
+}
+
+inline float floatOf(std::uint32_t bits) { return std::bit_cast<float>(bits); }
+inline double doubleOf(std::uint64_t bits) { return std::bit_cast<double>(bits); }
+
+/// A whole float as an integer: to the nearest there is; 0 for NaN.
+template <class Integer, class Float>
+Integer saturate(Float x) {
+  using Limits = std::numeric_limits<Integer>;
+  if (x != x) return 0;
+  if (x <= Float(Limits::min())) return Limits::min();
+  if (x >= Float(Limits::max())) return Limits::max();
+  return Integer(x);
+}
+
+/// Of a number and NaN, the number; -0 is below +0.
+template <class T>
+T minimum(T a, T b) {
+  if constexpr (std::is_floating_point_v<T>) {
+    if (a != a) return b;
+    if (b != b) return a;
+    if (a == b) return std::signbit(a) ? a : b;
+  }
+  return a < b ? a : b;
+}
+template <class T>
+T maximum(T a, T b) {
+  if constexpr (std::is_floating_point_v<T>) {
+    if (a != a) return b;
+    if (b != b) return a;
+    if (a == b) return std::signbit(a) ? b : a;
+  }
+  return a > b ? a : b;
+}
+
+/// Shifts by the width or more push every bit out.
+template <class T>
+T shiftLeft(T a, std::uint32_t by) {
+  return by >= sizeof(T) * 8 ? T(0) : T(std::make_unsigned_t<T>(a) << by);
+}
+template <class T>
+T shiftRight(T a, std::uint32_t by) {
+  return by >= sizeof(T) * 8 ? T(a < 0 ? -1 : 0) : T(a >> by);
+}
+
+template <class T>
+T reverseBits(T a) {
+  T reversed = 0;
+  for (std::size_t i = 0; i < sizeof(T) * 8; ++i) reversed = T(reversed << 1 | ((a >> i) & 1));
+  return reversed;
+}
+
+}  // namespace ptx

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the translator has to refuse, so that a kernel with it cannot pass the other tests."""
+import unittest
+
+from ptx_to_cpp import Refused, translate
+
+KERNEL = """.version 7.0
+.target sm_75
+.visible .entry kernel(.param .u64 kernel_param_0)
+{
+  .reg .f32 %f<4>;
+  .reg .b64 %rd<2>;
+  ld.param.u64 %rd1, [kernel_param_0];
+  ld.global.f32 %f1, [%rd1];
+  STATEMENT
+  st.global.f32 [%rd1+4], %f2;
+  ret;
+}
+"""
+
+
+def kernel_with(statement, **options):
+    return translate(KERNEL.replace("STATEMENT", statement), **options)
+
+
+class Translator(unittest.TestCase):
+    def test_accepts_arithmetic_that_is_exact_everywhere(self):
+        for statement in ["add.rn.f32 %f2, %f1, %f1;", "div.rn.f32 %f2, %f1, %f1;", "sqrt.rn.f32 %f2, %f1;",
+                          "fma.rn.f32 %f2, %f1, %f1, %f1;", "neg.f32 %f2, %f1;", "mov.f32 %f2, 0f3F800000;"]:
+            self.assertIn("kernel", kernel_with(statement))
+
+    def test_refuses_approximations_and_flushed_denormals(self):
+        for statement in ["sqrt.approx.f32 %f2, %f1;", "div.full.f32 %f2, %f1, %f1;", "ex2.approx.f32 %f2, %f1;",
+                          "add.rn.ftz.f32 %f2, %f1, %f1;", "div.approx.ftz.f32 %f2, %f1, %f1;"]:
+            with self.assertRaisesRegex(Refused, "inexact arithmetic"):
+                kernel_with(statement)
+
+    def test_refuses_what_may_still_be_contracted_or_is_rounded_otherwise(self):
+        for statement in ["add.f32 %f2, %f1, %f1;", "mul.f32 %f2, %f1, %f1;", "mul.rz.f32 %f2, %f1, %f1;"]:
+            with self.assertRaisesRegex(Refused, "contracted or rounded"):
+                kernel_with(statement)
+        self.assertIn("kernel", kernel_with("add.f32 %f2, %f1, %f1;", allow_contraction=True))
+
+    def test_refuses_calls_that_nothing_in_the_file_answers(self):
+        with self.assertRaisesRegex(Refused, "not in this file"):
+            kernel_with("call.uni (%f2), powf, (%f1, %f1);")
+
+    def test_refuses_what_it_does_not_know_and_says_where(self):
+        with self.assertRaisesRegex(Refused, "kernel: bar.sync 0"):
+            kernel_with("bar.sync 0;")
+        with self.assertRaisesRegex(Refused, "atom"):
+            kernel_with("atom.global.add.f32 %f2, [%rd1], %f1;")
+        with self.assertRaisesRegex(Refused, "shared memory"):
+            translate(".shared .align 4 .b8 scratch[64];\n" + KERNEL)
+
+
+if __name__ == "__main__":
+    unittest.main()
