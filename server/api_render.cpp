@@ -61,6 +61,7 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
   const auto renderer = context.makeRenderer(scene->dataset->volume);
   const RebuildStats rebuild = renderer->setScene(scene->render);
   while (!stopMet(scene->stop, *renderer, seconds())) {
+    if (request.gone && *request.gone) throw ProtocolError(503, "", "the client has gone");
     // A rule of time may end a pass in the middle; the first sample is given more, up to the server's own
     // limit.
     const bool timed = scene->stop.seconds > 0 && renderer->samples() > 0;
@@ -69,7 +70,6 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
     const auto slice = std::min(std::chrono::duration_cast<std::chrono::nanoseconds>(budget), kSlice);
     if (renderer->renderSample(context.cutting, slice)) continue;
     if (context.cutting) throw ProtocolError(503, "", "the server is stopping");
-    if (request.gone && *request.gone) throw ProtocolError(503, "", "the client has gone");
     if (seconds() < until) continue;
     if (timed && until < limit) break;
     // A picture that depends on the machine's speed is only for those who asked for it.

@@ -319,14 +319,16 @@ class Http(unittest.TestCase):
         for client in clients:
             client.sendall(head + endless)
         call = ("POST", "/api/v1/render", RENDER)
-        for _ in range(600):
-            if self.server.call(*call)[0] == 503:  # both places are taken
-                break
-            threading.Event().wait(0.05)
-        else:
-            self.fail("the renders never began")
-        for client in clients:
-            client.close()
+        try:
+            for _ in range(600):
+                if self.server.call(*call)[0] == 503:  # both places are taken
+                    break
+                threading.Event().wait(0.05)
+            else:
+                self.fail("the renders never began")
+        finally:
+            for client in clients:
+                client.close()
         for _ in range(200):
             if self.server.call(*call)[0] == 200:
                 return
