@@ -79,7 +79,7 @@ class Core {
 template <typename Result, typename Work>
 asio::awaitable<Result> runOn(asio::thread_pool& pool, Work work) {
   return asio::async_initiate<const asio::use_awaitable_t<>, void(Result)>(
-      [&pool](auto&& completion, Work task) {
+      [&pool](auto completion, Work task) {
         asio::post(pool, [completion = std::move(completion), task = std::move(task)]() mutable {
           auto executor = asio::get_associated_executor(completion);
           asio::post(executor, [completion = std::move(completion), result = task()]() mutable {
