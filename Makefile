@@ -36,10 +36,17 @@ test: test-deps web
 check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz
 	SCOLOPAX_STATISTICS=4 ctest --test-dir build/release -L statistics --output-on-failure
 
-check-asan-ubsan check-tsan: check-%: test-deps
-	cmake --preset $* > /dev/null
-	cmake --build --preset $* -j $(JOBS)
-	ctest --test-dir build/$* -LE 'web|statistics' --output-on-failure
+check-asan-ubsan: test-deps
+	cmake --preset asan-ubsan > /dev/null
+	cmake --build --preset asan-ubsan -j $(JOBS)
+	ctest --test-dir build/asan-ubsan -LE 'web|statistics' --output-on-failure
+	ctest --test-dir build/asan-ubsan -L hard --output-on-failure
+
+# What has threads: the server, and the renderer's own programs.
+check-tsan: test-deps
+	cmake --preset tsan > /dev/null
+	cmake --build --preset tsan -j $(JOBS)
+	ctest --test-dir build/tsan -L 'unit|server' -E NOT_BUILT --output-on-failure
 
 check-fuzz: test-deps
 	cmake --preset fuzz > /dev/null

@@ -8,6 +8,7 @@
 #include <memory>
 #include <string_view>
 
+#include "renderer/data/aov.h"
 #include "renderer/data/image.h"
 #include "renderer/data/scene.h"
 #include "renderer/data/volume.h"
@@ -50,6 +51,11 @@ class Renderer {
   virtual void countCosts() = 0;
   /// All zero unless counting.
   virtual RenderStats stats() const = 0;
+  /// From now on, keep what aov() gives, and count costs; takes time, and memory by pixel and channel. The
+  /// film begins anew.
+  virtual void recordAovs() = 0;
+  /// All values not defined unless recording.
+  virtual AovValues aov(Aov which) const = 0;
   virtual Image image() const = 0;
 };
 

@@ -88,6 +88,17 @@ std::chrono::milliseconds pollTimeout(const Config& config, const net::Request& 
   return std::chrono::milliseconds(std::int64_t(std::min(seconds, most) * 1000));
 }
 
+std::optional<Aov> queryAov(const net::Request& request) {
+  const std::string* asked = request.queryValue("aov");
+  if (!asked) return std::nullopt;
+  std::string known;
+  for (std::size_t i = 0; i < std::size(kAovs); ++i) {
+    if (kAovs[i].name == *asked) return Aov(i);
+    known += (i > 0 ? ", " : "") + std::string(kAovs[i].name);
+  }
+  throw ProtocolError(422, "", "query parameter aov: expected one of " + known + ", found \"" + *asked + '"');
+}
+
 net::Response frame(ApiContext& context, const net::Request& request) {
   const auto session = sessionOf(context, request);
   const std::string* asked = request.queryValue("format");
@@ -97,13 +108,20 @@ net::Response frame(ApiContext& context, const net::Request& request) {
   if (type == std::end(kImageTypes))
     throw ProtocolError(
         422, "", "query parameter format: expected jpeg, png or exr, found \"" + std::string(format) + '"');
-  const FrameQuery query{queryUnsigned(request, "after", 0), queryUnsigned(request, "minSamples", 1)};
+  const std::optional<Aov> aov = queryAov(request);
+  const FrameQuery query{queryUnsigned(request, "after", 0), queryUnsigned(request, "minSamples", 1),
+                         aov.has_value()};
   const auto found = session->waitForFrame(query, pollTimeout(context.config, request));
   if (!found && context.stopping) throw ProtocolError(503, "", "the server is stopping");
   if (!found) return {204, "", "", {}};
   net::Response response{200, std::string(type->mediaType), "", {}};
-  response.body = format == "jpeg" ? std::string(found->jpeg->begin(), found->jpeg->end())
-                                   : imageBytes(*found->image, found->background, format);
+  if (aov) {
+    const AovValues& values = (*found->aovs)[std::size_t(*aov)];
+    response.body = imageBytes(format == "exr" ? aovImage(values) : aovPicture(values), glm::vec3(0), format);
+  } else {
+    response.body = format == "jpeg" ? std::string(found->jpeg->begin(), found->jpeg->end())
+                                     : imageBytes(*found->image, found->background, format);
+  }
   response.headers = {{"Scolopax-Frame", std::to_string(found->info.number)},
                       {"Scolopax-Revision", std::to_string(found->info.revision)},
                       {"Scolopax-Samples", std::to_string(found->info.samples)},
@@ -190,6 +208,7 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
         {"after", "query", "integer", "Number of the last frame seen; a newer one is waited for"},
         {"minSamples", "query", "integer", "Samples per pixel that it has at least, unless it is final"},
         {"format", "query", "string", "jpeg (default), png or exr"},
+        {"aov", "query", "string", "Instead of the colours: depth, transmittance, channel or cost"},
         {"timeout", "query", "number", "Seconds to wait, at most 25, which is the default"}},
        "",
        imageTypes,

@@ -55,6 +55,8 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
       points.push_back({knot.position, hexOf(knot.color)});
     maps.push_back({{"name", entry.name}, {"doc", entry.doc}, {"points", std::move(points)}});
   }
+  json aovs = json::array();
+  for (const NamedValue& aov : kAovs) aovs.push_back({{"name", aov.name}, {"doc", aov.doc}});
   json formats = json::array();
   for (const ImageType& type : kImageTypes) formats.push_back(type.mediaType);
   return {{"version", SCOLOPAX_VERSION},
@@ -63,6 +65,8 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
           {"blendModes", named(lists.blendModes)},
           {"methods", named(lists.methods)},
           {"filters", named(lists.filters)},
+          {"samplings", named(lists.samplings)},
+          {"aovs", std::move(aovs)},
           {"lightTypes", named(lists.lightTypes)},
           {"colormaps", std::move(maps)},
           {"imageFormats", std::move(formats)},

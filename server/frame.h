@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "renderer/data/aov.h"
 #include "renderer/data/image.h"
 
 namespace scolopax::server {
@@ -33,6 +34,7 @@ struct RenderedFrame {
   FrameInfo info;
   std::shared_ptr<const Image> image;
   glm::vec3 background{0};
+  std::shared_ptr<const std::vector<AovValues>> aovs;  ///< in the list's order; null where nobody has asked
 };
 
 /// One encoding serves every viewer of a session.
@@ -42,6 +44,7 @@ struct EncodedFrame {
   std::shared_ptr<const std::vector<unsigned char>> jpeg;
   std::shared_ptr<const Image> image;  ///< for scripts that ask for png or exr
   glm::vec3 background{0};
+  std::shared_ptr<const std::vector<AovValues>> aovs;  ///< as in RenderedFrame
 };
 
 }  // namespace scolopax::server

@@ -53,7 +53,8 @@ ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, MakeRende
 
 bool ProgressiveRender::sceneStale(const RenderRequest& request) const {
   // Back to full resolution when edits have stopped; a film that already has it goes on.
-  return !scene_ || request.revision != revision_ || (!request.interactive && divisor_ != 1);
+  return !scene_ || request.revision != revision_ || (!request.interactive && divisor_ != 1) ||
+         (request.aovs && !recording_);
 }
 
 /// Whether a pass whose scene is stale goes on all the same: a small one, and one that follows an abandoned
@@ -109,6 +110,7 @@ void ProgressiveRender::takeScene(const RenderRequest& request, PassResult& resu
     renderer_.reset();
     volume_ = request.scene->dataset->volume;
     renderer_ = makeRenderer_(volume_);
+    recording_ = false;
     secondsPerPixel_.reset();
   }
   const int divisor = wantedDivisor(request);
@@ -118,7 +120,12 @@ void ProgressiveRender::takeScene(const RenderRequest& request, PassResult& resu
     throw Error(ErrorCode::tooLarge, "image: all sessions together may have " +
                                          std::to_string(options_.filmPixels) + " pixels, " +
                                          std::to_string(othersPixels_) + " of them are taken");
-  const RebuildStats stats = renderer_->setScene(scene);
+  RebuildStats stats = renderer_->setScene(scene);
+  if (request.aovs && !recording_) {
+    renderer_->recordAovs();
+    recording_ = stats.filmReset = true;
+    shown_ = {};  // the frames so far do not count: they hold no AOVs
+  }
   filmPixels_ = pixels;
   abandoned_ = unfinished_;
   unfinished_ = false;
@@ -158,7 +165,13 @@ void ProgressiveRender::show(const RenderRequest& request) {
   info.renderUs = renderUs_;
   info.interactive = request.interactive;
   info.final = !request.interactive && finished(request);
-  session_->submit({info, std::make_shared<const Image>(renderer_->image()), scene_->render.background});
+  RenderedFrame frame{info, std::make_shared<const Image>(renderer_->image()), scene_->render.background, {}};
+  if (recording_ && !request.interactive) {
+    std::vector<AovValues> aovs;
+    for (std::size_t i = 0; i < std::size(kAovs); ++i) aovs.push_back(renderer_->aov(Aov(i)));
+    frame.aovs = std::make_shared<const std::vector<AovValues>>(std::move(aovs));
+  }
+  session_->submit(std::move(frame));
   shown_ = info;
   shownAt_ = now_();
 }

@@ -69,6 +69,7 @@ class ProgressiveRender {
   std::unique_ptr<Renderer> renderer_;
   std::shared_ptr<const ResolvedScene> scene_;  ///< that the film shows; null before the first
   std::uint32_t revision_ = 0;
+  bool recording_ = false;   ///< the renderer keeps AOVs
   bool unfinished_ = false;  ///< a pass has used up its slice
   bool abandoned_ = false;   ///< the pass before it was given up for a newer scene
   TimePoint passBegan_;

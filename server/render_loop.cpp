@@ -66,6 +66,7 @@ EncodedFrame encodeFrame(const RenderedFrame& rendered, const Now& now) {
   frame.width = image.width;
   frame.height = image.height;
   frame.background = rendered.background;
+  frame.aovs = rendered.aovs;
   frame.jpeg = std::make_shared<const std::vector<unsigned char>>(
       encodeJpeg(toSrgb8(image, rendered.background), quick ? 75 : 90,
                  quick ? ChromaSampling::half420 : ChromaSampling::full444));

@@ -115,12 +115,14 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
   const std::uint32_t revision = revision_;
   const auto fits = [&] {
     return frame_ && frame_->info.number > query.after && frame_->info.revision >= revision &&
-           !frame_->info.interactive && (frame_->info.samples >= query.minSamples || frame_->info.final);
+           !frame_->info.interactive && (frame_->aovs || !query.aovs) &&
+           (frame_->info.samples >= query.minSamples || frame_->info.final);
   };
   if (pollSamples_.size() >= kMaxPolls)
     throw protocol::ProtocolError(429, "",
                                   "expected at most " + std::to_string(kMaxPolls) +
                                       " requests to wait for a session's frames, found another");
+  aovs_ = aovs_ || query.aovs;
   const auto poll = pollSamples_.insert(query.minSamples);
   hooks_.wakeRender();
   frameCame_.wait_until(lock, deadline, [&] { return closed_ || fits() || failedRevision_ == revision_; });
@@ -162,6 +164,7 @@ RenderRequest Session::requestLocked() const {
   request.scene = scene_;
   request.revision = revision_;
   request.pollSamples.assign(pollSamples_.begin(), pollSamples_.end());
+  request.aovs = aovs_;
   const bool seen =
       std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.visible; });
   request.wanted = !closed_ && failedRevision_ != revision_ && (seen || !pollSamples_.empty());

@@ -58,6 +58,7 @@ struct EditOrigin {
 struct FrameQuery {
   std::uint32_t after = 0;       ///< a frame with a larger number
   std::uint32_t minSamples = 1;  ///< with so many samples at least, or the final one
+  bool aovs = false;             ///< that holds AOVs, which the session records from now on
 };
 
 /// What the render thread should do for a session; a snapshot.
@@ -68,6 +69,7 @@ struct RenderRequest {
   bool interactive = false;                ///< edits arrive
   TimePoint interactiveEnd;                ///< when that ends, if no edit comes
   std::vector<std::uint32_t> pollSamples;  ///< sample counts that scripts wait for
+  bool aovs = false;                       ///< somebody has asked for AOVs
 };
 
 /// Functions that wake the loops; called with or without the session's mutex held.
@@ -176,7 +178,8 @@ class Session {
   std::map<ViewerId, Viewer> viewers_;
   ViewerId nextViewer_ = 1;
   std::multiset<std::uint32_t> pollSamples_;  ///< one per waiting script
-  std::optional<RenderedFrame> rendered_;     ///< waits for the encoder
+  bool aovs_ = false;
+  std::optional<RenderedFrame> rendered_;  ///< waits for the encoder
   std::shared_ptr<const EncodedFrame> frame_;
   std::uint32_t frameNumber_ = 0;
 

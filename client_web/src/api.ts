@@ -15,6 +15,7 @@ export interface Capabilities {
   blendModes?: Named[];
   methods?: Named[];
   filters?: Named[];
+  samplings?: Named[];
   colormaps?: Named[];
   limits?: Record<string, number>;
 }

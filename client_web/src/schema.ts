@@ -144,6 +144,7 @@ export function leavesBelow(path: Path): Path[] {
 const listOf: Record<string, keyof Omit<Capabilities, 'limits'>> = {
   'blend.mode': 'blendModes',
   'integrator.method': 'methods',
+  'integrator.sampling': 'samplings',
   'image.filter': 'filters',
 };
 

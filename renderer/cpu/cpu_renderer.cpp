@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "renderer/cpu/tile_kernels.h"
 #include "renderer/data/film.h"
@@ -49,8 +50,7 @@ class CpuRenderer final : public Renderer {
       film_ = std::move(resized);
     else if (stats.filmReset)
       film_.reset(scene.width, scene.height);
-    if (stats.filmReset) done_.assign(film_.pixelCount(), 0);
-    if (stats.filmReset && counting_) cost_.assign(film_.pixelCount(), {});
+    if (stats.filmReset) resetRecords();
     return stats;
   }
 
@@ -60,6 +60,7 @@ class CpuRenderer final : public Renderer {
                     sampleNumber(plan_.scene().sampling, film_.samples()),
                     film_.pass(),
                     counting_ ? cost_.data() : nullptr,
+                    recording_ ? first_.pass() : nullptr,
                     done_.data(),
                     &cancel,
                     std::chrono::steady_clock::now() + budget};
@@ -71,6 +72,8 @@ class CpuRenderer final : public Renderer {
       complete = std::find(done_.begin(), done_.end(), 0) == done_.end();
       if (!complete) return;
       film_.add();
+      if (recording_) first_.add(plan_.visibleChannels());
+      if (counting_) addCosts();
       std::fill(done_.begin(), done_.end(), std::uint8_t(0));
     });
     return complete;
@@ -82,27 +85,73 @@ class CpuRenderer final : public Renderer {
 
   void countCosts() override {
     counting_ = true;
-    cost_.assign(film_.pixelCount(), {});
+    resetRecords();
+  }
+  RenderStats stats() const override { return stats_; }
+
+  void recordAovs() override {
+    counting_ = recording_ = true;
+    if (film_.pixelCount() > 0) film_.reset(film_.width(), film_.height());
+    resetRecords();
   }
 
-  RenderStats stats() const override {
-    RenderStats stats;
-    stats.rays = std::uint64_t(film_.samples()) * cost_.size();
-    for (const kernel::SampleCost& cost : cost_) {
-      stats.fetches += cost.fetches;
-      stats.cellSteps += cost.cellSteps;
-      stats.randomBlocks += cost.randomBlocks;
-      stats.truncatedRays += cost.truncated;
+  AovValues aov(Aov which) const override {
+    AovValues result{which, film_.width(), film_.height(), {}};
+    result.values.assign(film_.pixelCount(), std::numeric_limits<float>::quiet_NaN());
+    if (!recording_ || film_.samples() == 0) return result;
+    switch (which) {
+      case Aov::depth:
+        result.values = first_.depth();
+        break;
+      case Aov::transmittance: {
+        const Image image = film_.image();
+        std::transform(image.pixels.begin(), image.pixels.end(), result.values.begin(),
+                       [](const glm::vec4& p) { return 1.0f - p.a; });
+        break;
+      }
+      case Aov::channel:
+        result.values = first_.channel();
+        break;
+      case Aov::cost:
+        std::transform(fetches_.begin(), fetches_.end(), result.values.begin(),
+                       [&](std::uint64_t n) { return float(double(n) / film_.samples()); });
+        break;
     }
-    return stats;
+    return result;
   }
 
  private:
+  void resetRecords() {
+    const std::size_t pixels = film_.pixelCount();
+    done_.assign(pixels, 0);
+    stats_ = {};
+    if (counting_) cost_.assign(pixels, {});
+    if (!recording_ || pixels == 0) return;
+    fetches_.assign(pixels, 0);
+    first_.reset(pixels, plan_.scene().channels.size());
+  }
+
+  /// Moves what a pass has cost into sums that do not overflow.
+  void addCosts() {
+    stats_.rays += cost_.size();
+    for (std::size_t i = 0; i < cost_.size(); ++i) {
+      stats_.fetches += cost_[i].fetches;
+      stats_.cellSteps += cost_[i].cellSteps;
+      stats_.randomBlocks += cost_[i].randomBlocks;
+      stats_.truncatedRays += cost_[i].truncated;
+      if (recording_) fetches_[i] += cost_[i].fetches;
+      cost_[i] = {};
+    }
+  }
+
   RenderPlan plan_;
   Film film_;
   std::vector<std::uint8_t> done_;  // pixels that a pass has behind it
-  bool counting_ = false;
-  std::vector<kernel::SampleCost> cost_;  // one per pixel while counting
+  bool counting_ = false, recording_ = false;
+  std::vector<kernel::SampleCost> cost_;  // of the pass, one per pixel while counting
+  RenderStats stats_;
+  std::vector<std::uint64_t> fetches_;  // one per pixel while recording
+  FirstCollisions first_;
   tbb::task_arena arena_;
 };
 

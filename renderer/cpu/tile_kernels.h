@@ -21,6 +21,7 @@ struct Pass {
   kernel::SampleNumber number;
   glm::vec4* pixels;
   kernel::SampleCost* cost;
+  kernel::FirstCollision* first;
   std::uint8_t* done;  ///< width x height: pixels of this pass that are rendered; the others are still to do
   const std::atomic<bool>* cancel;
   std::chrono::steady_clock::time_point deadline;
@@ -35,7 +36,7 @@ using TileFunction = void (*)(const Pass&, int tileX, int tileY);
 template <class Integrator, class Blend, class Features>
 void renderTile(const Pass& pass, int tileX, int tileY) {
   const kernel::RenderPixel<Integrator, Blend, Features> render{pass.scene, pass.number, pass.pixels,
-                                                                pass.cost};
+                                                                pass.cost, pass.first};
   const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
   const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
   for (int y = tileY * kTile; y < endY; ++y) {

@@ -83,6 +83,7 @@ kernel::CameraRays makeCameraRays(const Camera& camera, const Grid& grid, int wi
   rays.pixelSize = float(1.0 / height);
   rays.perspective = orthographic ? 0.0f : float(viewHeight * viewHeight);
   rays.halfSize = {0.5f * float(width), 0.5f * float(height)};
+  rays.start = float(start);
   return rays;
 }
 

@@ -40,6 +40,12 @@ namespace scolopax {
     "the first numbers of a pixel's samples are spread evenly (scrambled Sobol points): less noise") \
   X(independent, "independent", "every number is drawn on its own, as textbook error estimates assume")
 
+#define SCOLOPAX_AOVS(X)                                                                           \
+  X(depth, "depth", "mean distance of the first collision from the eye, along the view direction") \
+  X(transmittance, "transmittance", "share of the light from behind that comes through")           \
+  X(channel, "channel", "channel in which most rays end")                                          \
+  X(cost, "cost", "voxel lookups per sample: what a pixel costs")
+
 struct NamedValue {
   std::string_view name;
   std::string_view doc;
@@ -57,6 +63,7 @@ SCOLOPAX_DECLARE_ENUM(Method, SCOLOPAX_METHODS, kMethods)
 SCOLOPAX_DECLARE_ENUM(LightType, SCOLOPAX_LIGHT_TYPES, kLightTypes)
 SCOLOPAX_DECLARE_ENUM(PixelFilter, SCOLOPAX_PIXEL_FILTERS, kPixelFilters)
 SCOLOPAX_DECLARE_ENUM(Sampling, SCOLOPAX_SAMPLINGS, kSamplings)
+SCOLOPAX_DECLARE_ENUM(Aov, SCOLOPAX_AOVS, kAovs)
 
 #undef SCOLOPAX_ENUM_ENTRY
 #undef SCOLOPAX_NAMED_ENTRY

@@ -125,11 +125,13 @@ RebuildStats RenderPlan::update(const Scene& scene) {
     if (rebuilt[i]) channels_[i] = std::move(rebuilt[i]);
 
   channelViews_.clear();
+  visibleChannels_.clear();
   std::vector<const std::vector<float>*> bounds;
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     const ChannelPlan& plan = *channels_[i];
     if (!scene.channels[i].visible || plan.majorants.empty()) continue;
     channelViews_.push_back(plan.transfer.view(volume_->channels()[i]));
+    visibleChannels_.push_back(int(i));
     bounds.push_back(&plan.majorants);
   }
   const glm::ivec3 cells = macrocells_->cells;

@@ -4,6 +4,7 @@
 #pragma once
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "renderer/data/majorant_grid.h"
@@ -22,6 +23,8 @@ class RenderPlan {
   const Scene& scene() const { return *scene_; }
   /// Valid until the next update.
   const kernel::SceneView& view() const { return view_; }
+  /// Index in the volume of every channel of the view.
+  std::span<const int> visibleChannels() const { return visibleChannels_; }
 
  private:
   struct ChannelPlan {
@@ -34,6 +37,7 @@ class RenderPlan {
   std::vector<std::optional<ChannelPlan>> channels_;
   std::vector<float> majorants_;
   std::vector<kernel::ChannelView> channelViews_;
+  std::vector<int> visibleChannels_;
   kernel::SceneView view_{};
 };
 

@@ -87,6 +87,8 @@ std::string extensionOf(const fs::path& path) {
 
 void checkImageName(const fs::path& path) { checkExtension(extensionOf(path)); }
 
+bool isFloatFormat(const fs::path& path) { return isFloat(extensionOf(path)); }
+
 void writeImage(const fs::path& path, const Image& image, glm::vec3 background) {
   const std::vector<unsigned char> bytes = encode(image, background, extensionOf(path));
   writeFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});

@@ -18,6 +18,9 @@ void writeImage(const std::filesystem::path& path, const Image& image, glm::vec3
 /// Throws Error(unsupported) when writeImage knows no format of that extension.
 void checkImageName(const std::filesystem::path& path);
 
+/// Whether writeImage keeps the values under this name as they are.
+bool isFloatFormat(const std::filesystem::path& path);
+
 /// Reads any picture OpenImageIO knows, as linear premultiplied RGBA (8- and 16-bit files are taken as sRGB).
 Image readImage(const std::filesystem::path& path);
 

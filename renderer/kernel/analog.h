@@ -51,10 +51,11 @@ SCOLOPAX_HD glm::vec3 radiance(const SceneView& scene, const Ray& ray, const Col
 
 template <class Tracker>
 struct Analog {
-  /// Linear premultiplied RGBA of one sample along a ray.
+  /// Linear premultiplied RGBA of one sample along a ray; `first`, where it is not null, is set at a
+  /// collision.
   template <class Blend, class Features>
   SCOLOPAX_HD static glm::vec4 sample(const SceneView& scene, const Ray& ray, Interval inside,
-                                      Sampler& sampler, SampleCost* cost) {
+                                      Sampler& sampler, SampleCost* cost, FirstCollision* first) {
     if constexpr (Blend::kSeparate) {
       // Channels draw independent numbers, so 1 - prod(1 - hit_n) has the expected value 1 - prod(1 -
       // alpha_n).
@@ -62,14 +63,16 @@ struct Analog {
       for (int n = 0; n < scene.channelCount; ++n) {
         std::optional<Collision> hit;
         trackChannel<Blend>(scene, n, ray, inside, sampler, &hit, cost);
-        if (hit)
-          sum = glm::vec4(
-              glm::vec3(sum) + radiance<Tracker, Blend, Features>(scene, ray, *hit, sampler, cost), 1.0f);
+        if (!hit) continue;
+        if (first) keepNearer(first, {hit->place.t(), n});
+        sum = glm::vec4(glm::vec3(sum) + radiance<Tracker, Blend, Features>(scene, ray, *hit, sampler, cost),
+                        1.0f);
       }
       return sum;
     } else {
       const auto hit = Tracker::template track<Blend>(scene, ray, inside, sampler, cost);
       if (!hit) return glm::vec4(0.0f);
+      if (first) *first = {hit->place.t(), hit->channel};
       return glm::vec4(radiance<Tracker, Blend, Features>(scene, ray, *hit, sampler, cost), 1.0f);
     }
   }

@@ -24,6 +24,7 @@ struct CameraRays {
   float pixelSize;     ///< 1 / height
   float perspective;   ///< (2 tan(fovY/2))^2, or 0 for an orthographic camera
   glm::vec2 halfSize;  ///< width/2, height/2 in pixels
+  float start;  ///< distance of the plane in which rays start from the eye, along the view, world units
 
   /// Ray through the point (x, y) of the image plane, in pixels from the top left corner.
   SCOLOPAX_HD Ray operator()(float x, float y) const {
@@ -32,6 +33,12 @@ struct CameraRays {
     const float inverseLength = 1.0f / squareRoot(1.0f + perspective * (sx * sx + sy * sy));
     return {origin0 + sx * originX + sy * originY,
             (direction0 + sx * directionX + sy * directionY) * inverseLength};
+  }
+  /// Depth of the point t along the ray through (x, y): its distance from the eye along the view direction.
+  SCOLOPAX_HD float depth(float x, float y, float t) const {
+    const float sx = (x - halfSize.x) * pixelSize;
+    const float sy = (halfSize.y - y) * pixelSize;
+    return start + t / squareRoot(1.0f + perspective * (sx * sx + sy * sy));
   }
 };
 

@@ -27,6 +27,10 @@ struct Collision {
   float position;   ///< on that channel's curves
 };
 
+SCOLOPAX_HD inline void keepNearer(FirstCollision* first, const FirstCollision& other) {
+  if (first->channel < 0 || other.depth < first->depth) *first = other;
+}
+
 /// Tentative collisions after which a ray gives up and counts as truncated: a bound on its work, far above
 /// what any thickness that can be told from opaque needs.
 inline constexpr std::uint32_t kMaxTentativeCollisions = 1u << 20;

@@ -61,13 +61,32 @@ SCOLOPAX_HD float marchTransmittance(const SceneView& scene, const Ray& ray, Int
   return 1.0f - absorbed(depth);
 }
 
+/// The channel that a collision at a point happens in; `pick` in [0,1) decides where extinctions add up.
+template <class Blend>
+SCOLOPAX_HD int channelAt(const SceneView& scene, glm::vec3 point, float pick, float extinction) {
+  SampleCost uncounted;
+  if constexpr (!Blend::kSums) return largestOf(scene, point, &uncounted).channel;
+  float left = pick * extinction;
+  int n = 0;
+  while (n + 1 < scene.channelCount) {
+    left -= classify(scene, n, point, &uncounted).extinction;
+    if (left < 0.0f) break;
+    ++n;
+  }
+  return n;
+}
+
 /// Premultiplied RGBA of a ray; `only` >= 0 marches that channel alone.
 template <class Blend, class Features>
 SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval inside, int only,
-                               Sampler& sampler, SampleCost* cost) {
+                               Sampler& sampler, SampleCost* cost, FirstCollision* first) {
   glm::vec3 color(0.0f);
   float transmittance = 1.0f;
-  const float offset = uniformOf(sampler.next().x);
+  const RandomBlock random = sampler.next();
+  const float offset = uniformOf(random.x);
+  // A tracker's ray would end where the opacity passes this number.
+  const float end = first ? uniformOf(random.y) : kInfinity;
+  bool ended = false;
   march(scene, ray, inside, offset, 1 + only, cost, [&](glm::vec3 point, float t) {
     const Collision here{{t, 0.0f}, point, only, 0.0f};
     Visibility visibility;
@@ -102,8 +121,15 @@ SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval 
     }
     if (extinction > 0.0f) {
       const float alpha = absorbed(extinction * scene.step);
-      color += emission * (transmittance * alpha / extinction);
+      const float absorbedHere = transmittance * alpha;
+      color += emission * (absorbedHere / extinction);
+      const float before = 1.0f - transmittance;
       transmittance *= 1.0f - alpha;
+      if (!ended && 1.0f - transmittance > end) {
+        ended = true;
+        const float pick = (end - before) / absorbedHere;
+        keepNearer(first, {t, only < 0 ? channelAt<Blend>(scene, point, pick, extinction) : only});
+      }
     }
     return transmittance > kOpaqueTransmittance;
   });
@@ -113,18 +139,18 @@ SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval 
 struct RayMarch {
   template <class Blend, class Features>
   SCOLOPAX_HD static glm::vec4 sample(const SceneView& scene, const Ray& ray, Interval inside,
-                                      Sampler& sampler, SampleCost* cost) {
+                                      Sampler& sampler, SampleCost* cost, FirstCollision* first) {
     if constexpr (Blend::kSeparate) {
       glm::vec3 color(0.0f);
       float transmittance = 1.0f;
       for (int n = 0; n < scene.channelCount; ++n) {
-        const glm::vec4 alone = marchRay<Blend, Features>(scene, ray, inside, n, sampler, cost);
+        const glm::vec4 alone = marchRay<Blend, Features>(scene, ray, inside, n, sampler, cost, first);
         color += glm::vec3(alone);
         transmittance *= 1.0f - alone.w;
       }
       return glm::vec4(color, 1.0f - transmittance);
     } else {
-      return marchRay<Blend, Features>(scene, ray, inside, -1, sampler, cost);
+      return marchRay<Blend, Features>(scene, ray, inside, -1, sampler, cost, first);
     }
   }
 };

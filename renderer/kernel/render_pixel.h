@@ -14,8 +14,9 @@ template <class Integrator, class Blend, class Features>
 struct RenderPixel {
   SceneView scene;
   SampleNumber number;
-  glm::vec4* pass;   ///< width x height: this sample's linear premultiplied RGBA
-  SampleCost* cost;  ///< the same shape, or null where nobody counts
+  glm::vec4* pass;                  ///< width x height: this sample's linear premultiplied RGBA
+  SampleCost* cost;                 ///< the same shape, or null where nobody counts
+  FirstCollision* first = nullptr;  ///< the same shape, or null where nobody asks
 
   SCOLOPAX_HD void operator()(int pixel) const {
     Sampler sampler(std::uint32_t(pixel), number, scene.seed);
@@ -28,9 +29,12 @@ struct RenderPixel {
 
     SampleCost spent;
     glm::vec4 result(0.0f);
+    FirstCollision met;
     if (scene.channelCount > 0 && inside.enter < inside.exit)
-      result = Integrator::template sample<Blend, Features>(scene, ray, inside, sampler, &spent);
+      result = Integrator::template sample<Blend, Features>(scene, ray, inside, sampler, &spent,
+                                                            first ? &met : nullptr);
     pass[pixel] = result;
+    if (first) first[pixel] = {scene.rays.depth(x, y, met.depth), met.channel};
     if (cost) {
       spent.randomBlocks = sampler.blocks();
       cost[pixel].fetches += spent.fetches;

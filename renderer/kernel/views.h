@@ -84,4 +84,10 @@ struct SampleCost {
   std::uint32_t truncated = 0;
 };
 
+/// What a sample's ray meets first, for pictures of depth and channels.
+struct FirstCollision {
+  float depth = 0.0f;  ///< world units; integrators give it along the ray, passes along the view direction
+  int channel = -1;    ///< among the visible channels; -1: nothing was met
+};
+
 }  // namespace scolopax::kernel

@@ -37,6 +37,7 @@ struct Options {
   std::optional<std::uint32_t> samples;
   std::optional<double> seconds, error;
   std::vector<std::string> assignments;
+  std::vector<std::string> aovs;
   std::filesystem::path stats;
   int threads = 0;
 };
@@ -66,6 +67,30 @@ json patchOf(const std::string& assignment) {
                                "expected names between the dots of PATH=VALUE, found '" + assignment + "'");
   for (auto key = keys.rbegin(); key != keys.rend(); ++key) patch = json{{*key, std::move(patch)}};
   return patch;
+}
+
+/// A picture beside the picture.
+struct AovFile {
+  Aov aov;
+  std::filesystem::path path;
+};
+
+/// "depth=depth.exr".
+AovFile aovFileOf(const std::string& text) {
+  const auto equals = text.find('=');
+  std::string known;
+  for (std::size_t i = 0; i < std::size(kAovs); ++i) {
+    if (equals != std::string::npos && equals + 1 < text.size() && kAovs[i].name == text.substr(0, equals))
+      return {Aov(i), text.substr(equals + 1)};
+    known += (i > 0 ? ", " : "") + std::string(kAovs[i].name);
+  }
+  throw CLI::ValidationError("--aov", "expected NAME=FILE, NAME one of " + known + ", found '" + text + "'");
+}
+
+void writeAov(const AovFile& file, const Renderer& renderer) {
+  const AovValues values = renderer.aov(file.aov);
+  const bool isFloat = io::isFloatFormat(file.path);
+  io::writeImage(file.path, isFloat ? aovImage(values) : aovPicture(values), glm::vec3(0));
 }
 
 /// A line that is rewritten while one watches; nothing where nobody does.
@@ -120,6 +145,12 @@ void render(const Options& options) {
   if (!options.stats.empty()) io::checkWritable(options.stats);
   std::vector<json> patches;
   for (const std::string& assignment : options.assignments) patches.push_back(patchOf(assignment));
+  std::vector<AovFile> aovs;
+  for (const std::string& text : options.aovs) {
+    aovs.push_back(aovFileOf(text));
+    io::checkImageName(aovs.back().path);
+    io::checkWritable(aovs.back().path);
+  }
   json scene = readScene(options.scene);
   const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
   const auto store = std::make_shared<server::DatasetStore>(
@@ -134,6 +165,7 @@ void render(const Options& options) {
 
   const auto renderer = makeCpuRenderer(resolved->dataset->volume, options.threads);
   if (!options.stats.empty()) renderer->countCosts();
+  if (!aovs.empty()) renderer->recordAovs();
   const RebuildStats rebuild = renderer->setScene(resolved->render);
   const std::atomic<bool>& cancel = catchInterrupts();
   ProgressBar bar(stop);
@@ -153,6 +185,7 @@ void render(const Options& options) {
     if (renderer->samples() == 0) endByInterrupt();
   }
   io::writeImage(options.out, renderer->image(), resolved->render.background);
+  for (const AovFile& aov : aovs) writeAov(aov, *renderer);
   if (!options.stats.empty()) writeStats(options.stats, *renderer, rebuild, seconds, *resolved);
   if (cancel) endByInterrupt();
 }
@@ -182,6 +215,14 @@ CLI::App* addRenderCommand(CLI::App& root) {
   command->add_option("--threads", o->threads, "Threads to use; 0 takes all")
       ->envname("SCOLOPAX_THREADS")
       ->check(CLI::Range(0, 1024));
+  std::string names;
+  for (const NamedValue& aov : kAovs) names += fmt::format("\n{}: {}", aov.name, aov.doc);
+  command
+      ->add_option("--aov", o->aovs,
+                   "NAME=FILE: also write what else is known of the pixels, as values to .exr or .tif, as a "
+                   "picture to .png or .jpg:" +
+                       names)
+      ->allow_extra_args(false);
   command->add_option("--stats", o->stats, "Write counts and times as JSON");
   command->footer(
       "With several stop rules the first that is met ends the rendering; without any, the scene's (64 "

@@ -75,6 +75,8 @@ class FakeRenderer : public Renderer {
   double estimatedError() const override { return control_->error(samples_); }
   void countCosts() override {}
   RenderStats stats() const override { return {}; }
+  void recordAovs() override { samples_ = 0; }
+  AovValues aov(Aov which) const override { return {which, 1, 1, {float(samples_)}}; }
   Image image() const override {
     Image image{scene_.width, scene_.height, {}};
     image.pixels.assign(std::size_t(scene_.width) * std::size_t(scene_.height),

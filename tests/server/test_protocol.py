@@ -99,7 +99,8 @@ class Description(unittest.TestCase):
         self.assertEqual((status, told["protocolVersion"], told["backend"]), (200, 1, "cpu"))
         parts = call_json(server, "GET", "/api/v1/schema.json")[1]["$defs"]
         for list_name, part, field in (("methods", "Integrator", "method"), ("blendModes", "Blend", "mode"),
-                                       ("filters", "ImageSettings", "filter")):
+                                       ("filters", "ImageSettings", "filter"),
+                                       ("samplings", "Integrator", "sampling")):
             self.assertEqual([entry["name"] for entry in told[list_name]], parts[part]["properties"][field]["enum"])
             self.assertTrue(all(entry["doc"] for entry in told[list_name]))
         self.assertEqual({entry["name"]: entry["points"] for entry in told["colormaps"]}["gray"][-1], [1, "#ffffff"])
@@ -252,6 +253,33 @@ class Sessions(unittest.TestCase):
         self.assertEqual((told["id"], told["revision"], told["viewers"]), (session["id"], 2, 0))
         self.assertEqual({name: told["frame"][name] for name in ("revision", "samples", "final")},
                          {"revision": 2, "samples": 6, "final": True})
+
+    def test_tell_what_else_is_known_of_the_pixels(self):
+        session = begin(self, {"image": SMALL, "stop": {"samples": 4}, "channels": [{}, {"visible": False}]})
+        wait = path_of(session, "/frame")
+        status, headers, _ = call(server, "GET", f"{wait}?minSamples=4")
+        self.assertEqual((status, headers["Scolopax-Final"]), (200, "1"))
+        color = session["scene"]["channels"][0]["color"]
+        first = tuple(int(color[i:i + 2], 16) for i in (1, 3, 5))
+        # The picture is done, but nothing was recorded: it begins anew.
+        status, headers, picture = call(server, "GET", f"{wait}?aov=channel&format=png&minSamples=4")
+        self.assertEqual((status, headers["Scolopax-Samples"], headers["Scolopax-Revision"]), (200, "4", "1"))
+        self.assertEqual(png_colors(picture), {first, (0, 0, 0)})
+        for name in ("depth", "transmittance", "cost"):
+            status, _, picture = call(server, "GET", f"{wait}?aov={name}&format=png")
+            self.assertEqual((status, png_size(picture)), (200, (SMALL["width"], SMALL["height"])))
+            self.assertGreater(len(png_colors(picture)), 2, name)
+        status, headers, picture = call(server, "GET", f"{wait}?aov=depth&format=exr")
+        self.assertEqual((status, headers["Content-Type"], picture[:4]), (200, "image/x-exr", PICTURES["image/x-exr"]))
+        edit = {"channels": {"0": {"visible": False}}}
+        self.assertEqual(call(server, "PATCH", path_of(session, "/scene"), edit)[0], 200)
+        status, headers, picture = call(server, "GET", f"{wait}?aov=transmittance&format=png")
+        self.assertEqual((status, headers["Scolopax-Revision"], png_colors(picture)), (200, "2", {(255, 255, 255)}))
+        status, _, problem = call(server, "GET", f"{wait}?aov=normal")
+        self.assertEqual(status, 422)
+        self.assertIn("depth, transmittance, channel, cost", json.loads(problem)["detail"])
+        told = call_json(server, "GET", "/api/v1/capabilities")[1]["aovs"]
+        self.assertEqual([one["name"] for one in told], ["depth", "transmittance", "channel", "cost"])
 
     def test_that_are_deleted_are_not_found(self):
         session = begin(self, {"image": SMALL})

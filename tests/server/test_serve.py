@@ -194,6 +194,23 @@ class CommandLine(unittest.TestCase):
             with open(picture, encoding="utf-8") as file:
                 self.assertEqual(file.read(), "before")
 
+    def test_what_else_is_known_of_the_pixels_goes_into_files(self):
+        with tempfile.TemporaryDirectory() as folder:
+            at = lambda name: os.path.join(folder, name)
+            render = ["render", "--data", *write_volume(folder), "-o", at("a.png"), "--samples", "4",
+                      "--set", "image.width=16", "--set", "image.height=16"]
+            result = run(*render, "--aov", "depth=" + at("d.exr"), "--aov", "cost=" + at("c.png"))
+            self.assertEqual((result.returncode, result.stderr), (0, ""))
+            with open(at("d.exr"), "rb") as depth, open(at("c.png"), "rb") as cost, open(at("a.png"), "rb") as picture:
+                self.assertTrue(depth.read().startswith(b"\x76\x2f\x31\x01"))
+                self.assertNotEqual(cost.read(), picture.read())
+            for bad in ("depth", "depth=", "=a.exr", "normal=a.exr"):
+                result = run(*render, "--aov", bad)
+                self.assertEqual(result.returncode, 2, bad)
+                self.assertIn("depth, transmittance, channel, cost", result.stderr)
+            self.assertEqual(run(*render, "--aov", "depth=" + at("d.gif")).returncode, 1)
+            self.assertEqual(run(*render, "--aov", "depth=" + at("none/d.exr")).returncode, 1)
+
     def test_a_number_out_of_range_is_said_in_few_digits(self):
         with tempfile.TemporaryDirectory() as folder:
             for field in ("integrator.step=1e308", "camera.fovY=1e308", "camera.fovY=-1e308"):
