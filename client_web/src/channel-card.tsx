@@ -38,6 +38,7 @@ export function ChannelCard({ store, index, open: openAtFirst }: { store: Store;
   if (!channel) return null;
   const at = (key: string): Path => ['channels', index, key];
   const name = channel.name ?? store.datasets.shown.value?.channels[index]?.name ?? `Channel ${index + 1}`;
+  const unit = store.datasets.shown.value?.channels[index]?.unit;
   const visible = channel.visible ?? true;
   const range = channel.range ?? ([histogram?.minimum ?? 0, histogram?.maximum ?? 1] as const);
   const paint = paintOf(channel.color, channel.colormap, colormaps);
@@ -95,7 +96,7 @@ export function ChannelCard({ store, index, open: openAtFirst }: { store: Store;
               ))}
             </select>
           </Row>
-          <h4>Range</h4>
+          <h4>Range {unit && <span class="unit">{unit}</span>}</h4>
           <RangeEditor
             field={fieldAt(at('range'))}
             range={range as [number, number]}

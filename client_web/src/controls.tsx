@@ -7,9 +7,13 @@ import type { Field } from './schema';
 
 const kLogDecades = 2; // a slider over a scale reaches this far to both sides of its first value
 const kSliderSteps = 400;
+const kNumberLength = 8;
 
-/** Five significant digits: enough to recognise a value, short enough to read. */
-export const shortNumber = (value: number) => String(Number(value.toPrecision(5)));
+/** Five significant digits, or four where that needs an exponent: enough to recognise a value, and what fits an input. */
+export function shortNumber(value: number): string {
+  const plain = String(Number(value.toPrecision(5)));
+  return plain.length <= kNumberLength ? plain : Number(value.toPrecision(4)).toExponential();
+}
 
 interface RowProps {
   field: Field;
@@ -22,7 +26,9 @@ interface RowProps {
 export function Row({ field, children, id, onAutomatic }: RowProps) {
   return (
     <div class="row" title={field.doc}>
-      <label for={id}>{field.label}</label>
+      <label for={id}>
+        {field.label} {field.unit && <span class="unit">{field.unit}</span>}
+      </label>
       <div class="row-value">
         {children}
         {onAutomatic && (
@@ -173,7 +179,9 @@ export function VectorControl({ field, value, onChange }: ControlProps<number[]>
   const axes = field.length === 3 ? ['x', 'y', 'z'] : Array.from({ length: field.length }, (_, i) => String(i + 1));
   return (
     <fieldset class="vector" title={field.doc}>
-      <legend>{field.label}</legend>
+      <legend>
+        {field.label} {field.unit && <span class="unit">{field.unit}</span>}
+      </legend>
       {axes.map((axis, i) => (
         <NumberInput
           key={axis}

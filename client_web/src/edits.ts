@@ -64,6 +64,18 @@ export class Edits {
     return sent === undefined ? undefined : this.now() - sent;
   }
 
+  /** The server has refused the patch of this id: no picture will show it. */
+  refused(id: number): void {
+    this.answered(id);
+    this.sentAt.delete(id);
+  }
+
+  /** How long the oldest patch that no picture has shown has waited; undefined when there is none. */
+  get waitedMs(): number | undefined {
+    const [oldest] = this.sentAt.values();
+    return oldest === undefined ? undefined : this.now() - oldest;
+  }
+
   /** Id of the newest patch sent; 0 for none. */
   get last(): number {
     return this.lastId;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Moves of the scene's camera as pure functions: a turntable around the target, which keeps the horizon level.
+import type { JsonObject } from './merge-patch';
 
 export type Vector = readonly [number, number, number];
 
@@ -94,4 +95,14 @@ export function toPerspective(camera: Camera, fovY: number): Camera {
   const distance = viewHeight(camera) / (2 * Math.tan((fovY * Math.PI) / 360));
   const offset = normalize(subtract(camera.eye, camera.target));
   return { eye: add(camera.target, scale(offset, distance)), target: camera.target, up: camera.up, fovY };
+}
+
+/** The patch that moves the camera from `before` to `camera`. */
+export function cameraPatch(camera: Camera, before: Camera | undefined): JsonObject {
+  const { eye, target, up, orthoHeight, fovY } = camera;
+  const view: JsonObject = { eye: [...eye], target: [...target], up: [...up] };
+  // Either one removes the other, so the angle of view is said only when the projection changes.
+  if (orthoHeight !== undefined) view.orthoHeight = orthoHeight;
+  else if (before?.orthoHeight !== undefined && fovY !== undefined) view.fovY = fovY;
+  return view;
 }

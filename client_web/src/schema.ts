@@ -36,6 +36,8 @@ export interface Field {
   kind: Kind;
   /** What it is, with its unit. */
   doc: string;
+  /** "degrees"; empty for plain numbers. */
+  unit: string;
   /** Bounds, and whether the bound itself is allowed. */
   minimum?: number;
   maximum?: number;
@@ -105,11 +107,13 @@ const inWords = (key: string) => {
 
 function describeNode(key: string, outer: SchemaNode): Field {
   const { node, automatic } = withoutNull(outer);
+  const doc = (node.description ?? '').split('\n')[0]!; // the lines below it are the choices'
   return {
     key,
     label: inWords(key),
     kind: kindOf(node),
-    doc: (node.description ?? '').split('\n')[0]!, // the lines below it are the choices'
+    doc,
+    unit: doc.match(/ Unit: ([^.]+)\.$/)?.[1] ?? '',
     minimum: node.minimum ?? node.exclusiveMinimum,
     maximum: node.maximum ?? node.exclusiveMaximum,
     aboveMinimum: node.exclusiveMinimum !== undefined,

@@ -68,6 +68,9 @@ export function StatusBar({ store }: { store: Store }) {
           </button>
         )}
       </span>
+      <span class="rendering" aria-live="polite">
+        {state.kind === 'connected' && store.wait.shown.value ? 'Rendering …' : ''}
+      </span>
       {frame && (
         <>
           <Figure
@@ -86,8 +89,8 @@ export function StatusBar({ store }: { store: Store }) {
             hint="From sending an edit to the first picture that contains it"
           />
           <Figure name="frames/s" value={rate.toFixed(1)} hint="Pictures drawn per second" />
-          <Figure name="" value={store.scene.value?.integrator?.method ?? ''} hint="Method" />
-          <Figure name="" value={`${frame.width} × ${frame.height}`} hint="Size of the picture received" />
+          <Figure name="method" value={store.scene.value?.integrator?.method ?? ''} hint="Method; auto: the server chooses" />
+          <Figure name="pixels" value={`${frame.width} × ${frame.height}`} hint="Size of the picture received" />
         </>
       )}
     </footer>

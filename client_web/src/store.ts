@@ -3,30 +3,22 @@
 // the components, which read signals and call edit().
 import { batch, computed, signal } from '@preact/signals';
 import { ApiError, api, type Capabilities, type Problem, type SessionInfo } from './api';
+import { applyEdit } from './apply-edit';
 import { Connection, type ConnectionState } from './connection';
 import { DatasetList } from './dataset-list';
 import { Edits } from './edits';
+import { EditWait } from './edit-wait';
 import type { FrameHeader } from './frame-header';
 import { FrameMeter } from './frame-meter';
 import { fitSize, type Size } from './image-size';
-import { applyPatch, isObject, patchAt, type Json, type JsonObject } from './merge-patch';
-import type { Camera } from './orbit-camera';
+import { isObject, patchAt, type Json, type JsonObject } from './merge-patch';
+import { cameraPatch, type Camera } from './orbit-camera';
 import type { Scene } from './scene.generated';
 import { sayPointer, type Path } from './schema';
 import { ToastList } from './toast-list';
 
 const kSettleMs = 250;
 const kMemory = 'scolopax.session';
-
-/** The scene as it will be: camera projections exclude each other, the last one set wins. */
-function applyEdit(scene: Json | undefined, patch: JsonObject): Scene {
-  const next = applyPatch(scene ?? {}, patch) as JsonObject;
-  if (isObject(patch.camera) && isObject(next.camera)) {
-    if (patch.camera.fovY != null) delete next.camera.orthoHeight;
-    else if (patch.camera.orthoHeight != null) delete next.camera.fovY;
-  }
-  return next as Scene;
-}
 
 export class Store {
   readonly connection = signal<ConnectionState>({ kind: 'connecting' });
@@ -47,7 +39,13 @@ export class Store {
     return { eye, target, up, fovY: fovY ?? undefined, orthoHeight: orthoHeight ?? undefined };
   });
 
-  private readonly edits = new Edits((id, patch) => this.link.send({ type: 'patch', id, patch }));
+  private readonly edits = new Edits((id, patch) => {
+    const sent = this.link.send({ type: 'patch', id, patch });
+    if (sent) queueMicrotask(() => this.wait.update());
+    return sent;
+  });
+  /** The server is at work on an edit. */
+  readonly wait = new EditWait(() => this.edits.waitedMs);
   private readonly link: Connection;
   private revision = 0;
   private settleTimer: ReturnType<typeof setTimeout> | undefined;
@@ -86,20 +84,7 @@ export class Store {
   }
 
   setCamera(camera: Camera): void {
-    const { eye, target, up, orthoHeight } = camera;
-    this.edit({
-      camera: {
-        eye: [...eye],
-        target: [...target],
-        up: [...up],
-        // Either one removes the other, so the angle of view is said only when the projection changes.
-        ...(orthoHeight !== undefined
-          ? { orthoHeight }
-          : this.camera.peek()?.orthoHeight !== undefined && camera.fovY !== undefined
-            ? { fovY: camera.fovY }
-            : {}),
-      },
-    });
+    this.edit({ camera: cameraPatch(camera, this.camera.peek()) });
   }
 
   /** Has the server choose the view again; `then` runs when it is known. */
@@ -126,6 +111,7 @@ export class Store {
     batch(() => {
       this.frame.value = header;
       this.meter.drawn(this.edits.seen(header.patch));
+      this.wait.update();
     });
   }
 
@@ -142,6 +128,7 @@ export class Store {
     this.revision = 0;
     if (fresh) this.edits.forget();
     else this.edits.resend();
+    this.wait.update();
     this.setVisible(document.visibilityState === 'visible');
     try {
       if (fresh || !this.datasets.shown.peek()) await this.datasets.load();
@@ -163,7 +150,8 @@ export class Store {
   }
 
   private receiveProblem(problem: Problem, patch?: number): void {
-    if (patch) this.edits.answered(patch);
+    if (patch) this.edits.refused(patch);
+    this.wait.update();
     const { detail, title, pointer = '' } = problem;
     const text = detail ?? title ?? 'The server reports an error.';
     // The detail begins with the pointer, which is said in words instead.

@@ -56,3 +56,11 @@ describe('a slider', () => {
     expect(sliderScale(fieldAt(['stop', 'seconds']), undefined)).toBeUndefined();
   });
 });
+
+describe('units', () => {
+  it('are those that the schema names', () => {
+    expect(fieldAt(['camera', 'fovY']).unit).toBe('degrees');
+    expect(fieldAt(['channels', 0, 'density']).unit).toBe('1 / world unit');
+    expect(fieldAt(['channels', 0, 'gamma']).unit).toBe('');
+  });
+});

@@ -9,22 +9,24 @@ namespace scolopax {
 
 /// One line per entry: C++ name, wire name, what it is. Adding a tracker or blend mode is a line here and a
 /// struct in renderer/kernel; the instantiations expand these lists.
-#define SCOLOPAX_BLEND_MODES(X)                                                                             \
-  X(density, "density", "extinctions add up; a collision shows the one channel it happened in (Eq. 6-7)")   \
-  X(max, "max", "at every point the channel of the largest extinction hides the others (Eq. 8-9)")          \
-  X(mix, "mix", "extinction as max; colours of all channels weighted by extinction and weight (Eq. 8, 10)") \
-  X(composite, "composite",                                                                                 \
-    "every channel rendered alone, the pictures added: depth between channels is lost (4.2)")
+#define SCOLOPAX_BLEND_MODES(X) /* Eq. 6-7; Eq. 8-9; Eq. 8 and 10; section 4.2 */                          \
+  X(density, "density",                                                                                    \
+    "all channels share the space: each is seen through the others, and where they overlap their colours " \
+    "mix")                                                                                                 \
+  X(max, "max", "at every point only the channel that is densest there is seen; it hides the others")      \
+  X(mix, "mix",                                                                                            \
+    "as dense as the densest channel; the colours of all are mixed, by their density and weight")          \
+  X(composite, "composite",                                                                                \
+    "every channel is drawn by itself and the pictures are added: what is in front is lost")
 
-#define SCOLOPAX_METHODS(X)                                                                                  \
-  X(superposed, "superposed",                                                                                \
-    "one Poisson process over all channels; a drawn channel is fetched and tested; unbiased")                \
-  X(cumulative, "cumulative",                                                                                \
-    "one Poisson process over all channels; all are fetched and tested (5.1); unbiased")                     \
-  X(syncDda, "sync-dda", "one traversal, every channel tracked inside each macrocell (Listing 4); unbiased") \
-  X(nDda, "n-dda",                                                                                           \
-    "a traversal for every channel, the nearest collision wins (Listing 3, mended); unbiased")               \
-  X(raymarch, "raymarch", "equal steps along the ray, no noise but that of the jitter; biased by the step")
+#define SCOLOPAX_METHODS(X) /* Listings 3 (n-dda, mended) and 4 (sync-dda); section 5.1 (cumulative) */     \
+  X(superposed, "superposed",                                                                               \
+    "follows all channels at once and looks up one of them a step; exact but for noise")                    \
+  X(cumulative, "cumulative",                                                                               \
+    "follows all channels at once and looks up all of them a step; exact but for noise")                    \
+  X(syncDda, "sync-dda", "follows one channel after the other inside each small cell; exact but for noise") \
+  X(nDda, "n-dda", "follows every channel by itself, the nearest hit wins; exact but for noise")            \
+  X(raymarch, "raymarch", "equal steps along the ray: little noise, but the picture depends on the step")
 
 #define SCOLOPAX_LIGHT_TYPES(X)                                                   \
   X(directional, "directional", "parallel rays that travel along `direction`")    \

@@ -53,6 +53,20 @@ test('the picture is as large as the window leaves it, also when that changes', 
   }
 });
 
+test('an edit that is not answered for a while is said to be rendering, until its picture comes', async () => {
+  const sign = page.locator('.rendering');
+  await steadyPicture(page, 4);
+  assert.equal(await sign.textContent(), '');
+  server.signal('SIGSTOP');
+  try {
+    await firstColour().fill('#00ff80');
+    await eventually(async () => (await sign.textContent()) === 'Rendering …', 'nothing says that an edit waits');
+  } finally {
+    server.signal('SIGCONT');
+  }
+  await eventually(async () => (await sign.textContent()) === '', 'it is said for ever');
+});
+
 test('samples rise and the estimated error falls', async () => {
   const error = async () => Number((await page.locator('.status').textContent()).match(/([\d.e-]+) error/)?.[1]);
   await steadyPicture(page, 4);

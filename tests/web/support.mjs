@@ -29,7 +29,7 @@ export function generateOrbitals(folder, name = 'orbitals.nrrd', options = ['--s
   return file;
 }
 
-/** Starts the server and waits for its ready line. `end(signal)` ends it and waits until it has. */
+/** Starts the server and waits for its ready line. `end(signal)` ends it and waits until it has; `signal` only sends. */
 export async function startServer(files, options = [], port = '0') {
   if (!existsSync(path.join(root, 'client_web/dist/index.html')))
     throw new Error('client_web/dist is missing: run `npm ci && npm run build` in client_web first');
@@ -54,7 +54,7 @@ export async function startServer(files, options = [], port = '0') {
     child.kill(signal);
     await ended;
   };
-  return { url, port: new URL(url).port, end };
+  return { url, port: new URL(url).port, end, signal: (name) => child.kill(name) };
 }
 
 export const launchBrowser = () =>
