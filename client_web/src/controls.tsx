@@ -27,7 +27,7 @@ export function Row({ field, children, id, onAutomatic }: RowProps) {
   return (
     <div class="row" title={field.doc}>
       <label for={id}>
-        {field.label} {field.unit && <span class="unit">{field.unit}</span>}
+        {field.label} {field.unit && field.unit !== field.key && <span class="unit">{field.unit}</span>}
       </label>
       <div class="row-value">
         {children}

@@ -33,7 +33,7 @@ export function SettingsPanel({ store }: { store: Store }) {
         <summary>More settings</summary>
         {groups.map(({ label, paths }) => (
           <div key={label} role="group" aria-label={label}>
-            <h4>{label}</h4>
+            {paths[0]!.length > 1 && <h4>{label}</h4>}
             <FieldControls store={store} paths={paths} />
           </div>
         ))}
