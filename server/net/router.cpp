@@ -47,9 +47,8 @@ class Matcher : public httplib::Server {
   Matcher() {
     // process_request only runs a request while the server counts as started.
     svr_sock_ = 0;
-    set_exception_handler([](const httplib::Request&, httplib::Response& response, const std::exception_ptr&) {
-      response.status = 500;
-    });
+    set_exception_handler([](const httplib::Request&, httplib::Response& response,
+                             const std::exception_ptr&) { response.status = 500; });
   }
   ~Matcher() override { svr_sock_ = INVALID_SOCKET; }
 
