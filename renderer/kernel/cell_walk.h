@@ -60,8 +60,12 @@ class CellWalk {
   /// Moves to the next cell; false at the end of the ray.
   SCOLOPAX_HD bool advance() {
     if (!(exit_ < end_)) return false;
-    cell_[axis_] += ray_.direction[axis_] > 0.0f ? 1 : -1;
-    next_[axis_] = planeAfter(axis_);
+    // A loop over constant indices: what a variable indexes cannot stay in a GPU's registers.
+    for (int axis = 0; axis < 3; ++axis) {
+      if (axis != axis_) continue;
+      cell_[axis] += ray_.direction[axis] > 0.0f ? 1 : -1;
+      next_[axis] = planeAfter(axis);
+    }
     enter_ = exit_;
     leave();
     return true;
@@ -91,7 +95,7 @@ class CellWalk {
   }
   SCOLOPAX_HD void leave() {
     axis_ = next_.x <= next_.y ? (next_.x <= next_.z ? 0 : 2) : (next_.y <= next_.z ? 1 : 2);
-    exit_ = maximum(enter_, minimum(next_[axis_], end_));
+    exit_ = maximum(enter_, minimum(axis_ == 0 ? next_.x : axis_ == 1 ? next_.y : next_.z, end_));
   }
 
   Ray ray_;

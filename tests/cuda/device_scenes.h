@@ -73,12 +73,12 @@ inline Scene obliqueScene(const Volume& volume, int width, int height) {
 }
 
 /// Picture and cost by cuda/, with whatever runtime the program is linked with.
-struct DevicePicture {
+struct PictureAndCost {
   Image image;
   std::vector<kernel::SampleCost> cost;
 };
-inline DevicePicture renderOnDevice(const std::shared_ptr<const Volume>& volume, const Scene& scene,
-                                    std::uint32_t samples) {
+inline PictureAndCost renderOnDevice(const std::shared_ptr<const Volume>& volume, const Scene& scene,
+                                     std::uint32_t samples) {
   RenderPlan plan(volume);
   plan.update(scene);
   Film film;

@@ -33,5 +33,35 @@ TEST(PtxKernels, AreCaughtReadingAndWritingWhereTheyMayNot) {
   EXPECT_THAT(faultOf(plan.view(), 64), testing::HasSubstr("load outside of memory"));  // the host's pointers
 }
 
+TEST(PtxMemory, IsWhatAThreadOwnsAlignedAndOnlyWhileItDoes) {
+  const std::vector<ptx::Range> global{{1000, 1024}, {2000, 2004}}, parameters{{3000, 3008}};
+  ptx::Thread thread{{}, {}, {}, {}, global, parameters};
+  const auto allowed = [&](std::uint64_t address, std::size_t size, ptx::Access access) {
+    try {
+      ptx::checkAccess(thread, address, size, access);
+      return true;
+    } catch (const ptx::Fault&) {
+      return false;
+    }
+  };
+  using enum ptx::Access;
+  EXPECT_TRUE(allowed(1000, 8, load) && allowed(1016, 8, store) && allowed(2000, 4, store));
+  EXPECT_FALSE(allowed(1024, 1, load) || allowed(999, 1, load) || allowed(2000, 8, store));
+  EXPECT_FALSE(allowed(1004, 8, load)) << "misaligned";
+  EXPECT_TRUE(allowed(3000, 8, load));
+  EXPECT_FALSE(allowed(3000, 8, store)) << "parameters are constant";
+  alignas(8) std::byte outer[8], inner[8];
+  {
+    const ptx::Frame outerFrame(thread, outer);
+    {
+      const ptx::Frame innerFrame(thread, inner);
+      EXPECT_TRUE(allowed(ptx::addressOf(outer), 8, store) && allowed(ptx::addressOf(inner), 8, store));
+    }
+    EXPECT_TRUE(allowed(ptx::addressOf(outer), 8, load));
+    EXPECT_FALSE(allowed(ptx::addressOf(inner), 8, load));
+  }
+  EXPECT_FALSE(allowed(ptx::addressOf(outer), 8, load));
+}
+
 }  // namespace
 }  // namespace scolopax

@@ -110,6 +110,10 @@ struct Table {
   Table(const void* values, std::size_t size);
 };
 
+/// Throws Fault unless the address is a multiple of the size, a power of two; of a vector, its whole size.
+inline void checkAlignment(std::uint64_t address, std::size_t size) {
+  if (address % size != 0) throw Fault("misaligned address");
+}
 enum class Access { load, store };
 /// Throws Fault unless the thread may make this access.
 void checkAccess(const Thread& thread, std::uint64_t address, std::size_t size, Access access);

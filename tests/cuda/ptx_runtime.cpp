@@ -64,7 +64,7 @@ std::vector<std::string> kernelNames() {
 }
 
 void checkAccess(const Thread& thread, std::uint64_t address, std::size_t size, Access access) {
-  if (address % size != 0) throw Fault("misaligned address");
+  checkAlignment(address, size);
   const auto after = std::upper_bound(thread.global.begin(), thread.global.end(), Range{address, 0}, before);
   if (after != thread.global.begin() && std::prev(after)->holds(address, size)) return;
   for (const Frame* frame = thread.local; frame; frame = frame->outer)

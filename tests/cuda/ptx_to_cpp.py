@@ -178,7 +178,10 @@ class FunctionTranslator:
         load = "ptx::read" if "param" in modifiers else "ptx::load"
         where = "" if "param" in modifiers else "thread, "
         code = f"{{ const std::uint64_t at = {self.address(operands[1])}; "
-        for i, register in enumerate(self.vector(modifiers, operands[0])):
+        registers = self.vector(modifiers, operands[0])
+        if len(registers) > 1:
+            code += f"ptx::checkAlignment(at, {len(registers) * size}); "
+        for i, register in enumerate(registers):
             code += self.assign(register, type_name, f"{load}<{CPP_TYPES[type_name]}>({where}at + {i * size})")
         return code + " }"
 
@@ -188,7 +191,10 @@ class FunctionTranslator:
         store = "ptx::write" if "param" in modifiers else "ptx::store"
         where = "" if "param" in modifiers else "thread, "
         code = f"{{ const std::uint64_t at = {self.address(operands[0])}; "
-        for i, register in enumerate(self.vector(modifiers, operands[1])):
+        registers = self.vector(modifiers, operands[1])
+        if len(registers) > 1:
+            code += f"ptx::checkAlignment(at, {len(registers) * size}); "
+        for i, register in enumerate(registers):
             code += f"{store}<{CPP_TYPES[type_name]}>({where}at + {i * size}, {self.value(register, type_name)}); "
         return code + "}"
 

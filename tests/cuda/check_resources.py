@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""check_resources.py FILE.ptx...: what each kernel needs of a device, by ptxas; fails beyond the limits below."""
+import re
+import subprocess
+import sys
+
+ARCHITECTURES = ["sm_75", "sm_90"]
+# Without light all but three of twenty kernels (mix by n-dda and sync-dda, composite by raymarch) stay within 104
+# registers, 64 bytes of spilling and 64 of stack. With light, shading indexes vectors and shadows march once more.
+LIMITS = {"registers": 128, "spill": 112, "stack": 80}
+LIMITS_LIT = {"registers": 168, "spill": 400, "stack": 320}
+
+KERNEL = re.compile(r"entry function '(\w+)'.*?(\d+) bytes stack frame, (\d+) bytes spill stores.*?Used (\d+) registers",
+                    re.DOTALL)
+
+kernels, excesses = 0, []
+for architecture in ARCHITECTURES:
+    largest = {"registers": 0, "spill": 0, "stack": 0}
+    for file in sys.argv[1:]:
+        result = subprocess.run(["ptxas", "-v", f"-arch={architecture}", file, "-o", "/dev/null"],
+                                capture_output=True, text=True, check=True)
+        for name, stack, spill, registers in KERNEL.findall(result.stderr):
+            kernels += 1
+            used = {"registers": int(registers), "spill": int(spill), "stack": int(stack)}
+            limits = LIMITS if "LightFeaturesILb0ELb0E" in name else LIMITS_LIT
+            for what, amount in used.items():
+                largest[what] = max(largest[what], amount)
+                if amount > limits[what]:
+                    excesses.append(f"{architecture} {name}: {what} {amount}, at most {limits[what]}")
+    print(architecture, "at most", largest)
+print(kernels, "kernels")
+if kernels == 0 or excesses:
+    sys.exit("\n".join(excesses) or "no kernels")
