@@ -11,7 +11,7 @@ SCOLOPAX := build/release/scolopax
 # Two recipes would run .ci/install at once; the tools called use all processors on their own.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: run build web test check check-asan-ubsan check-tsan check-tidy check-fuzz check-format deps test-deps format clean
+.PHONY: run build web test check check-asan-ubsan check-tsan check-tidy check-fuzz check-format check-cuda deps test-deps format clean
 
 run: build web $(if $(strip $(DATA)),,$(DEMO))
 	exec $(SCOLOPAX) serve $(if $(strip $(DATA)),$(DATA),$(DEMO)) --port $(PORT)
@@ -33,7 +33,7 @@ test: test-deps web
 	cmake --build --preset release -j $(JOBS)
 	ctest --test-dir build/release --output-on-failure
 
-check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz
+check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
 	SCOLOPAX_STATISTICS=4 ctest --test-dir build/release -L statistics --output-on-failure
 
 check-asan-ubsan: test-deps
@@ -53,12 +53,18 @@ check-fuzz: test-deps
 	cmake --build --preset fuzz -j $(JOBS)
 	ctest --test-dir build/fuzz -L fuzz --output-on-failure
 
+# With nvcc; without one, configuring says so and there is nothing to check.
+check-cuda: test-deps
+	cmake --preset cuda > /dev/null
+	cmake --build --preset cuda -j $(JOBS) --target cuda_checks
+	ctest --test-dir build/cuda -L cuda --output-on-failure
+
 # clang 14 has coroutines but does not say so; Boost and libstdc++ ask.
 TIDY := clang-tidy --quiet -p build/release --extra-arg=-D__cpp_impl_coroutine=201902L \
   --extra-arg=-DBOOST_ASIO_HAS_CO_AWAIT=1 --extra-arg=-DBOOST_ASIO_HAS_STD_COROUTINE=1
 
 check-tidy: build test-deps
-	git ls-files 'renderer/*.cpp' 'protocol/*.cpp' 'server/*.cpp' | xargs -P $(JOBS) -n 4 $(TIDY)
+	git ls-files 'renderer/*.cpp' 'cuda/*.cpp' 'protocol/*.cpp' 'server/*.cpp' | xargs -P $(JOBS) -n 4 $(TIDY)
 
 check-format: test-deps
 	git ls-files '*.cpp' '*.h' '*.cu' | xargs clang-format --dry-run --Werror

@@ -16,19 +16,8 @@ namespace scolopax {
 namespace {
 
 TileFunction chooseKernel(const Scene& scene) {
-  switch (scene.method) {
-    case Method::superposed:
-      return chooseTileFunction<kernel::Analog<kernel::Superposed>>(scene);
-    case Method::cumulative:
-      return chooseTileFunction<kernel::Analog<kernel::Cumulative>>(scene);
-    case Method::syncDda:
-      return chooseTileFunction<kernel::Analog<kernel::SyncDda>>(scene);
-    case Method::nDda:
-      return chooseTileFunction<kernel::Analog<kernel::NDda>>(scene);
-    case Method::raymarch:
-      return chooseTileFunction<kernel::RayMarch>(scene);
-  }
-  return nullptr;
+  return visitIntegrator(scene,
+                         [&](auto integrator) { return chooseTileFunction<decltype(integrator)>(scene); });
 }
 
 class CpuRenderer final : public Renderer {

@@ -6,12 +6,8 @@
 #include <atomic>
 #include <chrono>
 
-#include "renderer/data/scene.h"
-#include "renderer/kernel/analog.h"
-#include "renderer/kernel/raymarch.h"
+#include "renderer/data/instances.h"
 #include "renderer/kernel/render_pixel.h"
-#include "renderer/kernel/trackers/one_process.h"
-#include "renderer/kernel/trackers/process_per_channel.h"
 
 namespace scolopax {
 
@@ -52,29 +48,11 @@ void renderTile(const Pass& pass, int tileX, int tileY) {
   }
 }
 
-template <class Integrator, class Blend>
-TileFunction chooseLight(const Scene& scene) {
-  using kernel::LightFeatures;
-  if (scene.shading)
-    return scene.shadows ? renderTile<Integrator, Blend, LightFeatures<true, true>>
-                         : renderTile<Integrator, Blend, LightFeatures<true, false>>;
-  return scene.shadows ? renderTile<Integrator, Blend, LightFeatures<false, true>>
-                       : renderTile<Integrator, Blend, LightFeatures<false, false>>;
-}
-
 template <class Integrator>
 TileFunction chooseTileFunction(const Scene& scene) {
-  switch (scene.blend) {
-    case BlendMode::density:
-      return chooseLight<Integrator, kernel::BlendDensity>(scene);
-    case BlendMode::max:
-      return chooseLight<Integrator, kernel::BlendMax>(scene);
-    case BlendMode::mix:
-      return chooseLight<Integrator, kernel::BlendMix>(scene);
-    case BlendMode::composite:
-      return chooseLight<Integrator, kernel::BlendComposite>(scene);
-  }
-  return nullptr;
+  return visitBlendAndLight(scene, [](auto blend, auto features) -> TileFunction {
+    return renderTile<Integrator, decltype(blend), decltype(features)>;
+  });
 }
 
 extern template TileFunction chooseTileFunction<kernel::Analog<kernel::Superposed>>(const Scene&);
