@@ -33,16 +33,14 @@ double ScalarField::operator()(const glm::dvec3& point) const {
   const glm::dvec3 cell = glm::min(glm::floor(p), glm::max(glm::dvec3(dims_) - 2.0, 0.0));
   const auto c = corners(glm::ivec3(cell));
   if (!c) return std::numeric_limits<double>::quiet_NaN();
-  double sum = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    double weight = 1;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double w = p[axis] - cell[axis];
-      weight *= corner >> axis & 1 ? w : 1 - w;
-    }
-    sum += weight * (*c)[std::size_t(corner)];
+  // Axis by axis, so that equal corners give their value to the last bit: no gradient from rounding.
+  std::array<double, 8> v = *c;
+  for (std::size_t axis = 0, count = 4; axis < 3; ++axis, count /= 2) {
+    const double w = p[int(axis)] - cell[int(axis)];
+    for (std::size_t i = 0; i < count; ++i)
+      v[i] = w == 1 ? v[2 * i + 1] : v[2 * i] + w * (v[2 * i + 1] - v[2 * i]);
   }
-  return sum;
+  return v[0];
 }
 
 glm::dvec3 ScalarField::gradient(const glm::dvec3& point) const {

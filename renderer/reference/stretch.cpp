@@ -95,8 +95,14 @@ void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, BlendMode bl
     // belong to the outermost cells.
     const glm::dvec3 cell = glm::clamp(glm::floor(ray.origin + 0.5 * (begin + end) * ray.direction),
                                        glm::dvec3(0), glm::max(glm::dvec3(dims) - 2.0, 0.0));
+    // There coordinates are 0 or 1 exactly, at the cut as well: what is equal is equal to the last bit, and
+    // max can tell which of two channels comes first.
+    const glm::dvec3 between = ray.origin + 0.5 * (begin + end) * ray.direction - cell;
     const auto inCell = [&](double t) {
-      return glm::clamp(ray.origin + t * ray.direction - cell, glm::dvec3(0), glm::dvec3(1));
+      glm::dvec3 p = glm::clamp(ray.origin + t * ray.direction - cell, glm::dvec3(0), glm::dvec3(1));
+      for (int axis = 0; axis < 3; ++axis)
+        if (between[axis] <= 0 || between[axis] >= 1) p[axis] = between[axis] <= 0 ? 0 : 1;
+      return p;
     };
     stretch.length = end - begin;
     stretch.begin = ray.origin + begin * ray.direction;

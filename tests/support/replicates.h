@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures of one scene that are independent of each other: one seed each, so that low-discrepancy points are
+// scrambled anew. Their spread says what noise explains; agreement.h decides.
+#pragma once
+#include <utility>
+#include <vector>
+
+#include "renderer/data/render_plan.h"
+#include "renderer/data/sampling.h"
+#include "renderer/kernel/analog.h"
+#include "renderer/kernel/render_pixel.h"
+#include "tests/support/statistics.h"
+
+namespace scolopax::test {
+
+inline constexpr int kReplicates = 32;
+/// Of a replicate, times statisticsFactor(): at factor 4 a replicate has all points of one scrambling.
+inline constexpr int kSamplesPerReplicate = 16;
+inline int samplesPerReplicate() { return kSamplesPerReplicate * statisticsFactor(); }
+
+struct Replicates {
+  std::vector<Image> pictures;  ///< each the mean of `samples` samples of every pixel
+  int samples = 0;
+};
+
+/// What the CPU backend draws.
+inline Replicates replicate(const std::shared_ptr<const Volume>& volume, Scene scene, Method method) {
+  scene.method = method;
+  Replicates result{{}, samplesPerReplicate()};
+  const auto renderer = makeCpuRenderer(volume, 0);
+  const std::atomic<bool> never = false;
+  for (int r = 0; r < kReplicates; ++r) {
+    scene.seed = std::uint32_t(1000 + r);
+    renderer->setScene(scene);
+    for (int s = 0; s < result.samples; ++s) renderer->renderSample(never);
+    result.pictures.push_back(renderer->image());
+  }
+  return result;
+}
+
+/// The same pictures from one kernel of the test's choice, on a view that `change` may have spoilt: for
+/// seeded defects. `change(view)` is called for every replicate; what it makes the view point at must live
+/// until the next call.
+template <class Integrator, class Blend, class Features, class Change>
+Replicates replicateKernel(const std::shared_ptr<const Volume>& volume, Scene scene, Change&& change) {
+  Replicates result{{}, samplesPerReplicate()};
+  RenderPlan plan(volume);
+  for (int r = 0; r < kReplicates; ++r) {
+    scene.seed = std::uint32_t(1000 + r);
+    plan.update(scene);
+    kernel::SceneView view = plan.view();
+    change(view);
+    const std::size_t count = std::size_t(view.width) * std::size_t(view.height);
+    std::vector<glm::vec4> pass(count);
+    std::vector<glm::dvec4> sum(count, glm::dvec4(0));
+    for (int s = 0; s < result.samples; ++s) {
+      const kernel::RenderPixel<Integrator, Blend, Features> pixel{
+          view, sampleNumber(scene.sampling, std::uint32_t(s)), pass.data(), nullptr};
+      for (int i = 0; i < int(count); ++i) {
+        pixel(i);
+        sum[std::size_t(i)] += glm::dvec4(pass[std::size_t(i)]);
+      }
+    }
+    Image picture{view.width, view.height, std::vector<glm::vec4>(count)};
+    for (std::size_t i = 0; i < count; ++i) picture.pixels[i] = glm::vec4(sum[i] / double(result.samples));
+    result.pictures.push_back(std::move(picture));
+  }
+  return result;
+}
+
+}  // namespace scolopax::test
