@@ -14,8 +14,8 @@
 namespace scolopax::test {
 
 inline constexpr int kReplicates = 32;
-/// Of a replicate, times statisticsFactor(): at factor 4 a replicate has all points of one scrambling.
-inline constexpr int kSamplesPerReplicate = 16;
+/// Of a replicate, times statisticsFactor(): all points of one scrambling.
+inline constexpr int kSamplesPerReplicate = int(kernel::kReplicateSamples);
 inline int samplesPerReplicate() { return kSamplesPerReplicate * statisticsFactor(); }
 
 struct Replicates {

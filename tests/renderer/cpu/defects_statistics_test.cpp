@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: Apache-2.0
+// The negative controls of the statistical tests: mistakes of the kinds that renderers have, sown on purpose,
+// each of which the comparison with the reference must notice.
+//
+// Two it cannot notice. One scrambling shared by all pixels leaves every pixel's expected value as it is;
+// LowDiscrepancy.LeavesNoiseWithoutStructure sees it. A sample that is lost, or counted twice, and divided by
+// the number that is left, is as unbiased as any; CpuRenderer.KeepsASampleIndependentOfHowManyCameBefore sees
+// it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "renderer/kernel/trackers/one_process.h"
+#include "tests/support/agreement.h"
+#include "tests/support/estimator_scenes.h"
+#include "tests/support/printed_n_dda.h"
+
+namespace scolopax {
+namespace {
+
+using namespace test;
+using kernel::Analog;
+using kernel::LightFeatures;
+using kernel::SceneView;
+
+/// Shadow rays are those that begin inside the box: the eyes of the test scenes are outside.
+bool isShadowRay(kernel::Interval inside) { return !(inside.enter > 0); }
+
+/// Shading sees the light where it is, shadow rays look for it on the other side.
+struct FlippedShadows {
+  template <class Blend>
+  static std::optional<kernel::Collision> track(const SceneView& scene, kernel::Ray ray,
+                                                kernel::Interval inside, kernel::Sampler& sampler,
+                                                kernel::SampleCost* cost) {
+    if (isShadowRay(inside)) {
+      ray.direction = -ray.direction;
+      inside = kernel::clipToBox(ray, scene.dims);
+      if (!(inside.enter < inside.exit)) return std::nullopt;
+    }
+    return kernel::Superposed::track<Blend>(scene, ray, inside, sampler, cost);
+  }
+};
+
+/// Shadow rays do not see the last channel.
+struct ShadowsWithoutTheLastChannel {
+  template <class Blend>
+  static std::optional<kernel::Collision> track(const SceneView& scene, const kernel::Ray& ray,
+                                                kernel::Interval inside, kernel::Sampler& sampler,
+                                                kernel::SampleCost* cost) {
+    std::optional<kernel::Collision> nearest;
+    const int count = scene.channelCount - (isShadowRay(inside) ? 1 : 0);
+    for (int n = 0; n < count; ++n)
+      kernel::trackChannel<Blend>(scene, n, ray, inside, sampler, &nearest, cost);
+    return nearest;
+  }
+};
+
+/// Shadow rays that see nothing within half a voxel: the usual cure for noise that is none.
+struct ShadowsThatBeginLate {
+  template <class Blend>
+  static std::optional<kernel::Collision> track(const SceneView& scene, const kernel::Ray& ray,
+                                                kernel::Interval inside, kernel::Sampler& sampler,
+                                                kernel::SampleCost* cost) {
+    if (isShadowRay(inside)) inside.enter += 0.5f * scene.smallestSpacing;
+    if (!(inside.enter < inside.exit)) return std::nullopt;
+    return kernel::Superposed::track<Blend>(scene, ray, inside, sampler, cost);
+  }
+};
+
+class Defect : public testing::Test {
+ protected:
+  void use(TestScene which, BlendMode blend, bool shading, bool shadows) {
+    made_ = *testScene(which);
+    made_.scene.blend = blend;
+    made_.scene.shading = shading;
+    made_.scene.shadows = shadows;
+    expected_ = reference::renderReference(*made_.volume, made_.scene, 1);
+  }
+  /// The scene drawn by this kernel, with a view that `change` has spoilt.
+  template <class Tracker, class Blend, class Features = LightFeatures<false, false>, class Change>
+  ::testing::AssertionResult passes(Change&& change) {
+    const auto found = replicateKernel<Analog<Tracker>, Blend, Features>(made_.volume, made_.scene, change);
+    return haveMean(found, made_.scene, expected_);
+  }
+  template <class Tracker, class Blend, class Features>
+  ::testing::AssertionResult passes() {
+    return passes<Tracker, Blend, Features>([](SceneView&) {});
+  }
+  /// The backend drawing another scene than the reference did.
+  ::testing::AssertionResult passesWith(const std::function<void(Scene&)>& change) {
+    Scene spoilt = made_.scene;
+    change(spoilt);
+    return haveMean(replicate(made_.volume, spoilt, Method::superposed), made_.scene, expected_);
+  }
+  /// Copies what the view points at, so that a test can write to it.
+  std::vector<kernel::ChannelView>& ownChannels(SceneView& view) {
+    channels_.assign(view.channels, view.channels + view.channelCount);
+    view.channels = channels_.data();
+    return channels_;
+  }
+  std::vector<float>& ownMajorants(SceneView& view) {
+    const auto& grid = view.majorants;
+    const std::size_t cells =
+        std::size_t(grid.cells.x) * std::size_t(grid.cells.y) * std::size_t(grid.cells.z);
+    majorants_.assign(grid.values, grid.values + cells * std::size_t(1 + view.channelCount));
+    view.majorants.values = majorants_.data();
+    return majorants_;
+  }
+
+  VolumeAndScene made_;
+  reference::ReferenceImage expected_;
+  std::vector<kernel::ChannelView> channels_;
+  std::vector<float> majorants_;
+};
+
+using Unlit = LightFeatures<false, false>;
+using Shaded = LightFeatures<true, false>;
+using Shadowed = LightFeatures<false, true>;
+using Both = LightFeatures<true, true>;
+
+TEST_F(Defect, NoneIsFoundWhereThereIsNone) {
+  use(TestScene::figure3, BlendMode::density, true, true);
+  EXPECT_TRUE((passes<kernel::Superposed, kernel::BlendDensity, Both>()));
+  EXPECT_TRUE((passes<kernel::NDda, kernel::BlendDensity, Both>([&](SceneView& view) {
+    ownChannels(view);
+    ownMajorants(view);
+  })));
+}
+
+TEST_F(Defect, OfMajorantsATenthTooLowIsFoundInEveryTracker) {
+  const auto tooLow = [&](SceneView& view) {
+    for (float& bound : ownMajorants(view)) bound *= 0.9f;
+  };
+  use(TestScene::figure3, BlendMode::density, false, false);
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendDensity>(tooLow)));
+  EXPECT_FALSE((passes<kernel::Cumulative, kernel::BlendDensity>(tooLow)));
+  EXPECT_FALSE((passes<kernel::SyncDda, kernel::BlendDensity>(tooLow)));
+  EXPECT_FALSE((passes<kernel::NDda, kernel::BlendDensity>(tooLow)));
+  use(TestScene::figure3, BlendMode::max, false, false);
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendMax>(tooLow)));
+  EXPECT_FALSE((passes<kernel::NDda, kernel::BlendMax>(tooLow)));
+}
+
+TEST_F(Defect, OfTheBoundOfMaxInBlendModeDensityIsFound) {
+  use(TestScene::figure3, BlendMode::density, false, false);
+  EXPECT_FALSE((passes<kernel::Cumulative, kernel::BlendDensity>([&](SceneView& view) {
+    auto& bounds = ownMajorants(view);
+    for (std::size_t i = 0; i < bounds.size(); i += 4)
+      bounds[i] = std::max({bounds[i + 1], bounds[i + 2], bounds[i + 3]});
+  })));
+}
+
+TEST_F(Defect, OfTheOrderThatListing3PrintsIsFound) {
+  // Channels that alternate between thin and dense along the ray, out of step with each other.
+  const glm::ivec3 dims(16, 16, 32);
+  const auto layers = [](int phase) {
+    return [phase](int, int, int z) { return (z / 4 + phase) % 2 ? 255 : 4; };
+  };
+  made_.volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, layers(0)),
+                          channelOf<std::uint8_t>(dims, layers(1)), channelOf<std::uint8_t>(dims, layers(0)));
+  made_.scene = frontScene(*made_.volume, 16, 16);
+  made_.scene.filter = PixelFilter::point;
+  for (int i = 0; i < 3; ++i) {
+    ChannelAppearance& a = made_.scene.channels[std::size_t(i)];
+    a.rangeHi = 255;
+    a.density = 0.1;
+    a.color = {{0, glm::dvec3(i == 0, i == 1, i == 2)}};
+  }
+  expected_ = reference::renderReference(*made_.volume, made_.scene, 1);
+  EXPECT_TRUE((passes<kernel::NDda, kernel::BlendDensity, Unlit>()));
+  EXPECT_FALSE((passes<PrintedNDda, kernel::BlendDensity, Unlit>()));
+}
+
+TEST_F(Defect, OfALightThatShinesTheOtherWayIsFound) {
+  for (const BlendMode blend : kBlends)
+    for (const bool shading : {false, true}) {
+      use(TestScene::lumps, blend, shading, true);
+      EXPECT_FALSE(passesWith([](Scene& scene) { scene.lights[0].vector = -scene.lights[0].vector; }));
+    }
+}
+
+TEST_F(Defect, OfShadowRaysThatLookTheOtherWayIsFound) {
+  use(TestScene::lumps, BlendMode::density, false, true);
+  EXPECT_FALSE((passes<FlippedShadows, kernel::BlendDensity, Shadowed>()));
+  use(TestScene::lumps, BlendMode::max, true, true);
+  EXPECT_FALSE((passes<FlippedShadows, kernel::BlendMax, Both>()));
+}
+
+TEST_F(Defect, OfShadowRaysThatMissOneChannelIsFound) {
+  use(TestScene::lumps, BlendMode::density, false, true);
+  EXPECT_FALSE((passes<ShadowsWithoutTheLastChannel, kernel::BlendDensity, Shadowed>()));
+  use(TestScene::lumps, BlendMode::density, true, true);
+  EXPECT_FALSE((passes<ShadowsWithoutTheLastChannel, kernel::BlendDensity, Both>()));
+}
+
+TEST_F(Defect, OfShadowRaysThatBeginLateIsFound) {
+  use(TestScene::lumps, BlendMode::density, false, true);
+  EXPECT_FALSE((passes<ShadowsThatBeginLate, kernel::BlendDensity, Shadowed>()));
+}
+
+TEST_F(Defect, OfTheFirstChannelsMaterialForAllIsFound) {
+  const auto firstMaterial = [&](SceneView& view) {
+    for (auto& channel : ownChannels(view)) channel.material = view.channels[0].material;
+  };
+  use(TestScene::lumps, BlendMode::density, true, false);
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendDensity, Shaded>(firstMaterial)));
+  use(TestScene::lumps, BlendMode::max, true, false);
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendMax, Shaded>(firstMaterial)));
+  use(TestScene::lumps, BlendMode::mix, true, false);
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendMix, Shaded>(firstMaterial)));
+  use(TestScene::lumps, BlendMode::composite, true, false);
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendComposite, Shaded>(firstMaterial)));
+}
+
+TEST_F(Defect, OfGradientsInUnitsOfVoxelsIsFound) {
+  use(TestScene::lumps, BlendMode::density, true, false);
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendDensity, Shaded>(
+      [](SceneView& view) { view.gradientFromVoxel = glm::mat3(1.0f); })));
+}
+
+TEST_F(Defect, OfLightInSceneThatHasNoneIsFound) {
+  use(TestScene::lumps, BlendMode::density, false, false);
+  EXPECT_FALSE(passesWith([](Scene& scene) { scene.shading = true; }));
+  EXPECT_FALSE(passesWith([](Scene& scene) { scene.shadows = true; }));
+}
+
+TEST_F(Defect, OfDensityPerVoxelIsFound) {
+  use(TestScene::lumps, BlendMode::density, false, false);
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendDensity>([&](SceneView& view) {
+    for (auto& channel : ownChannels(view)) channel.density *= view.smallestSpacing;
+  })));
+}
+
+TEST_F(Defect, OfHalfAVoxelIsFound) {
+  use(TestScene::lumps, BlendMode::density, false, false);
+  EXPECT_FALSE(
+      (passes<kernel::Superposed, kernel::BlendDensity>([](SceneView& view) { view.rays.origin0 += 0.5f; })));
+}
+
+TEST_F(Defect, OfWeightsThatAreForgottenIsFound) {
+  use(TestScene::lumps, BlendMode::mix, false, false);
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendMix>([&](SceneView& view) {
+    for (auto& channel : ownChannels(view)) channel.weight = 1;
+  })));
+}
+
+TEST_F(Defect, OfAnotherBlendModeIsFound) {
+  for (const BlendMode blend : kBlends) {
+    use(TestScene::lumps, blend, false, false);
+    for (const BlendMode other : kBlends)
+      EXPECT_EQ(bool(passesWith([&](Scene& scene) { scene.blend = other; })), blend == other)
+          << nameOf(other) << " for " << nameOf(blend);
+  }
+}
+
+TEST_F(Defect, OfOneScramblingForAllReplicatesIsFound) {
+  use(TestScene::lumps, BlendMode::density, false, false);
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendDensity>([](SceneView& view) { view.seed = 5; })));
+}
+
+TEST_F(Defect, OfASampleLostOrCountedTwiceIsFound) {
+  use(TestScene::lumps, BlendMode::density, false, false);
+  for (const double counted : {-1.0, 1.0}) {
+    auto found = replicate(made_.volume, made_.scene, Method::superposed);
+    const float scale = float(1 + counted / found.samples);
+    for (Image& picture : found.pictures)
+      for (glm::vec4& pixel : picture.pixels) pixel *= scale;
+    EXPECT_FALSE(haveMean(found, made_.scene, expected_)) << counted;
+  }
+}
+
+TEST_F(Defect, OfOneMethodIsADifferenceBetweenTwo) {
+  use(TestScene::figure3, BlendMode::density, false, false);
+  const auto tooLow = [&](SceneView& view) {
+    for (float& bound : ownMajorants(view)) bound *= 0.9f;
+  };
+  const auto good = replicate(made_.volume, made_.scene, Method::syncDda);
+  EXPECT_TRUE(haveSameMean(good, replicate(made_.volume, made_.scene, Method::nDda), made_.scene));
+  EXPECT_FALSE(haveSameMean(good,
+                            (replicateKernel<Analog<kernel::Cumulative>, kernel::BlendDensity, Unlit>(
+                                made_.volume, made_.scene, tooLow)),
+                            made_.scene));
+}
+
+}  // namespace
+}  // namespace scolopax

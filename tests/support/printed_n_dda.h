@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// The defect that the paper's Listing 3 has, for tests that must notice it.
+#pragma once
+#include "renderer/kernel/trackers/process_per_channel.h"
+
+namespace scolopax::test {
+
+/// Listing 3 as printed: a step beyond the nearest collision so far ends the traversal, although it may also
+/// lie beyond the end of a thin cell with a denser one behind.
+struct PrintedNDda {
+  template <class Blend>
+  static std::optional<kernel::Collision> track(const kernel::SceneView& scene, const kernel::Ray& ray,
+                                                kernel::Interval inside, kernel::Sampler& sampler,
+                                                kernel::SampleCost* cost) {
+    std::optional<kernel::Collision> nearest;
+    for (int n = 0; n < scene.channelCount; ++n)
+      trackPrinted<Blend>(scene, n, ray, inside, sampler, &nearest, cost);
+    return nearest;
+  }
+
+ private:
+  template <class Blend>
+  static void trackPrinted(const kernel::SceneView& scene, int n, const kernel::Ray& ray,
+                           kernel::Interval inside, kernel::Sampler& sampler,
+                           std::optional<kernel::Collision>* nearest, kernel::SampleCost* cost) {
+    kernel::CellWalk walk(ray, inside, scene.majorants);
+    do {
+      const float bound =
+          scene.majorants.values[walk.index() * std::size_t(1 + scene.channelCount) + std::size_t(1 + n)];
+      if (!(bound > 0)) continue;
+      float t = walk.enter();
+      while (true) {
+        const kernel::RandomBlock random = sampler.next();
+        t += kernel::opticalDepth(kernel::uniformOf(random.x)) / bound;
+        if (*nearest && t > (*nearest)->place.t()) return;  // the order that is printed
+        if (!(t < walk.exit())) break;
+        const kernel::Place place{t, 0};
+        if (const auto hit =
+                kernel::testChannel<Blend>(scene, n, bound, place, walk.pointAt(t), random, cost)) {
+          *nearest = hit;
+          return;
+        }
+      }
+    } while (walk.advance());
+  }
+};
+
+}  // namespace scolopax::test
