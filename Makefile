@@ -20,16 +20,16 @@ $(DEMO): | build
 	mkdir -p $(dir $@)
 	$(SCOLOPAX) generate orbitals $@
 
-# BUILD_TESTING=OFF would make this tree another one than `make test` uses; tests are just not built here.
+# Without the tests, whose libraries need not be here, until `make test` has configured them.
 build: deps
-	cmake --preset release > /dev/null
+	cmake --preset release -DBUILD_TESTING=$(if $(wildcard build/release/tests),ON,OFF) > /dev/null
 	cmake --build --preset release --target scolopax -j $(JOBS)
 
 web: deps
 	cd client_web && npm run --silent build
 
 test: test-deps web
-	cmake --preset release > /dev/null
+	cmake --preset release -DBUILD_TESTING=ON > /dev/null
 	cmake --build --preset release -j $(JOBS)
 	ctest --test-dir build/release --output-on-failure
 
