@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "renderer/core/error.h"
+#include "server/commands/bench.h"
 #include "server/commands/compare.h"
 #include "server/commands/generate.h"
 #include "server/commands/info.h"
@@ -55,6 +56,7 @@ int main(int argc, char** argv) {
   scolopax::addInfoCommand(app);
   scolopax::addGenerateCommand(app);
   scolopax::addCompareCommand(app);
+  scolopax::addBenchCommand(app);
   try {
     app.parse(argc, argv);
     return 0;

@@ -8,19 +8,16 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
-#include "protocol/json_text.h"
 #include "renderer/core/error.h"
 #include "renderer/io/image_file.h"
 #include "renderer/io/output_file.h"
 #include "renderer/renderer.h"
 #include "server/commands/interrupt.h"
+#include "server/commands/scene_arguments.h"
 #include "server/commands/validators.h"
-#include "server/dataset_store.h"
 #include "server/progressive_render.h"
 #include "server/scene_resolver.h"
 
@@ -31,43 +28,14 @@ using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
 struct Options {
-  std::string scene;
-  std::vector<std::filesystem::path> data;
+  SceneArguments scene;
   std::filesystem::path out;
   std::optional<std::uint32_t> samples;
   std::optional<double> seconds, error;
-  std::vector<std::string> assignments;
   std::vector<std::string> aovs;
   std::filesystem::path stats;
   int threads = 0;
 };
-
-json readScene(const std::string& path) {
-  if (path.empty()) return json::object();
-  std::ifstream file(path, std::ios::binary);
-  std::stringstream text;
-  if (!file || !(text << file.rdbuf())) throw Error(ErrorCode::io, path + ": cannot be read");
-  return protocol::parseJson(text.str(), {});
-}
-
-/// "channels.0.density=0.1" as the merge patch {"channels": {"0": {"density": 0.1}}}.
-json patchOf(const std::string& assignment) {
-  const auto equals = assignment.find('=');
-  if (equals == std::string::npos || equals == 0)
-    throw CLI::ValidationError("--set", "expected PATH=VALUE, found '" + assignment + "'");
-  const std::string text = assignment.substr(equals + 1);
-  json patch = json::parse(text, nullptr, false);
-  if (patch.is_discarded()) patch = text;
-  std::vector<std::string> keys;
-  std::stringstream path(assignment.substr(0, equals));
-  for (std::string key; std::getline(path, key, '.');) keys.push_back(key);
-  if (assignment[equals - 1] == '.') keys.emplace_back();  // getline drops an empty last part
-  if (std::find(keys.begin(), keys.end(), "") != keys.end())
-    throw CLI::ValidationError("--set",
-                               "expected names between the dots of PATH=VALUE, found '" + assignment + "'");
-  for (auto key = keys.rbegin(); key != keys.rend(); ++key) patch = json{{*key, std::move(patch)}};
-  return patch;
-}
 
 /// A picture beside the picture.
 struct AovFile {
@@ -143,21 +111,13 @@ void render(const Options& options) {
   io::checkImageName(options.out);
   io::checkWritable(options.out);
   if (!options.stats.empty()) io::checkWritable(options.stats);
-  std::vector<json> patches;
-  for (const std::string& assignment : options.assignments) patches.push_back(patchOf(assignment));
   std::vector<AovFile> aovs;
   for (const std::string& text : options.aovs) {
     aovs.push_back(aovFileOf(text));
     io::checkImageName(aovs.back().path);
     io::checkWritable(aovs.back().path);
   }
-  json scene = readScene(options.scene);
-  const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
-  const auto store = std::make_shared<server::DatasetStore>(
-      io::loadDatasets(options.data, io::defaultMemoryLimitBytes(), warn));
-  const server::SceneResolver resolver(store, {});
-  auto resolved = resolver.replace(scene);
-  for (const json& patch : patches) resolved = resolver.patch(*resolved, patch);
+  const auto resolved = resolveScene(options.scene);
   server::StopRule stop = resolved->stop;
   // A rule on the command line replaces the scene's: what is asked for last is what is meant.
   if (options.samples || options.seconds || options.error)
@@ -195,9 +155,7 @@ void render(const Options& options) {
 CLI::App* addRenderCommand(CLI::App& root) {
   CLI::App* command = root.add_subcommand("render", "Render a scene into a picture file");
   const auto o = std::make_shared<Options>();
-  command->add_option("SCENE", o->scene,
-                      "Scene file (JSON, see PROTOCOL.md); without one, a good first picture");
-  command->add_option("--data", o->data, "Volume files; those of one grid are one data set")->required();
+  addSceneArguments(*command, o->scene);
   command
       ->add_option("-o,--output", o->out,
                    "Picture: .png or .jpg (sRGB, over the background), .exr or .tif (float, linear "
@@ -208,10 +166,6 @@ CLI::App* addRenderCommand(CLI::App& root) {
   command->add_option("--seconds", o->seconds, "Stop after this time")->check(numberUpTo(1e9, false));
   command->add_option("--error", o->error, "Stop at this estimated RMSE over linear RGB")
       ->check(numberUpTo(1e9, false));
-  command
-      ->add_option("--set", o->assignments,
-                   "Set a field of the scene, as channels.0.density=0.1; the value is JSON, else a string")
-      ->allow_extra_args(false);
   command->add_option("--threads", o->threads, "Threads to use; 0 takes all")
       ->envname("SCOLOPAX_THREADS")
       ->check(CLI::Range(0, 1024));

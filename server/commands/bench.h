@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <CLI/CLI.hpp>
+
+namespace scolopax {
+
+/// Speed against error of the methods on one scene.
+CLI::App* addBenchCommand(CLI::App& root);
+
+}  // namespace scolopax

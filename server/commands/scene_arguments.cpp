@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/commands/scene_arguments.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "protocol/json_text.h"
+#include "renderer/core/error.h"
+#include "server/dataset_store.h"
+
+namespace scolopax {
+namespace {
+
+using nlohmann::json;
+
+json readScene(const std::string& path) {
+  if (path.empty()) return json::object();
+  std::ifstream file(path, std::ios::binary);
+  std::stringstream text;
+  if (!file || !(text << file.rdbuf())) throw Error(ErrorCode::io, path + ": cannot be read");
+  return protocol::parseJson(text.str(), {});
+}
+
+/// "channels.0.density=0.1" as the merge patch {"channels": {"0": {"density": 0.1}}}.
+json patchOf(const std::string& assignment) {
+  const auto equals = assignment.find('=');
+  if (equals == std::string::npos || equals == 0)
+    throw CLI::ValidationError("--set", "expected PATH=VALUE, found '" + assignment + "'");
+  const std::string text = assignment.substr(equals + 1);
+  json patch = json::parse(text, nullptr, false);
+  if (patch.is_discarded()) patch = text;
+  std::vector<std::string> keys;
+  std::stringstream path(assignment.substr(0, equals));
+  for (std::string key; std::getline(path, key, '.');) keys.push_back(key);
+  if (assignment[equals - 1] == '.') keys.emplace_back();  // getline drops an empty last part
+  if (std::find(keys.begin(), keys.end(), "") != keys.end())
+    throw CLI::ValidationError("--set",
+                               "expected names between the dots of PATH=VALUE, found '" + assignment + "'");
+  for (auto key = keys.rbegin(); key != keys.rend(); ++key) patch = json{{*key, std::move(patch)}};
+  return patch;
+}
+
+}  // namespace
+
+void addSceneArguments(CLI::App& command, SceneArguments& arguments) {
+  command.add_option("SCENE", arguments.scene,
+                     "Scene file (JSON, see PROTOCOL.md); without one, a good first picture");
+  command.add_option("--data", arguments.data, "Volume files; those of one grid are one data set")
+      ->required();
+  command
+      .add_option("--set", arguments.assignments,
+                  "Set a field of the scene, as channels.0.density=0.1; the value is JSON, else a string")
+      ->allow_extra_args(false);
+}
+
+std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& arguments) {
+  std::vector<json> patches;
+  for (const std::string& assignment : arguments.assignments) patches.push_back(patchOf(assignment));
+  const json scene = readScene(arguments.scene);
+  const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
+  const auto store = std::make_shared<server::DatasetStore>(
+      io::loadDatasets(arguments.data, io::defaultMemoryLimitBytes(), warn));
+  const server::SceneResolver resolver(store, {});
+  auto resolved = resolver.replace(scene);
+  for (const json& patch : patches) resolved = resolver.patch(*resolved, patch);
+  return resolved;
+}
+
+}  // namespace scolopax
