@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
@@ -37,9 +38,15 @@ void check(const Scene& scene, const Volume& volume) {
   if (scene.lights.size() > std::size_t(kernel::kMaxLights))
     fail("lights: at most " + std::to_string(kernel::kMaxLights) + " are possible, found " +
          std::to_string(scene.lights.size()));
-  for (const Light& light : scene.lights)
-    if (!(light.intensity >= 0) || !(glm::min(light.color.x, glm::min(light.color.y, light.color.z)) >= 0))
-      fail("lights: colour and intensity must not be negative");
+  for (const Light& light : scene.lights) {
+    const double length = glm::length(light.vector);
+    if (light.type != LightType::headlight && !std::isfinite(length))
+      fail("lights: position and direction must be finite");
+    if (light.type == LightType::directional && !(length > 0)) fail("lights: the direction must not be zero");
+    for (const double value : {light.intensity, light.color.x, light.color.y, light.color.z})
+      if (!(value >= 0 && std::isfinite(value)))
+        fail("lights: colour and intensity must be finite and not negative");
+  }
   if (!(scene.step >= 0.01 && scene.step <= 100))
     fail("integrator.step: expected 0.01 to 100, found " + shortText(scene.step));
   if (scene.macrocell < 1 || scene.macrocell > 64)
@@ -53,7 +60,23 @@ static_assert(int(LightType::directional) == int(kernel::LightKind::directional)
               int(LightType::point) == int(kernel::LightKind::point) &&
               int(LightType::headlight) == int(kernel::LightKind::headlight));
 
-/// Lights to voxel space; none when neither shading nor shadows ask for them.
+/// Whether lights and shadows make any difference to what a channel shows.
+bool respondsToLight(const Scene& scene, const ChannelAppearance& channel) {
+  const Material& m = channel.material;
+  return channel.visible &&
+         ((scene.shadows && m.ambient != 1) || (scene.shading && (m.diffuse > 0 || m.specular > 0)));
+}
+
+/// A point light so far away that it is the same direction for the whole box, moved to where the squares of
+/// its distance are floats.
+glm::dvec3 withinReach(const glm::dvec3& voxel, const Grid& grid) {
+  constexpr double kFarthest = 1e12;
+  const glm::dvec3 centre = glm::dvec3(grid.dims - 1) * 0.5, way = voxel - centre;
+  const double distance = glm::length(way);
+  return distance > kFarthest ? centre + way * (kFarthest / distance) : voxel;
+}
+
+/// Lights to voxel space: those that shine, if there is anything that shows it.
 void placeLights(const Scene& scene, const Grid& grid, kernel::SceneView* view) {
   const glm::dvec3 spacing = grid.spacing();
   const double smallest = std::min({spacing.x, spacing.y, spacing.z});
@@ -62,15 +85,19 @@ void placeLights(const Scene& scene, const Grid& grid, kernel::SceneView* view) 
   view->gradientFromVoxel = glm::mat3(glm::inverse(glm::transpose(linear / smallest)));
   view->smallestSpacing = float(smallest);
   view->lightCount = 0;
-  if (!scene.shading && !scene.shadows) return;
+  if (std::none_of(scene.channels.begin(), scene.channels.end(),
+                   [&](const ChannelAppearance& channel) { return respondsToLight(scene, channel); }))
+    return;
   const std::vector<Light> headlight(1);
   const glm::dmat4 voxelFromWorld = glm::inverse(grid.worldFromVoxel);
   for (const Light& light : scene.lights.empty() ? headlight : scene.lights) {
+    // One without intensity has no part in shading nor in the share of light that is in shadow.
+    if (light.color * light.intensity == glm::dvec3(0)) continue;
     kernel::LightView& v = view->lights[view->lightCount++];
     v.kind = kernel::LightKind(light.type);
     v.intensity = glm::vec3(light.color * light.intensity);
     if (light.type == LightType::point)
-      v.vector = glm::vec3(glm::dvec3(voxelFromWorld * glm::dvec4(light.vector, 1)));
+      v.vector = glm::vec3(withinReach(glm::dvec3(voxelFromWorld * glm::dvec4(light.vector, 1)), grid));
     else
       v.vector = glm::vec3(glm::dmat3(voxelFromWorld) * -glm::normalize(light.vector));
   }

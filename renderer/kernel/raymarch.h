@@ -19,24 +19,25 @@ SCOLOPAX_HD void march(const SceneView& scene, const Ray& ray, Interval inside, 
                        SampleCost* cost, Visit&& visit) {
   const float step = scene.step;
   CellWalk walk(ray, inside, scene.majorants);
-  float k = 0.0f;  // of the next sample; whole
+  int k = 0;  // of the next sample; whole numbers above 2^24 are not all floats, and a loop must advance
+  const auto at = [&](int sample) { return inside.enter + (float(sample) + offset) * step; };
   int steps = 0;
   do {
     ++cost->cellSteps;
     if (!(scene.majorants.values[walk.index() * std::size_t(1 + scene.channelCount) + std::size_t(bound)] >
           0.0f))
       continue;
-    // First sample in the cell. Rounding may put the guess one too low, which the loop mends; a sample is
-    // never taken twice, because k only grows.
-    const float guess = float(int(clamp((walk.enter() - inside.enter) / step - offset, 0.0f, 1e9f)));
-    k = maximum(k, guess);
-    while (inside.enter + (k + offset) * step < walk.enter()) k += 1.0f;
-    for (; inside.enter + (k + offset) * step < walk.exit(); k += 1.0f) {
+    // First sample in the cell. Rounding may put the guess too low, which two steps mend; a sample is never
+    // taken twice, because k only grows.
+    const int guess = int(clamp((walk.enter() - inside.enter) / step - offset, 0.0f, 1e9f));
+    if (guess > k) k = guess;
+    for (int mend = 0; mend < 2 && at(k) < walk.enter(); ++mend) ++k;
+    for (; at(k) < walk.exit(); ++k) {
       if (++steps > kMaxMarchSteps) {
         cost->truncated = 1;
         return;
       }
-      const float t = inside.enter + (k + offset) * step;
+      const float t = at(k);
       if (!visit(walk.pointAt(t), t)) return;
     }
   } while (walk.advance());
@@ -81,7 +82,7 @@ template <class Blend, class Features>
 SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval inside, int only,
                                Sampler& sampler, SampleCost* cost, FirstCollision* first) {
   glm::vec3 color(0.0f);
-  float transmittance = 1.0f;
+  float transmittance = 1.0f, opacity = 0.0f;  // both: 1 - transmittance would lose what is thin
   const RandomBlock random = sampler.next();
   const float offset = uniformOf(random.x);
   // A tracker's ray would end where the opacity passes this number.
@@ -123,9 +124,10 @@ SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval 
       const float alpha = absorbed(extinction * scene.step);
       const float absorbedHere = transmittance * alpha;
       color += emission * (absorbedHere / extinction);
-      const float before = 1.0f - transmittance;
+      const float before = opacity;
+      opacity += absorbedHere;
       transmittance *= 1.0f - alpha;
-      if (!ended && 1.0f - transmittance > end) {
+      if (!ended && opacity > end) {
         ended = true;
         const float pick = (end - before) / absorbedHere;
         keepNearer(first, {t, only < 0 ? channelAt<Blend>(scene, point, pick, extinction) : only});
@@ -133,7 +135,7 @@ SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval 
     }
     return transmittance > kOpaqueTransmittance;
   });
-  return glm::vec4(color, 1.0f - transmittance);
+  return glm::vec4(color, minimum(opacity, 1.0f));
 }
 
 struct RayMarch {
@@ -142,13 +144,13 @@ struct RayMarch {
                                       Sampler& sampler, SampleCost* cost, FirstCollision* first) {
     if constexpr (Blend::kSeparate) {
       glm::vec3 color(0.0f);
-      float transmittance = 1.0f;
+      float opacity = 0.0f;
       for (int n = 0; n < scene.channelCount; ++n) {
         const glm::vec4 alone = marchRay<Blend, Features>(scene, ray, inside, n, sampler, cost, first);
         color += glm::vec3(alone);
-        transmittance *= 1.0f - alone.w;
+        opacity += (1.0f - opacity) * alone.w;
       }
-      return glm::vec4(color, 1.0f - transmittance);
+      return glm::vec4(color, opacity);
     } else {
       return marchRay<Blend, Features>(scene, ray, inside, -1, sampler, cost, first);
     }

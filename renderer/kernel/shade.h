@@ -28,6 +28,10 @@ SCOLOPAX_HD inline glm::vec3 normalize(glm::vec3 v) {
   return lengthSquared > 0.0f ? v * (1.0f / squareRoot(lengthSquared)) : v;
 }
 
+SCOLOPAX_HD inline float largestComponent(glm::vec3 v) {
+  return maximum(maximum(maximum(v.x, -v.x), maximum(v.y, -v.y)), maximum(v.z, -v.z));
+}
+
 SCOLOPAX_HD inline ToLight toLight(const SceneView& scene, const LightView& light, const Ray& ray,
                                    const Collision& hit) {
   if (light.kind == LightKind::directional) return {light.vector, kInfinity};
@@ -94,13 +98,18 @@ SCOLOPAX_HD glm::vec3 lit(const SceneView& scene, const ChannelView& channel, gl
   if constexpr (Features::kShadows) ambient = material.ambient + (1.0f - material.ambient) * visibility.share;
   if constexpr (!Features::kShading) return color * ambient;
 
+  // In units of its largest component: stored values may be as large or small as floats can, and their
+  // squares are not.
   const glm::vec3 gradient = gradientAt(scene, channel, hit.point, cost);
-  const float steepness = squareRoot(dot(gradient, gradient)) * channel.inverseRange;
-  const float g = minimum(1.0f, steepness);
+  const float largest = largestComponent(gradient);
+  if (!(largest > 0.0f)) return color * ambient;
+  const glm::vec3 scaled(gradient.x / largest, gradient.y / largest, gradient.z / largest);
+  const float length = squareRoot(dot(scaled, scaled));
+  const float g = minimum(1.0f, largest * channel.inverseRange * length);
   const float s = 1.0f - (1.0f - g) * (1.0f - g);
   if (!(s > 0.0f)) return color * ambient;
   const glm::vec3 toViewer = normalize(-toWorld(scene, ray.direction));
-  glm::vec3 normal = normalize(gradient);
+  glm::vec3 normal = scaled * (1.0f / length);
   if (dot(normal, toViewer) < 0.0f) normal = -normal;
   glm::vec3 diffuse(0.0f), specular(0.0f);
   for (int i = 0; i < scene.lightCount; ++i) {

@@ -26,9 +26,11 @@ struct Blended {
 Blended blended(BlendMode mode, const Stretch& stretch, const ChannelSample* samples) {
   Blended result;
   const std::size_t count = stretch.channels.size();
+  // Of equal channels the first, also where only rounding tells them apart: channels of one field over
+  // different ranges would otherwise take turns at every point, and no bisection would end.
   std::size_t largest = 0;
   for (std::size_t n = 1; n < count; ++n)
-    if (samples[n].extinction > samples[largest].extinction) largest = n;
+    if (samples[n].extinction * (1 - kEqualExtinction) > samples[largest].extinction) largest = n;
   switch (mode) {
     case BlendMode::density:
     case BlendMode::composite:  // of a single channel, see Integrator::trace

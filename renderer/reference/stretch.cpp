@@ -66,7 +66,7 @@ void appendHandovers(const Stretch& stretch, double begin, double end, std::vect
       const bool bent = channels[i].channel->bent || channels[j].channel->bent;
       for (const double w : bracketEnds(extinctions[i], extinctions[j], bent)) {
         const double d = difference(w);
-        if (d == 0) continue;
+        if (std::abs(d) <= kEqualExtinction * channels[i].at(difference.uOf(w)).extinction) continue;
         if (d * lastSign < 0) {
           const double u = difference.uOf(bisect(difference, last, w));
           const double shared = channels[i].at(u).extinction * (1 + 1e-9);

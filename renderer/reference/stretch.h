@@ -43,6 +43,9 @@ struct Stretch {
   glm::dvec3 point(double u) const { return begin + u * (end - begin); }
 };
 
+/// Relative difference below which extinctions count as equal: that of rounding.
+inline constexpr double kEqualExtinction = 1e-12;
+
 /// Calls visit(stretch, begin, end) front to back for every part [begin, end] of u in which extinction and
 /// colour of all channels are smooth and, in max and mix, one and the same channel has the largest
 /// extinction; until visit returns false.

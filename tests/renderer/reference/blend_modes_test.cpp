@@ -50,6 +50,31 @@ TEST(ReferenceBlend, MaxOfEqualChannelsShowsTheFirst) {
   expectColor(constant.trace(BlendMode::max), alpha * kRed, alpha, 1e-12);
 }
 
+TEST(ReferenceBlend, MaxOfChannelsThatAreEqualButForRoundingShowsTheFirstAndEnds) {
+  // One field in units that differ by factors of a third and a tenth, over ranges that differ by the same.
+  const VoxelFunction lumpy = [](int i, int j, int k) { return (i * 7 + j * 5 + k * 3) % 11; };
+  const Grid grid = makeGrid({5, 5, 5});
+  std::vector<ChannelSource> sources;
+  for (const double slope : {0.3, 0.1, 1.0 / 3}) {
+    ChannelSource source;
+    source.voxels = VoxelBuffer(ScalarType::u8, grid.voxelCount());
+    source.slope = slope;
+    auto out = source.voxels.as<std::uint8_t>().begin();
+    for (int k = 0; k < 5; ++k)
+      for (int j = 0; j < 5; ++j)
+        for (int i = 0; i < 5; ++i) *out++ = std::uint8_t(lumpy(i, j, k));
+    sources.push_back(std::move(source));
+  }
+  const Volume volume(grid, std::move(sources));
+  Scene scene = makeScene({ramp(0, 10 * 0.3, 0.3, {1, 0, 0}), ramp(0, 10 * 0.1, 0.3, {0, 1, 0}),
+                           ramp(0, 10.0 / 3, 0.3, {0, 0, 1})});
+  scene.blend = BlendMode::max;
+  const RayResult found = traceReference(volume, scene, {-9, 1.3, 0.7}, {1, 0.1, 0.2});
+  EXPECT_GT(found.rgba.a, 0.3);
+  EXPECT_NEAR(found.rgba.r, found.rgba.a, 1e-7);
+  EXPECT_NEAR(found.rgba.g + found.rgba.b, 0, 1e-9);
+}
+
 TEST(ReferenceBlend, MixOfConstantChannelsWeightsAllByExtinctionAndWeight) {
   Constant constant;
   const double alpha = 1 - std::exp(-4.5);
