@@ -39,14 +39,15 @@ check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz check
 check-asan-ubsan: test-deps
 	cmake --preset asan-ubsan > /dev/null
 	cmake --build --preset asan-ubsan -j $(JOBS)
-	ctest --test-dir build/asan-ubsan -LE 'web|statistics' --output-on-failure
+	ctest --test-dir build/asan-ubsan -j $(JOBS) -LE 'web|statistics' --output-on-failure
 	ctest --test-dir build/asan-ubsan -L hard --output-on-failure
 
 # What has threads: the server, and the renderer's own programs.
 check-tsan: test-deps
 	cmake --preset tsan > /dev/null
 	cmake --build --preset tsan -j $(JOBS)
-	ctest --test-dir build/tsan -L 'unit|server' -E NOT_BUILT --output-on-failure
+	ctest --test-dir build/tsan -j $(JOBS) -L server -E NOT_BUILT --output-on-failure
+	ctest --test-dir build/tsan -R '^(CpuRenderer|Aovs|Film|Macrocell)' --output-on-failure
 
 check-fuzz: test-deps
 	cmake --preset fuzz > /dev/null

@@ -110,7 +110,7 @@ net::Response frame(ApiContext& context, const net::Request& request) {
         422, "", "query parameter format: expected jpeg, png or exr, found \"" + std::string(format) + '"');
   const std::optional<Aov> aov = queryAov(request);
   const FrameQuery query{queryUnsigned(request, "after", 0), queryUnsigned(request, "minSamples", 1),
-                         aov.has_value()};
+                         aov.has_value(), request.gone.get()};
   const auto found = session->waitForFrame(query, pollTimeout(context.config, request));
   if (!found && context.stopping) throw ProtocolError(503, "", "the server is stopping");
   if (!found) return {204, "", "", {}};

@@ -14,6 +14,8 @@ namespace {
 
 constexpr int kDivisors[] = {1, 2, 3, 4, 6, 8, 12, 16};
 constexpr int kProbeDivisor = 4;
+/// As many as a scene may ask for; numbers of samples beyond 2^31 would repeat draws.
+constexpr std::uint32_t kMaxSamples = 1u << 24;
 
 double secondsBetween(TimePoint from, TimePoint to) {
   return std::chrono::duration<double>(to - from).count();
@@ -38,9 +40,9 @@ int divisorForTarget(std::uint64_t pixels, double secondsPerPixel, double target
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
   const std::uint32_t samples = renderer.samples();
   // The estimate counts from 16 samples on: fewer can look alike by chance.
-  return samples > 0 &&
-         ((stop.samples > 0 && samples >= stop.samples) || (stop.seconds > 0 && seconds >= stop.seconds) ||
-          (stop.error > 0 && samples >= 16 && renderer.estimatedError() <= stop.error));
+  return samples > 0 && (samples >= kMaxSamples || (stop.samples > 0 && samples >= stop.samples) ||
+                         (stop.seconds > 0 && seconds >= stop.seconds) ||
+                         (stop.error > 0 && samples >= 16 && renderer.estimatedError() <= stop.error));
 }
 
 ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer,
@@ -115,7 +117,8 @@ void ProgressiveRender::takeScene(const RenderRequest& request, PassResult& resu
   }
   const int divisor = wantedDivisor(request);
   const Scene scene = atDivisor(request.scene->render, divisor);
-  const auto pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height);
+  // What is recorded of AOVs takes up to twice as much again, with all channels there may be.
+  const auto pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height) * (request.aovs ? 3 : 1);
   if (pixels > filmPixels_ && othersPixels_ + pixels > options_.filmPixels)
     throw Error(ErrorCode::tooLarge, "image: all sessions together may have " +
                                          std::to_string(options_.filmPixels) + " pixels, " +

@@ -31,7 +31,7 @@ class ProgressiveRender {
     std::chrono::milliseconds stillInterval{500};       ///< between frames once samples are many
     std::chrono::milliseconds slice{100};   ///< of a slow pass, before other sessions have their turn
     std::chrono::milliseconds shield{300};  ///< for so long a pass goes on when its scene is stale
-    std::uint64_t filmPixels = 67'108'864;  ///< of all sessions' films together, at 57 bytes each
+    std::uint64_t filmPixels = 67'108'864;  ///< of all sessions' films together, at 120 bytes each
   };
   ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer, Options options, Now now,
                     Log log);

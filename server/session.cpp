@@ -112,20 +112,29 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
                                                           std::chrono::milliseconds timeout) {
   const auto deadline = std::chrono::steady_clock::now() + timeout;
   std::unique_lock lock(mutex_);
+  if (pollSamples_.size() >= kMaxPolls)
+    throw protocol::ProtocolError(429, "",
+                                  "expected at most " + std::to_string(kMaxPolls) +
+                                      " requests to wait for a session's frames, found another");
+  if (query.aovs && !aovs_) {
+    // The picture begins anew, so nobody may take it for the one that was there.
+    aovs_ = true;
+    ++revision_;
+    for (auto& [id, viewer] : viewers_) viewer.sink->sceneChanged(revision_, nlohmann::json::object());
+  }
   const std::uint32_t revision = revision_;
+  const auto isGone = [&] { return query.gone && *query.gone; };
   const auto fits = [&] {
     return frame_ && frame_->info.number > query.after && frame_->info.revision >= revision &&
            !frame_->info.interactive && (frame_->aovs || !query.aovs) &&
            (frame_->info.samples >= query.minSamples || frame_->info.final);
   };
-  if (pollSamples_.size() >= kMaxPolls)
-    throw protocol::ProtocolError(429, "",
-                                  "expected at most " + std::to_string(kMaxPolls) +
-                                      " requests to wait for a session's frames, found another");
-  aovs_ = aovs_ || query.aovs;
   const auto poll = pollSamples_.insert(query.minSamples);
   hooks_.wakeRender();
-  frameCame_.wait_until(lock, deadline, [&] { return closed_ || fits() || failedRevision_ == revision_; });
+  const auto answered = [&] { return closed_ || fits() || failedRevision_ == revision_ || isGone(); };
+  // In slices: nobody notifies of a client that goes.
+  for (auto now = deadline - timeout; !answered() && now < deadline; now = std::chrono::steady_clock::now())
+    frameCame_.wait_until(lock, std::min(deadline, now + std::chrono::milliseconds(100)), answered);
   pollSamples_.erase(poll);
   lastUsed_ = hooks_.now();
   hooks_.wakeRender();

@@ -58,7 +58,9 @@ struct EditOrigin {
 struct FrameQuery {
   std::uint32_t after = 0;       ///< a frame with a larger number
   std::uint32_t minSamples = 1;  ///< with so many samples at least, or the final one
-  bool aovs = false;             ///< that holds AOVs, which the session records from now on
+  bool aovs =
+      false;  ///< that holds AOVs; the first such query makes a revision, from which they are recorded
+  const std::atomic<bool>* gone = nullptr;  ///< nobody waits any more
 };
 
 /// What the render thread should do for a session; a snapshot.

@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <limits>
+#include <new>
+#include <string>
 
+#include "renderer/core/error.h"
 #include "renderer/cpu/tile_kernels.h"
 #include "renderer/data/film.h"
 #include "renderer/data/render_plan.h"
@@ -112,12 +115,18 @@ class CpuRenderer final : public Renderer {
  private:
   void resetRecords() {
     const std::size_t pixels = film_.pixelCount();
-    done_.assign(pixels, 0);
     stats_ = {};
-    if (counting_) cost_.assign(pixels, {});
-    if (!recording_ || pixels == 0) return;
-    fetches_.assign(pixels, 0);
-    first_.reset(pixels, plan_.scene().channels.size());
+    try {
+      done_.assign(pixels, 0);
+      if (counting_) cost_.assign(pixels, {});
+      if (!recording_ || pixels == 0) return;
+      fetches_.assign(pixels, 0);
+      first_.reset(pixels, plan_.scene().channels.size());
+    } catch (const std::bad_alloc&) {
+      throw Error(ErrorCode::tooLarge, "image: no memory for what is recorded of " +
+                                           std::to_string(film_.width()) + "x" +
+                                           std::to_string(film_.height()) + " pixels");
+    }
   }
 
   /// Moves what a pass has cost into sums that do not overflow.

@@ -73,7 +73,8 @@ double Film::estimatedError() const {
     deviations += std::max(0.0, squares - squaredLength(whole) / n);
   }
   const double samplesPerPart = enough ? kernel::kReplicateSamples : 1;
-  const double varianceOfMeans = deviations / (n - 1) / (samplesPerPart * samples_);
+  // A replicate that has only begun counts for nothing: its samples are not yet spread as well.
+  const double varianceOfMeans = deviations / (n - 1) / (samplesPerPart * samplesPerPart * n);
   return std::sqrt(varianceOfMeans / (3.0 * double(sum_.size())));
 }
 

@@ -26,7 +26,8 @@ class Film {
   Image image() const;
   /// Estimated RMSE over linear premultiplied RGB of image(); NaN below two samples. From the variance
   /// between replicates, which are independent, as soon as there are kEnoughReplicates of them. Before, from
-  /// the samples' variance, which is too large where sampling is of low discrepancy: an upper estimate.
+  /// the samples' variance, which is too large where sampling is of low discrepancy: an upper estimate, for a
+  /// marcher by far.
   double estimatedError() const;
   static constexpr std::uint32_t kEnoughReplicates = 16;
 

@@ -14,13 +14,13 @@
 #include <nlohmann/json.hpp>
 
 #include "renderer/core/error.h"
-#include "renderer/io/image_file.h"
 #include "renderer/io/output_file.h"
 #include "renderer/metrics/flip.h"
 #include "renderer/metrics/metrics.h"
 #include "renderer/reference/render.h"
 #include "renderer/renderer.h"
 #include "server/commands/scene_arguments.h"
+#include "server/commands/validators.h"
 
 namespace scolopax {
 namespace {
@@ -37,7 +37,7 @@ struct Options {
   std::vector<double> steps{4, 2, 1, 0.5};
   int repetitions = 3;
   int threads = 0;
-  std::filesystem::path truth, json;
+  std::filesystem::path json;
 };
 
 /// What one method is measured with, and what came out.
@@ -49,6 +49,7 @@ struct Point {
   std::vector<glm::dvec4> sum;  ///< of the pictures of all repetitions
   double flip = 0;
   RenderStats counts;
+  std::uint32_t samplesTimed = 0;
 
   double time() const {
     std::vector<double> sorted = seconds;
@@ -74,6 +75,14 @@ double biasOf(const Point& point, const Image& truth) {
   return std::sqrt(std::max(0.0, (k * ofMean - point.mse()) / (k - 1)));
 }
 
+/// Rising, each number once.
+template <class Number>
+std::vector<Number> ordered(std::vector<Number> numbers) {
+  std::sort(numbers.begin(), numbers.end());
+  numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+  return numbers;
+}
+
 std::vector<Point> pointsOf(const Options& options) {
   std::vector<Point> points;
   for (std::size_t i = 0; i < std::size(kMethods); ++i) {
@@ -82,21 +91,25 @@ std::vector<Point> pointsOf(const Options& options) {
         std::find(options.methods.begin(), options.methods.end(), nameOf(method)) == options.methods.end())
       continue;
     if (method == Method::raymarch)
-      for (const double step : options.steps) points.push_back({method, 1, step, {}, {}, {}, 0, {}});
+      for (const double step : ordered(options.steps)) points.push_back({method, 1, step, {}, {}, {}, 0, {}});
     else
-      for (const std::uint32_t samples : options.samples)
+      for (const std::uint32_t samples : ordered(options.samples))
         points.push_back({method, samples, 0, {}, {}, {}, 0, {}});
   }
   return points;
 }
 
 void measure(Point& point, Renderer& renderer, Scene scene, const Image& truth) {
+  // Another picture first: else the film would go on with the samples of the point before.
+  scene.method = point.method == Method::raymarch ? Method::superposed : Method::raymarch;
+  renderer.setScene(scene);
   scene.method = point.method;
   if (point.step > 0) scene.step = point.step;
   renderer.setScene(scene);
   const std::atomic<bool> cancel = false;
   const auto begin = Clock::now();
-  while (renderer.samples() < point.samples) renderer.renderSample(cancel);
+  point.samplesTimed = 0;
+  for (; renderer.samples() < point.samples; ++point.samplesTimed) renderer.renderSample(cancel);
   point.seconds.push_back(std::chrono::duration<double>(Clock::now() - begin).count());
   const Image image = renderer.image();
   point.squaredErrors.push_back(std::pow(compareImages(image, truth).rmse, 2));
@@ -115,22 +128,6 @@ void count(Point& point, const std::shared_ptr<const Volume>& volume, Scene scen
   const std::atomic<bool> cancel = false;
   renderer->renderSample(cancel);
   point.counts = renderer->stats();
-}
-
-Image truthOf(const Options& options, const Volume& volume, const Scene& scene) {
-  if (!options.truth.empty() && std::filesystem::exists(options.truth)) {
-    const Image truth = io::readImage(options.truth);
-    if (truth.width != scene.width || truth.height != scene.height)
-      throw Error(ErrorCode::badInput, options.truth.string() + ": expected the scene's " +
-                                           std::to_string(scene.width) + "x" + std::to_string(scene.height) +
-                                           ", found " + std::to_string(truth.width) + "x" +
-                                           std::to_string(truth.height));
-    return truth;
-  }
-  fmt::print(stderr, "scolopax: rendering the reference\n");
-  const Image truth = reference::renderReference(volume, scene, 1).image;
-  if (!options.truth.empty()) io::writeImage(options.truth, truth, glm::vec3(0));
-  return truth;
 }
 
 /// Seconds to an RMSE: of an unbiased method by the law of its noise, of a marcher by its fastest picture
@@ -160,6 +157,7 @@ ordered_json report(const std::vector<Point>& points, const Image& truth, const 
                         {"samples", point.samples},
                         {"step", point.step > 0 ? ordered_json(point.step) : ordered_json()},
                         {"seconds", point.time()},
+                        {"samplesTimed", point.samplesTimed},
                         {"nsPerRay", 1e9 * point.time() / rays},
                         {"rmse", point.rmse()},
                         {"psnr", -20 * std::log10(point.rmse())},
@@ -207,12 +205,16 @@ void bench(const Options& options) {
     if (std::none_of(std::begin(kMethods), std::end(kMethods),
                      [&](const NamedValue& known) { return known.name == method; }))
       throw CLI::ValidationError("--methods", "there is no method '" + method + "'");
-  if (!options.json.empty()) io::checkWritable(options.json);
+  if (!options.json.empty()) {
+    io::checkWritable(options.json);
+    checkOutputs({options.json}, options.scene);
+  }
   const auto resolved = resolveScene(options.scene);
   const auto volume = resolved->dataset->volume;
   Scene scene = resolved->render;
   scene.filter = PixelFilter::point;  // where the reference has no noise
-  const Image truth = truthOf(options, *volume, scene);
+  fmt::print(stderr, "scolopax: rendering the reference\n");
+  const Image truth = reference::renderReference(*volume, scene, 1).image;
 
   std::vector<Point> points = pointsOf(options);
   const auto renderer = makeCpuRenderer(volume, options.threads);
@@ -245,13 +247,10 @@ CLI::App* addBenchCommand(CLI::App& root) {
       ->check(CLI::Range(1u, 1u << 24));
   command->add_option("--steps", o->steps, "Steps of the marcher, in voxels")
       ->delimiter(',')
-      ->check(CLI::Range(0.01, 100.0));
+      ->check(CLI::Range(0.01, 100.0) & numberUpTo(100, false));
   command->add_option("--repetitions", o->repetitions, "Seeds and timings of every point; medians are told")
       ->check(CLI::Range(2, 1000));
   command->add_option("--threads", o->threads, "Threads to use; 0 takes all")->check(CLI::Range(0, 1024));
-  command->add_option("--truth", o->truth,
-                      "Float picture that errors are measured against; made by the reference, which is slow, "
-                      "where it is not there yet");
   command->add_option("--json", o->json, "Write the numbers here instead of printing a table");
   command->footer(
       "Samples go through the pixels' centres, where the reference has no noise. Unbiased methods are "

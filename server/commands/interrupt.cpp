@@ -14,6 +14,7 @@ static_assert(std::atomic<bool>::is_always_lock_free);  // what a handler may wr
 extern "C" void onInterrupt(int signal) {
   caught = signal;
   interrupted = true;
+  for (const int other : {SIGTERM, SIGINT}) std::signal(other, SIG_DFL);  // the second of either ends at once
 }
 
 }  // namespace

@@ -117,6 +117,10 @@ void render(const Options& options) {
     io::checkImageName(aovs.back().path);
     io::checkWritable(aovs.back().path);
   }
+  std::vector<std::filesystem::path> outputs{options.out};
+  if (!options.stats.empty()) outputs.push_back(options.stats);
+  for (const AovFile& aov : aovs) outputs.push_back(aov.path);
+  checkOutputs(outputs, options.scene);
   const auto resolved = resolveScene(options.scene);
   server::StopRule stop = resolved->stop;
   // A rule on the command line replaces the scene's: what is asked for last is what is meant.

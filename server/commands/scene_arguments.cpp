@@ -70,4 +70,19 @@ std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& 
   return resolved;
 }
 
+void checkOutputs(const std::vector<std::filesystem::path>& outputs, const SceneArguments& arguments) {
+  const auto canonical = [](const std::filesystem::path& path) {
+    std::error_code ignored;
+    return std::filesystem::weakly_canonical(path, ignored);
+  };
+  std::vector<std::filesystem::path> taken;
+  for (const auto& path : arguments.data) taken.push_back(canonical(path));
+  if (!arguments.scene.empty()) taken.push_back(canonical(arguments.scene));
+  for (const auto& path : outputs) {
+    if (std::find(taken.begin(), taken.end(), canonical(path)) != taken.end())
+      throw CLI::ValidationError(path.string(), "expected a file that is not read or written otherwise");
+    taken.push_back(canonical(path));
+  }
+}
+
 }  // namespace scolopax

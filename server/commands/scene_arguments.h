@@ -24,4 +24,7 @@ void addSceneArguments(CLI::App& command, SceneArguments& arguments);
 /// and CLI::ValidationError for an assignment that is none, before anything is loaded.
 std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& arguments);
 
+/// Throws CLI::ValidationError when two of the files are one, or one is to be written over data that is read.
+void checkOutputs(const std::vector<std::filesystem::path>& outputs, const SceneArguments& arguments);
+
 }  // namespace scolopax

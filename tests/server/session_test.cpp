@@ -166,6 +166,34 @@ TEST(Session, GivesAScriptTheFrameItWaitsFor) {
   EXPECT_FALSE(frame->info.interactive);
 }
 
+TEST(Session, StopsWaitingForAScriptThatHasGone) {
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
+  const std::atomic<bool> gone{true};
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(session->waitForFrame({0, 1, false, &gone}, 60s), nullptr);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 30s);
+  EXPECT_FALSE(session->request().wanted);
+}
+
+TEST(Session, MakesARevisionWhenAovsAreAskedForFirst) {
+  Workshop workshop;
+  const auto session = workshop.store.create({{"stop", {{"samples", 3}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.steps(5);
+  ASSERT_TRUE(viewer->frames.back().info.final);
+  EXPECT_EQ(session->waitForFrame({0, 1, true}, 0ms), nullptr);  // that one has none
+  workshop.steps(8);
+  // Nothing better may follow a final frame of one revision, so these are of the next.
+  EXPECT_EQ(viewer->frames.back().info.revision, 2u);
+  const auto frame = session->waitForFrame({0, 1, true}, 0ms);
+  ASSERT_NE(frame, nullptr);
+  ASSERT_TRUE(frame->aovs);
+  EXPECT_EQ(frame->aovs->size(), 4u);
+  EXPECT_EQ(session->scene().revision, 2u);
+}
+
 TEST(Session, GivesAScriptTheFinalFrameWhenThereCannotBeMoreSamples) {
   Workshop workshop;
   const auto session = workshop.store.create({{"stop", {{"samples", 3}}}});

@@ -261,9 +261,9 @@ class Sessions(unittest.TestCase):
         self.assertEqual((status, headers["Scolopax-Final"]), (200, "1"))
         color = session["scene"]["channels"][0]["color"]
         first = tuple(int(color[i:i + 2], 16) for i in (1, 3, 5))
-        # The picture is done, but nothing was recorded: it begins anew.
+        # The picture is done, but nothing was recorded: it begins anew, as a revision of its own.
         status, headers, picture = call(server, "GET", f"{wait}?aov=channel&format=png&minSamples=4")
-        self.assertEqual((status, headers["Scolopax-Samples"], headers["Scolopax-Revision"]), (200, "4", "1"))
+        self.assertEqual((status, headers["Scolopax-Samples"], headers["Scolopax-Revision"]), (200, "4", "2"))
         self.assertEqual(png_colors(picture), {first, (0, 0, 0)})
         for name in ("depth", "transmittance", "cost"):
             status, _, picture = call(server, "GET", f"{wait}?aov={name}&format=png")
@@ -274,7 +274,7 @@ class Sessions(unittest.TestCase):
         edit = {"channels": {"0": {"visible": False}}}
         self.assertEqual(call(server, "PATCH", path_of(session, "/scene"), edit)[0], 200)
         status, headers, picture = call(server, "GET", f"{wait}?aov=transmittance&format=png")
-        self.assertEqual((status, headers["Scolopax-Revision"], png_colors(picture)), (200, "2", {(255, 255, 255)}))
+        self.assertEqual((status, headers["Scolopax-Revision"], png_colors(picture)), (200, "3", {(255, 255, 255)}))
         status, _, problem = call(server, "GET", f"{wait}?aov=normal")
         self.assertEqual(status, 422)
         self.assertIn("depth, transmittance, channel, cost", json.loads(problem)["detail"])

@@ -209,6 +209,9 @@ class CommandLine(unittest.TestCase):
                 self.assertEqual(result.returncode, 2, bad)
                 self.assertIn("depth, transmittance, channel, cost", result.stderr)
             self.assertEqual(run(*render, "--aov", "depth=" + at("d.gif")).returncode, 1)
+            for twice in (["--aov", "cost=" + at("a.png")], ["--aov", "cost=" + at("c.exr"), "--stats", at("c.exr")],
+                          ["--stats", render[2]]):
+                self.assertEqual(run(*render, *twice).returncode, 2, twice)
             self.assertEqual(run(*render, "--aov", "depth=" + at("none/d.exr")).returncode, 1)
 
     def test_a_number_out_of_range_is_said_in_few_digits(self):

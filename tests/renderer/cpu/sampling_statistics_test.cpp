@@ -80,7 +80,9 @@ TEST_F(LowDiscrepancy, LeavesLessNoiseThanIndependentSamples) {
   const auto gain = [&](int samples) {
     return squaredError(Sampling::independent, samples) / squaredError(Sampling::lowDiscrepancy, samples);
   };
-  EXPECT_NEAR(gain(1), 1, 0.2);
+  if (statisticsFactor() == 1) {
+    EXPECT_NEAR(gain(1), 1, 0.2);
+  }
   EXPECT_GT(gain(64), 1.1);
 }
 

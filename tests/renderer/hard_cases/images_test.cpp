@@ -9,6 +9,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/data/film.h"
+#include "renderer/kernel/rng.h"
 #include "tests/renderer/hard_cases/hard_scenes.h"
 
 namespace scolopax {
@@ -40,6 +41,40 @@ TEST(Film, DoesNotDriftInTenMillionSamples) {
   EXPECT_EQ(film.image().pixels[0], glm::vec4(0.1f, 0.7f, 1e-6f, 1.0f));
   // Sums of n terms are off by at most n 2^-53 of themselves; their difference is 0 but for that.
   EXPECT_LT(film.estimatedError(), std::sqrt(3 * 0x1p-53 * 0.5 / 3));
+}
+
+TEST(Film, ClaimsTheErrorOfItsWholeReplicatesUntilTheNextIsWhole) {
+  // What has begun is not yet spread evenly: it neither adds to what is known nor counts as samples.
+  Film film;
+  film.reset(1, 1);
+  double whole = 0;
+  for (std::uint32_t i = 0; i < 18 * kernel::kReplicateSamples; ++i) {
+    film.pass()[0] = glm::vec4(float(i % 7), float(i % 3), float(i / 64 % 5), 1.0f);
+    film.add();
+    if (film.samples() < 16 * kernel::kReplicateSamples) continue;
+    if (film.samples() % kernel::kReplicateSamples == 0) {
+      EXPECT_NE(film.estimatedError(), whole);
+      whole = film.estimatedError();
+    }
+    EXPECT_EQ(film.estimatedError(), whole) << film.samples();
+  }
+}
+
+TEST(Film, TakesTheErrorFromTheSpreadOfTheReplicates) {
+  // Samples that differ wildly within every replicate and not at all between them: no error. Means of the
+  // replicates that alternate between 0 and 1: the standard deviation of 16 such is sqrt(4 / 15), of their
+  // mean a quarter of it; one of three components has it.
+  for (const bool alternate : {false, true}) {
+    Film film;
+    film.reset(1, 1);
+    for (std::uint32_t i = 0; i < 16 * kernel::kReplicateSamples; ++i) {
+      const float v = alternate ? float(i / kernel::kReplicateSamples % 2) : float(i % 2);
+      film.pass()[0] = glm::vec4(v, 0, 0, 1);
+      film.add();
+    }
+    const double expected = alternate ? std::sqrt(4.0 / 15 / 16 / 3) : 0;
+    EXPECT_NEAR(film.estimatedError(), expected, 1e-9);
+  }
 }
 
 TEST(Picture, OfOnePixelIsThatOfTheRayThroughItsCentre) {
