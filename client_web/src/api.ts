@@ -12,12 +12,14 @@ export interface Named {
 }
 
 export interface Capabilities {
-  blendModes?: Named[];
-  methods?: Named[];
-  filters?: Named[];
-  samplings?: Named[];
   colormaps?: Named[];
   limits?: Record<string, number>;
+  /** Among others the lists of what enumerated fields may be, each a Named[]. */
+  [member: string]: unknown;
+}
+
+export function isNamedList(member: unknown): member is Named[] {
+  return Array.isArray(member) && member.every((entry) => typeof (entry as Named | null)?.name === 'string');
 }
 
 export interface ChannelInfo {

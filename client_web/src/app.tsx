@@ -7,7 +7,7 @@ import { DatasetPanel } from './dataset-panel';
 import type { FrameView } from './frame-view';
 import { PictureView } from './picture-view';
 import { savePicture } from './save-picture';
-import { SettingsPanel } from './settings-panel';
+import { ListSections, SettingsPanel } from './settings-panel';
 import { StatusBar } from './status-bar';
 import type { Store } from './store';
 import { Toasts } from './toasts';
@@ -56,6 +56,7 @@ export function App({ store, attach }: { store: Store; attach(view: FrameView): 
         </section>
         <SettingsPanel store={store} />
         <CameraPanel store={store} />
+        <ListSections store={store} />
       </aside>
     </div>
   );

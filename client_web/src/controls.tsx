@@ -136,6 +136,9 @@ export function ToggleControl({ field, value, onChange }: ControlProps<boolean>)
   );
 }
 
+/** `names` in the server's text as they are quoted in print. */
+const inPrint = (doc: string | undefined) => doc?.replace(/`([^`]+)`/g, '“$1”');
+
 export function EnumControl({ field, value, onChange, choices }: ControlProps<string> & { choices: Named[] }) {
   const id = useId();
   const chosen = choices.find((choice) => choice.name === value);
@@ -145,13 +148,13 @@ export function EnumControl({ field, value, onChange, choices }: ControlProps<st
         <select id={id} value={value} onChange={(event) => onChange(event.currentTarget.value)}>
           {value !== undefined && !chosen && <option value={value}>{value}</option>}
           {choices.map(({ name, doc }) => (
-            <option key={name} value={name} title={doc}>
+            <option key={name} value={name} title={inPrint(doc)}>
               {name}
             </option>
           ))}
         </select>
       </Row>
-      {chosen?.doc && <p class="note">{chosen.doc}</p>}
+      {chosen?.doc && <p class="note">{inPrint(chosen.doc)}</p>}
     </>
   );
 }

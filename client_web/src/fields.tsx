@@ -10,13 +10,15 @@ import {
   ToggleControl,
   VectorControl,
 } from './controls';
+import { ListControl } from './list-control';
 import { choicesOf, fieldAt, type Path } from './schema';
 import type { Store } from './store';
 
 export function FieldControl({ store, path, label }: { store: Store; path: Path; label?: string }) {
   const found = fieldAt(path);
   const field = label ? { ...found, label } : found;
-  const value = valueAt(store.scene.value as Json | undefined, path);
+  const scene = store.scene.value as Json | undefined;
+  const value = valueAt(scene, path) ?? (scene && field.default); // an item that was just added is still empty
   const props = { field, onChange: (next: Json) => store.set(path, next) };
   switch (field.kind) {
     case 'number':
@@ -32,6 +34,8 @@ export function FieldControl({ store, path, label }: { store: Store; path: Path;
       return <TextControl {...props} value={value as string | undefined} />;
     case 'vector':
       return <VectorControl {...props} value={value as number[] | undefined} />;
+    case 'list':
+      return <ListControl store={store} path={path} />;
     default:
       return null;
   }

@@ -2,7 +2,7 @@
 // What the scene's JSON Schema says of a field, in the form in which controls are built from it: a field
 // that is added to the schema gets its control without a change here.
 import document from '../../protocol/schema.json';
-import type { Capabilities, Named } from './api';
+import { isNamedList, type Capabilities, type Named } from './api';
 
 export type Path = readonly (string | number)[];
 
@@ -26,7 +26,7 @@ interface SchemaNode {
   default?: unknown;
 }
 
-export type Kind = 'number' | 'integer' | 'toggle' | 'enum' | 'color' | 'text' | 'vector' | 'object' | 'other';
+export type Kind = 'number' | 'integer' | 'toggle' | 'enum' | 'color' | 'text' | 'vector' | 'list' | 'object' | 'other';
 
 export interface Field {
   /** The key, or '' for the whole scene. */
@@ -50,6 +50,9 @@ export interface Field {
   options: string[];
   /** Keys of an object. */
   members: string[];
+  /** How many items a list may have, and what one of them is called: "Light". */
+  maxItems: number;
+  itemLabel: string;
 }
 
 const root = document as unknown as SchemaNode;
@@ -92,18 +95,24 @@ function kindOf(node: SchemaNode): Kind {
     case 'object':
       return 'object';
     case 'array':
-      return node.minItems === node.maxItems && node.items && kindOf(resolve(node.items)) === 'number'
-        ? 'vector'
-        : 'other';
+      return kindOfList(node);
     default:
       return 'other';
   }
+}
+
+function kindOfList(node: SchemaNode): Kind {
+  const items = node.items ? kindOf(resolve(node.items)) : 'other';
+  if (items === 'object') return 'list';
+  return items === 'number' && node.minItems === node.maxItems ? 'vector' : 'other';
 }
 
 const inWords = (key: string) => {
   const words = key.replace(/([a-z])([A-Z])/g, (_, a: string, b: string) => `${a} ${b.toLowerCase()}`);
   return words.charAt(0).toUpperCase() + words.slice(1);
 };
+
+const itemLabelOf = (list: SchemaNode) => inWords((list.items && resolve(list.items).title) ?? 'Item');
 
 function describeNode(key: string, outer: SchemaNode): Field {
   const { node, automatic } = withoutNull(outer);
@@ -122,6 +131,8 @@ function describeNode(key: string, outer: SchemaNode): Field {
     length: node.minItems ?? 0,
     options: (node.enum ?? []).filter((entry): entry is string => typeof entry === 'string'),
     members: Object.keys(node.properties ?? {}),
+    maxItems: node.maxItems ?? Infinity,
+    itemLabel: itemLabelOf(node),
   };
 }
 
@@ -137,31 +148,36 @@ export function fieldAt(path: Path): Field {
   return describeNode(String(path[path.length - 1] ?? ''), node);
 }
 
-/** Paths of the single values below a path, objects opened, lists left out. */
+/** Paths of the single values below a path, objects opened; a list of objects counts as one. */
 export function leavesBelow(path: Path): Path[] {
   const field = fieldAt(path);
   if (field.kind === 'object') return field.members.flatMap((member) => leavesBelow([...path, member]));
   return field.kind === 'other' ? [] : [path];
 }
 
-/** Where the server lists what an enumerated field may be, with a line on each. */
-const listOf: Record<string, keyof Omit<Capabilities, 'limits'>> = {
-  'blend.mode': 'blendModes',
-  'integrator.method': 'methods',
-  'integrator.sampling': 'samplings',
-  'image.filter': 'filters',
-};
-
-/** The choices of an enumerated field: the running server's list where it has one, else the schema's. */
+/**
+ * The choices of an enumerated field, with a line on each: of the running server's lists the one that has most of
+ * the schema's names, or, where none has half of them, those names alone.
+ */
 export function choicesOf(path: Path, capabilities: Capabilities): Named[] {
-  const list = listOf[path.join('.')];
-  return (list && capabilities[list]) || fieldAt(path).options.map((name) => ({ name }));
+  const { options } = fieldAt(path);
+  const shared = (list: Named[]) => list.filter(({ name }) => options.includes(name)).length;
+  const [best] = Object.values(capabilities)
+    .filter(isNamedList)
+    .sort((a, b) => shared(b) - shared(a));
+  return best && shared(best) >= options.length / 2 ? best : options.map((name) => ({ name }));
 }
 
 /** "/channels/0/gamma" as a person would say it: "Channel 1, gamma". */
 export function sayPointer(pointer: string): string {
-  const keys = pointer.split('/').filter(Boolean);
-  if (keys[0] === 'channels' && keys[1] !== undefined)
-    return [`Channel ${Number(keys[1]) + 1}`, ...keys.slice(2)].join(', ');
-  return keys.join(', ');
+  const words: string[] = [];
+  let node: SchemaNode | undefined = root;
+  for (const key of pointer.split('/').filter(Boolean)) {
+    const inner: SchemaNode = node ? withoutNull(node).node : {};
+    const isItem = kindOf(inner) === 'list' && /^\d+$/.test(key);
+    if (isItem) words[words.length - 1] = `${itemLabelOf(inner)} ${Number(key) + 1}`;
+    else words.push(key);
+    node = isItem ? inner.items : inner.properties?.[key];
+  }
+  return words.join(', ');
 }

@@ -26,15 +26,36 @@ describe('the schema', () => {
     expect(() => fieldAt(['camera', 'roll'])).toThrow(/camera.roll/);
   });
 
-  it('takes choices from the running server, else from itself', () => {
-    const blendModes = [{ name: 'only here', doc: 'x' }];
-    expect(choicesOf(['blend', 'mode'], { blendModes })).toEqual(blendModes);
+  it('knows lists of objects, and what one of their items is', () => {
+    expect(fieldAt(['lights'])).toMatchObject({ kind: 'list', label: 'Lights', itemLabel: 'Light', maxItems: 8 });
+    expect(fieldAt(['channels']).kind).toBe('list');
+    expect(fieldAt(['channels', 0, 'opacity']).kind).toBe('other'); // a list of pairs, which has an editor of its own
+    expect(leavesBelow([]).map((path) => path.join('.'))).toContain('lights');
+    expect(leavesBelow(['lights', 2])).toContainEqual(['lights', 2, 'intensity']);
+  });
+
+  it('takes choices from that list of the running server which has the names, else from itself', () => {
+    const capabilities = {
+      version: '1',
+      imageFormats: ['point'],
+      aovs: [{ name: 'density' }],
+      filters: [{ name: 'box' }, { name: 'point', doc: 'centres' }],
+      lightTypes: [{ name: 'point', doc: 'from all sides' }, { name: 'directional' }, { name: 'only here' }],
+      blendModes: ['density', 'max', 'only here'].map((name) => ({ name, doc: name })),
+    };
+    expect(choicesOf(['blend', 'mode'], capabilities)).toBe(capabilities.blendModes);
+    expect(choicesOf(['lights', 0, 'type'], capabilities)).toBe(capabilities.lightTypes);
+    expect(choicesOf(['image', 'filter'], capabilities)).toBe(capabilities.filters);
+    expect(choicesOf(['blend', 'mode'], { aovs: capabilities.aovs }).map(({ name }) => name)).toContain('max');
     expect(choicesOf(['blend', 'mode'], {}).map((choice) => choice.name)).toContain('density');
   });
 
   it('names the field of a problem in words', () => {
     expect(sayPointer('/channels/0/gamma')).toBe('Channel 1, gamma');
     expect(sayPointer('/camera/eye')).toBe('camera, eye');
+    expect(sayPointer('/lights/1/type')).toBe('Light 2, type');
+    expect(sayPointer('/channels/1/opacity/0')).toBe('Channel 2, opacity, 0');
+    expect(sayPointer('/unheard/0/of')).toBe('unheard, 0, of');
   });
 });
 
