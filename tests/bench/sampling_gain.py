@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """By how much low-discrepancy sampling lowers the squared error: sampling_gain.py DATA... prints a table.
 
-The error of N samples is that against 16384 low-discrepancy samples of another seed, mean over several seeds. The
-truth's own error adds at most 256 / 16384 of what is measured, the same to both columns."""
+The error of N samples is that against 8192 low-discrepancy samples of another seed, mean over several seeds. The
+truth's own error adds at most 256 / 8192 of what is measured, the same to both columns."""
 import json
 import os
 import subprocess
@@ -12,7 +12,7 @@ import tempfile
 
 PROGRAM = os.environ.get("SCOLOPAX",
                          os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../build/release/scolopax"))
-SIZE = 128
+SIZE = 96
 
 
 def render(data, out, samples, seed, sampling, method):
@@ -32,7 +32,7 @@ def main(data):
     with tempfile.TemporaryDirectory() as folder:
         truth, picture = os.path.join(folder, "truth.exr"), os.path.join(folder, "picture.exr")
         for method in ("superposed", "sync-dda"):
-            render(data, truth, 16384, 4000000000, "low-discrepancy", method)
+            render(data, truth, 8192, 4000000000, "low-discrepancy", method)
             for samples in (1, 4, 16, 64, 256):
                 mean = {}
                 seeds = range(1, 1 + max(2, min(16, 256 // samples)))

@@ -83,6 +83,14 @@ TEST(ApplyPatch, EditsEntriesOfPlainListsThatAreThere) {
   EXPECT_EQ(refusedAt("{}", R"({"channels": {"0": {"opacity": {"0": [0, 1]}}}})"), "/channels/0/opacity");
 }
 
+TEST(ApplyPatch, GrowsTheLightsUpToTheirNumber) {
+  EXPECT_EQ(applied("{}", R"({"lights": {"1": {"intensity": 2}}})"),
+            json::parse(R"({"lights": [{}, {"intensity": 2}]})"));
+  EXPECT_EQ(applied(R"({"lights": [{"intensity": 2}]})", R"({"lights": {"0": null}})"),
+            json::parse(R"({"lights": [{}]})"));
+  EXPECT_EQ(refusedAt("{}", R"({"lights": {"8": {}}})"), "/lights/8");
+}
+
 TEST(ApplyPatch, RefusesIndicesThatAreNone) {
   EXPECT_EQ(refusedAt("{}", R"({"channels": {"4": {}}})"), "/channels/4");
   EXPECT_EQ(refusedAt("{}", R"({"channels": {"4": null}})"), "/channels/4");
