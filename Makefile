@@ -5,6 +5,8 @@
 DATA ?=
 PORT ?= 8080
 JOBS ?= $(shell nproc)
+# A label that no test has is a mistake in this file.
+CTEST := ctest --no-tests=error
 DEMO := build/demo/orbitals.nrrd
 SCOLOPAX := build/release/scolopax
 
@@ -31,34 +33,34 @@ web: deps
 test: test-deps web
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null
 	cmake --build --preset release -j $(JOBS)
-	ctest --test-dir build/release --output-on-failure
+	$(CTEST) --test-dir build/release --output-on-failure
 
 check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
-	SCOLOPAX_STATISTICS=4 ctest --test-dir build/release -L statistics --output-on-failure
+	SCOLOPAX_STATISTICS=4 $(CTEST) --test-dir build/release -L statistics --output-on-failure
 
 check-asan-ubsan: test-deps
 	cmake --preset asan-ubsan > /dev/null
 	cmake --build --preset asan-ubsan -j $(JOBS)
-	ctest --test-dir build/asan-ubsan -j $(JOBS) -LE 'web|statistics' --output-on-failure
-	ctest --test-dir build/asan-ubsan -L hard --output-on-failure
+	$(CTEST) --test-dir build/asan-ubsan -j $(JOBS) -LE 'web|statistics' --output-on-failure
+	$(CTEST) --test-dir build/asan-ubsan -L hard --output-on-failure
 
 # What has threads: the server, and the renderer's own programs.
 check-tsan: test-deps
 	cmake --preset tsan > /dev/null
 	cmake --build --preset tsan -j $(JOBS)
-	ctest --test-dir build/tsan -j $(JOBS) -L server -E NOT_BUILT --output-on-failure
-	ctest --test-dir build/tsan -R '^(CpuRenderer|Aovs|Film|Macrocell)' --output-on-failure
+	$(CTEST) --test-dir build/tsan -j $(JOBS) -L server -E NOT_BUILT --output-on-failure
+	$(CTEST) --test-dir build/tsan -R '^(CpuRenderer|Aovs|Film|Macrocell)' --output-on-failure
 
 check-fuzz: test-deps
 	cmake --preset fuzz > /dev/null
 	cmake --build --preset fuzz -j $(JOBS)
-	ctest --test-dir build/fuzz -L fuzz --output-on-failure
+	$(CTEST) --test-dir build/fuzz -L fuzz --output-on-failure
 
 # With nvcc; without one, configuring says so and there is nothing to check.
 check-cuda: test-deps
 	cmake --preset cuda > /dev/null
 	cmake --build --preset cuda -j $(JOBS) --target cuda_checks
-	ctest --test-dir build/cuda -L cuda --output-on-failure
+	$(CTEST) --test-dir build/cuda -L cuda --output-on-failure
 
 # clang 14 has coroutines but does not say so; Boost and libstdc++ ask.
 TIDY := clang-tidy --quiet -p build/release --extra-arg=-D__cpp_impl_coroutine=201902L \
