@@ -29,7 +29,12 @@ void tryMessage(std::string_view text) try {
 }
 
 void tryPatch(std::string_view sceneText, std::string_view patchText) try {
-  static const protocol::Lists kLists{{{"density", ""}}, {{"auto", ""}}, {{"box", ""}}, {{"gray", ""}}};
+  static const protocol::Lists kLists{.blendModes = {{"density", ""}},
+                                      .methods = {{"auto", ""}},
+                                      .filters = {{"box", ""}},
+                                      .samplings = {{"independent", ""}},
+                                      .colormaps = {{"gray", ""}},
+                                      .lightTypes = {{"headlight", ""}}};
   const nlohmann::json scene = protocol::parseJson(sceneText);
   protocol::parseScene(scene, kLists);
   const nlohmann::json sparse = protocol::applyPatch(nlohmann::json::object(), scene, kChannels);
