@@ -9,6 +9,7 @@
 #include <new>
 
 #include "renderer/core/error.h"
+#include "renderer/core/short_text.h"
 
 namespace scolopax {
 namespace {
@@ -125,6 +126,12 @@ Volume::Volume(Grid grid, std::vector<ChannelSource> sources) : grid_(grid) {
     if (!std::isfinite(channel.slope) || channel.slope == 0 || !std::isfinite(channel.intercept))
       throw Error(ErrorCode::badInput, "volume: channel '" + channel.name +
                                            "' needs a finite slope that is not 0 and a finite intercept");
+    // So that sums and differences of data values are finite too.
+    const double largestStored = channel.voxels.type() == ScalarType::f32 ? 0x1p128 : 0x1p16;
+    if (!(std::abs(channel.slope) * largestStored + std::abs(channel.intercept) < 0x1p1000))
+      throw Error(ErrorCode::badInput,
+                  "volume: channel '" + channel.name + "' needs values below 1e301, found slope " +
+                      shortText(channel.slope) + " and intercept " + shortText(channel.intercept));
     normalise(channel);
     channel.histogram = measureHistogram(channel.voxels, channel.slope, channel.intercept);
     channels_.push_back(std::move(channel));

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "renderer/core/error.h"
 #include "renderer/data/transfer_function.h"
 #include "renderer/kernel/classify.h"
 #include "renderer/kernel/sample_volume.h"
@@ -167,6 +168,19 @@ TEST(Values, BesideAFillValueKeepTheirPlaceInTheRange) {
     const Row turned = Row::of<float>({0.3, fill});
     for (const double x : {-0.5, 0.0}) EXPECT_NEAR(turned.position(x, 0, 1), 0.3, kUlp) << fill;
   }
+}
+
+TEST(Values, ThatNoDoubleCouldHoldAreRefused) {
+  const glm::ivec3 dims(2, 2, 2);
+  const auto ends = [](int x, int, int) { return x == 0 ? -32768 : 32767; };
+  const auto load = [&](double slope, double intercept) {
+    volumeOf(gridOf(dims), channelOf<std::int16_t>(dims, ends, slope, intercept));
+  };
+  EXPECT_NO_THROW(load(1e290, 1e290));
+  EXPECT_THROW(load(1e307, 0), Error);
+  EXPECT_THROW(load(-1e304, 1e308), Error);
+  const auto large = [](int x, int, int) { return x == 0 ? -3e38 : 3e38; };
+  EXPECT_THROW(volumeOf(gridOf(dims), channelOf<float>(dims, large, 1e275)), Error);
 }
 
 TEST(Values, OfMinusZeroAreZero) {
