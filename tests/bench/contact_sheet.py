@@ -20,7 +20,7 @@ def main(out):
                 pictures.append(os.path.join(folder, f"{light}-{blend}.png"))
                 subprocess.run(
                     [PROGRAM, "render", os.path.join(HERE, "scenes/orbitals.json"), "--data", data, "-o", pictures[-1],
-                     "--samples", "256", "--set", f"blend.mode={blend}", "--set", f"shading={light}",
+                     "--samples", "160", "--set", f"blend.mode={blend}", "--set", f"shading={light}",
                      "--set", f"shadows={light}"], check=True)
         # Debian's openimageio-tools: puts pictures side by side.
         subprocess.run(["oiiotool", *pictures, "--mosaic:pad=4", "4x2", "--compression", "jpeg:88", "-o", out], check=True)
