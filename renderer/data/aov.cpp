@@ -31,7 +31,7 @@ glm::vec3 defaultLinearColor(int channel) {
 
 glm::vec3 heat(float at) {
   static const std::vector<ColorKnot> knots = colormapKnots("inferno");
-  return glm::vec3(knots[std::size_t(at * float(knots.size() - 1) + 0.5f)].color);
+  return glm::vec3(knots[std::size_t(std::lround(at * float(knots.size() - 1)))].color);
 }
 
 template <class Color>
