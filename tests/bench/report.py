@@ -48,8 +48,10 @@ def counts(scenes):
 def main(path):
     with open(path, encoding="utf-8") as file:
         measured = json.load(file)
-    print(f"# Speed against error\nMachine: {measured['machine']}. Pictures of 96x96 through pixel centres, errors against the "
-          "double-precision reference.\nMade by `tests/bench/run.py out.json` and `tests/bench/report.py out.json`.\n\n"
+    image = next(iter(next(iter(measured["scenes"].values())).values()))["scene"]["image"]
+    print(f"# Speed against error\nMachine: {measured['machine']}. Pictures of {image['width']}x{image['height']} through "
+          "pixel centres, errors against the "
+          "double-precision\nreference. Made by `tests/bench/run.py out.json` and `tests/bench/report.py out.json`.\n\n"
           "## Time to an error\nOf trackers by the law of their noise from the most samples measured; of the marcher by "
           "its fastest step\nthat is good enough (-: none of 4, 2, 1, 0.5 is). In brackets: how many times less than "
           f"sync-dda in the same run.\n\n{times(measured['scenes'])}\n## Counts and errors\n{counts(measured['scenes'])}",
