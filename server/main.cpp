@@ -12,6 +12,7 @@
 #include "server/commands/compare.h"
 #include "server/commands/generate.h"
 #include "server/commands/info.h"
+#include "server/commands/reference.h"
 #include "server/commands/render.h"
 #include "server/commands/serve.h"
 
@@ -57,6 +58,7 @@ int main(int argc, char** argv) {
   scolopax::addGenerateCommand(app);
   scolopax::addCompareCommand(app);
   scolopax::addBenchCommand(app);
+  scolopax::addReferenceCommand(app);
   try {
     app.parse(argc, argv);
     return 0;

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/commands/reference.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <memory>
+
+#include "renderer/io/image_file.h"
+#include "renderer/io/output_file.h"
+#include "renderer/reference/render.h"
+#include "server/commands/scene_arguments.h"
+
+namespace scolopax {
+namespace {
+
+struct Options {
+  SceneArguments scene;
+  std::filesystem::path out;
+  int samplesPerAxis = 4;
+};
+
+double rootMeanSquare(const std::vector<glm::vec4>& values) {
+  double sum = 0;
+  for (const glm::vec4& v : values)
+    sum += double(v.r) * double(v.r) + double(v.g) * double(v.g) + double(v.b) * double(v.b);
+  return std::sqrt(sum / (3 * double(values.size())));
+}
+
+void renderTruth(const Options& options) {
+  io::checkImageName(options.out);
+  io::checkWritable(options.out);
+  checkOutputs({options.out}, options.scene);
+  const auto resolved = resolveScene(options.scene);
+  const auto truth = reference::renderReference(*resolved->dataset->volume, resolved->render,
+                                                options.samplesPerAxis, resolved->render.seed);
+  io::writeImage(options.out, truth.image, resolved->render.background);
+  fmt::print("largest error of a ray {:.2e}\nnoise of the picture {:.2e} (RMS)\n", truth.maximumRayError,
+             rootMeanSquare(truth.standardError));
+}
+
+}  // namespace
+
+CLI::App* addReferenceCommand(CLI::App& root) {
+  CLI::App* command = root.add_subcommand(
+      "reference", "Render a scene in double precision: slow, what errors are counted from");
+  const auto o = std::make_shared<Options>();
+  addSceneArguments(*command, o->scene);
+  command
+      ->add_option("-o,--output", o->out,
+                   "Picture: .exr or .tif (float, linear premultiplied RGBA), .png or .jpg")
+      ->required();
+  command
+      ->add_option("--samples-per-axis", o->samplesPerAxis,
+                   "Strata of a pixel along x and y, two rays in each; with image.filter=point one ray goes "
+                   "through the\npixel's centre, and there is no noise")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  command->footer(
+      "Prints the largest estimated error of a ray, and the noise that sampling the pixels' areas leaves.\n"
+      "integrator.method, .step and .macrocell of the scene are of no account.");
+  command->callback([o] { renderTruth(*o); });
+  return command;
+}
+
+}  // namespace scolopax
