@@ -29,8 +29,11 @@ DeviceScene::DeviceScene(const kernel::SceneView& host) : view_(host) {
   }
   view_.channels = channels.data();
   moveToDevice(&view_.channels, channels.size());
-  moveToDevice(&view_.majorants.values, std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z) *
-                                            std::size_t(1 + host.channelCount));
+  kernel::MajorantView& majorants = view_.majorants;
+  const std::size_t cellCount = std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z);
+  moveToDevice(&majorants.totals, cellCount);
+  moveToDevice(&majorants.intervals, cellCount * std::size_t(majorants.columns));
+  moveToDevice(&majorants.tables, std::size_t(host.channelCount));
 }
 
 }  // namespace scolopax::cuda

@@ -17,9 +17,10 @@ namespace scolopax {
 
 /// What setScene had to redo.
 struct RebuildStats {
-  int macrocellChannels = 0;  ///< channels whose macrocells were measured again
-  int majorantChannels = 0;   ///< channels whose majorants were rebuilt
-  bool filmReset = false;     ///< false: the new scene makes the same picture, samples are kept
+  int macrocellChannels = 0;      ///< channels whose macrocells were measured again
+  int majorantChannels = 0;       ///< channels whose table of bounds was rebuilt
+  std::size_t majorantCells = 0;  ///< macrocells whose majorant was worked out again
+  bool filmReset = false;         ///< false: the new scene makes the same picture, samples are kept
   double rebuildMs = 0;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/data/macrocell_grid.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -8,38 +9,59 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <type_traits>
+
+#include "renderer/data/value_levels.h"
 
 namespace scolopax {
 namespace {
 
-constexpr float kEmpty = std::numeric_limits<float>::infinity();
-
 /// Three nested interpolations round by at most 9 * 2^-24 of the largest value among their corners. An
 /// interval of one value, and an end at zero, are exact: equal corners give no difference to round, and
 /// rounding is monotone through zero.
+float slackFor(float largest) { return largest * 0x1p-20f; }
+
 ValueInterval widen(ValueInterval v) {
   if (!(v.lo < v.hi)) return v;
-  const float slack = std::max(std::abs(v.lo), std::abs(v.hi)) * 0x1p-20f;
+  const float slack = slackFor(std::max(std::abs(v.lo), std::abs(v.hi)));
   if (v.lo != 0) v.lo -= slack;
   if (v.hi != 0) v.hi += slack;
   return v;
 }
 
-template <class T>
-ValueInterval intervalOf(const T* voxels, glm::ivec3 dims, glm::ivec3 first, glm::ivec3 last) {
-  ValueInterval v{kEmpty, -kEmpty};
-  for (int z = first.z; z <= last.z; ++z)
-    for (int y = first.y; y <= last.y; ++y) {
-      const T* row = voxels + (std::size_t(z) * std::size_t(dims.y) + std::size_t(y)) * std::size_t(dims.x);
-      for (int x = first.x; x <= last.x; ++x) {
-        const float value = float(row[x]);
-        if constexpr (std::is_same_v<T, float>)
-          if (!std::isfinite(value)) continue;
-        v.lo = std::min(v.lo, value);
-        v.hi = std::max(v.hi, value);
+/// Calls visit(cell, interval) for every macrocell, from many threads. lo > hi where no voxel is finite.
+template <class T, class Visit>
+void measure(const T* voxels, glm::ivec3 dims, const MacrocellGrid& grid, Visit&& visit) {
+  constexpr bool kFloat = std::is_same_v<T, float>;
+  constexpr T kMost = kFloat ? std::numeric_limits<T>::infinity() : std::numeric_limits<T>::max();
+  constexpr T kLeast = kFloat ? -std::numeric_limits<T>::infinity() : std::numeric_limits<T>::lowest();
+  const std::size_t rowLength = std::size_t(dims.x);
+  tbb::parallel_for(0, grid.cells.z, [&](int z) {
+    std::vector<T> least(rowLength), most(rowLength);
+    for (int y = 0; y < grid.cells.y; ++y) {
+      // All rows of voxels of a row of macrocells into one: a long loop that vectorises.
+      std::fill(least.begin(), least.end(), kMost);
+      std::fill(most.begin(), most.end(), kLeast);
+      for (int k = z * grid.size; k <= std::min((z + 1) * grid.size, dims.z - 1); ++k)
+        for (int j = y * grid.size; j <= std::min((y + 1) * grid.size, dims.y - 1); ++j) {
+          const T* row = voxels + (std::size_t(k) * std::size_t(dims.y) + std::size_t(j)) * rowLength;
+          for (std::size_t i = 0; i < rowLength; ++i) {
+            const bool counts = !kFloat || row[i] - row[i] == 0;
+            const T low = counts ? row[i] : kMost, high = counts ? row[i] : kLeast;
+            least[i] = low < least[i] ? low : least[i];
+            most[i] = high > most[i] ? high : most[i];
+          }
+        }
+      std::size_t cell =
+          (std::size_t(z) * std::size_t(grid.cells.y) + std::size_t(y)) * std::size_t(grid.cells.x);
+      for (int x = 0; x < grid.cells.x; ++x, ++cell) {
+        const int first = x * grid.size, last = std::min(first + grid.size, dims.x - 1);
+        visit(cell, ValueInterval{
+                        float(*std::min_element(&least[std::size_t(first)], &least[std::size_t(last)] + 1)),
+                        float(*std::max_element(&most[std::size_t(first)], &most[std::size_t(last)] + 1))});
       }
     }
-  return widen(v);
+  });
 }
 
 }  // namespace
@@ -50,23 +72,34 @@ MacrocellGrid buildMacrocells(const Volume& volume, int size) {
   grid.size = size;
   // Cells lie between voxel centres: their support is size + 1 voxels an edge.
   for (int axis = 0; axis < 3; ++axis) grid.cells[axis] = std::max(1, (dims[axis] - 1 + size - 1) / size);
-  const auto cells = glm::ivec3(grid.cells);
-  const std::size_t count = std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z);
-  for (const Channel& channel : volume.channels()) {
-    std::vector<ValueInterval> intervals(count);
-    visitScalarType(channel.voxels.type(), [&](auto zero) {
-      const auto* voxels = channel.voxels.as<decltype(zero)>().data();
-      tbb::parallel_for(0, cells.z, [&](int z) {
-        std::size_t at = std::size_t(z) * std::size_t(cells.y) * std::size_t(cells.x);
-        for (int y = 0; y < cells.y; ++y)
-          for (int x = 0; x < cells.x; ++x) {
-            const glm::ivec3 first = glm::ivec3(x, y, z) * size;
-            const glm::ivec3 last = glm::min(first + size, dims - 1);
-            intervals[at++] = intervalOf(voxels, dims, first, last);
-          }
-      });
+  const std::size_t channels = volume.channels().size();
+  grid.intervals.resize(grid.cellCount() * channels);
+  for (std::size_t n = 0; n < channels; ++n) {
+    const VoxelBuffer& buffer = volume.channels()[n].voxels;
+    visitScalarType(buffer.type(), [&](auto zero) {
+      using T = decltype(zero);
+      const T* voxels = buffer.as<T>().data();
+      ValueLevels levels;
+      if constexpr (std::is_same_v<T, std::uint8_t>) {
+        for (int i = 0; i < kernel::kMaxLevels; ++i) levels.values.push_back(float(i));
+        measure(voxels, dims, grid, [&](std::size_t cell, ValueInterval v) {
+          grid.intervals[cell * channels + n] = {std::uint8_t(v.lo), std::uint8_t(v.hi)};
+        });
+      } else {
+        std::vector<ValueInterval> measured(grid.cellCount());
+        measure(voxels, dims, grid, [&](std::size_t cell, ValueInterval v) {
+          measured[cell] = std::is_same_v<T, float> ? widen(v) : v;
+        });
+        levels.values = chooseLevels(measured);
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, measured.size(), 4096), [&](const auto& range) {
+          for (std::size_t cell = range.begin(); cell < range.end(); ++cell)
+            grid.intervals[cell * channels + n] = encode(levels, measured[cell]);
+        });
+      }
+      if constexpr (std::is_integral_v<T>)
+        levels.slack = slackFor(std::max(std::abs(levels.values.front()), std::abs(levels.values.back())));
+      grid.levels.push_back(std::move(levels));
     });
-    grid.channels.push_back(std::move(intervals));
   }
   return grid;
 }

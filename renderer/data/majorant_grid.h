@@ -1,23 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
-// Upper bounds of the extinction per macrocell. Each channel's bounds are kept apart, so that an edit
-// rebuilds one channel; combine() interleaves the visible ones for the kernels.
+// Upper bounds of the extinction per macrocell, kept up to date edit by edit: an edit of a channel's curve
+// costs a new table of that channel, and the totals of those cells whose values it changes.
 #pragma once
-#include <span>
+#include <memory>
 #include <vector>
 
 #include "renderer/data/transfer_function.h"
-#include "renderer/kernel/views.h"
+#include "renderer/kernel/majorants.h"
 
 namespace scolopax {
 
-/// Bounds of one channel, one per macrocell: for every sample x of the cell, extinction(x) <= bound, in
-/// float.
-std::vector<float> buildMajorants(const std::vector<ValueInterval>& intervals,
-                                  const TransferFunction& transfer);
+/// Bounds of the channel in `column` of the macrocells. For every sample x of a cell, in float: extinction(x)
+/// <= over(the cell's interval), which is the least upper bound over the interval's stored values.
+kernel::BoundTable buildBounds(const ValueLevels& levels, const TransferFunction& transfer, int column);
 
-/// Interleaves the bounds of the visible channels: per cell their sum (or, for blend modes that show one
-/// channel at a point, their maximum), then each.
-std::vector<float> combineMajorants(std::span<const std::vector<float>* const> channels, std::size_t cells,
-                                    bool sums);
+class MajorantGrid {
+ public:
+  /// Takes over the visible channels' tables, in the order of the channels, and the macrocells they belong
+  /// to. `sums`: the channels' extinctions add up; else the largest hides the others. Returns in how many
+  /// cells the total was worked out again. Nothing has changed when this throws.
+  std::size_t update(std::shared_ptr<const MacrocellGrid> macrocells, std::vector<kernel::BoundTable> tables,
+                     bool sums);
+  /// Valid until the next update.
+  kernel::MajorantView view() const;
+
+ private:
+  float totalOf(const kernel::LevelInterval* intervals) const;
+
+  std::shared_ptr<const MacrocellGrid> macrocells_;
+  std::vector<kernel::BoundTable> tables_;
+  bool sums_ = true;
+  std::vector<float> totals_;
+};
 
 }  // namespace scolopax

@@ -13,7 +13,7 @@
 namespace scolopax {
 namespace {
 
-/// Whether the same voxels have the same extinction: what majorants depend on.
+/// Whether the same voxels have the same extinction: what bounds depend on.
 bool sameExtinction(const ChannelAppearance& a, const ChannelAppearance& b) {
   return a.rangeLo == b.rangeLo && a.rangeHi == b.rangeHi && a.gamma == b.gamma && a.density == b.density &&
          a.opacity == b.opacity;
@@ -122,49 +122,37 @@ RebuildStats RenderPlan::update(const Scene& scene) {
   const bool newCells = !macrocells_ || macrocells_->size != scene.macrocell;
   const auto macrocells = newCells ? sharedMacrocells(volume_, scene.macrocell) : macrocells_;
   if (newCells) stats.macrocellChannels = int(volume_->channels().size());
-  std::vector<std::optional<ChannelPlan>> rebuilt(scene.channels.size());
-  bool combine = newCells || !scene_ || sumsExtinction(scene_->blend) != sumsExtinction(scene.blend);
+  std::vector<std::optional<ChannelPlan>> plans = channels_;
+  plans.resize(scene.channels.size());
+  std::vector<kernel::ChannelView> views;
+  std::vector<int> visible;
+  std::vector<kernel::BoundTable> bounds;
   for (std::size_t i = 0; i < scene.channels.size(); ++i) {
     const ChannelAppearance& appearance = scene.channels[i];
+    std::optional<ChannelPlan>& plan = plans[i];
     const bool stale = newCells || !scene_ || !sameExtinction(scene_->channels[i], appearance);
-    const bool restyled = !scene_ || scene_->channels[i] != appearance;
-    if (scene_ && scene_->channels[i].visible != appearance.visible) combine = true;
-    const bool unbuilt = i < channels_.size() && channels_[i] && channels_[i]->majorants.empty();
-    if (!stale && !restyled && !(unbuilt && appearance.visible)) continue;
-    ChannelPlan plan{TransferFunction(volume_->channels()[i], appearance), {}};
-    const bool seen = appearance.visible && !plan.transfer.invisible();
-    if (seen && (stale || unbuilt)) {
-      plan.majorants = buildMajorants(macrocells->channels[i], plan.transfer);
+    if (stale)
+      plan = {TransferFunction(volume_->channels()[i], appearance), {}};
+    else if (scene_->channels[i] != appearance)
+      plan->transfer = TransferFunction(volume_->channels()[i], appearance);
+    if (!appearance.visible || plan->transfer.invisible()) continue;
+    if (!plan->bounds) {
+      plan->bounds = buildBounds(macrocells->levels[i], plan->transfer, int(i));
       ++stats.majorantChannels;
-      combine = true;
-    } else if (stale) {
-      combine = true;  // it may have been seen before
-    } else {
-      plan.majorants = channels_[i]->majorants;
     }
-    rebuilt[i] = std::move(plan);
+    visible.push_back(int(i));
+    bounds.push_back(*plan->bounds);
   }
+  for (const int i : visible)
+    views.push_back(plans[std::size_t(i)]->transfer.view(volume_->channels()[std::size_t(i)]));
+  std::optional<Scene> next = scene;
+  stats.majorantCells = majorants_.update(macrocells, std::move(bounds), sumsExtinction(scene.blend));
 
-  scene_ = scene;
+  scene_ = std::move(next);
   macrocells_ = macrocells;
-  channels_.resize(scene.channels.size());
-  for (std::size_t i = 0; i < rebuilt.size(); ++i)
-    if (rebuilt[i]) channels_[i] = std::move(rebuilt[i]);
-
-  channelViews_.clear();
-  visibleChannels_.clear();
-  std::vector<const std::vector<float>*> bounds;
-  for (std::size_t i = 0; i < channels_.size(); ++i) {
-    const ChannelPlan& plan = *channels_[i];
-    if (!scene.channels[i].visible || plan.majorants.empty()) continue;
-    channelViews_.push_back(plan.transfer.view(volume_->channels()[i]));
-    visibleChannels_.push_back(int(i));
-    bounds.push_back(&plan.majorants);
-  }
-  const glm::ivec3 cells = macrocells_->cells;
-  if (combine)
-    majorants_ = combineMajorants(bounds, std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z),
-                                  sumsExtinction(scene.blend));
+  channels_ = std::move(plans);
+  channelViews_ = std::move(views);
+  visibleChannels_ = std::move(visible);
 
   placeLights(scene, volume_->grid(), &view_);
   view_.rays = rays;
@@ -176,7 +164,7 @@ RebuildStats RenderPlan::update(const Scene& scene) {
   view_.channelCount = int(channelViews_.size());
   view_.channels = channelViews_.data();
   view_.step = view_.smallestSpacing * float(scene.step);
-  view_.majorants = {cells, float(macrocells_->size), majorants_.data()};
+  view_.majorants = majorants_.view();
   stats.rebuildMs =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   return stats;

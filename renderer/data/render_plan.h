@@ -29,13 +29,13 @@ class RenderPlan {
  private:
   struct ChannelPlan {
     TransferFunction transfer;
-    std::vector<float> majorants;  // empty while the channel cannot be seen
+    std::optional<kernel::BoundTable> bounds;  // none as long as the channel has never been seen so
   };
   std::shared_ptr<const Volume> volume_;
   std::optional<Scene> scene_;
   std::shared_ptr<const MacrocellGrid> macrocells_;
   std::vector<std::optional<ChannelPlan>> channels_;
-  std::vector<float> majorants_;
+  MajorantGrid majorants_;
   std::vector<kernel::ChannelView> channelViews_;
   std::vector<int> visibleChannels_;
   kernel::SceneView view_{};

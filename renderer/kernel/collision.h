@@ -35,27 +35,33 @@ SCOLOPAX_HD inline void keepNearer(FirstCollision* first, const FirstCollision& 
 /// what any thickness that can be told from opaque needs.
 inline constexpr std::uint32_t kMaxTentativeCollisions = 1u << 20;
 
-/// Tentative collision of the process of all channels together, whose bound is their sum. Accepts with
-/// probability extinction / bound (Eq. 4), strictly below, so that zero extinction is never hit.
+/// Tentative collision in a macrocell of the process of all channels together; `bound` is their total.
+/// Accepts with probability extinction / bound (Eq. 4), strictly below, so that zero extinction is never hit.
 struct PickOneChannel {
-  /// Draws the channel first, with probability bound_n / sum, and fetches only that one.
-  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, const float* bounds, Place place,
-                                                   glm::vec3 point, const RandomBlock& random,
+  /// Draws the channel first, with probability bound_n / bound, and fetches only that one. What the bounds
+  /// leave of the total belongs to none.
+  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, std::size_t cell, float bound,
+                                                   Place place, glm::vec3 point, const RandomBlock& random,
                                                    SampleCost* cost) {
-    float pick = uniformOf(random.y) * bounds[0];
-    int n = 0;
-    while (n + 1 < scene.channelCount && pick >= bounds[1 + n]) pick -= bounds[1 + n++];
-    const Classified c = classify(scene, n, point, cost);
-    if (!(uniformOf(random.z) * bounds[1 + n] < c.extinction)) return std::nullopt;
-    return Collision{place, point, n, c.position};
+    float pick = uniformOf(random.y) * bound;
+    for (int n = 0; n < scene.channelCount; ++n) {
+      const float own = scene.majorants.bound(cell, n);
+      if (pick < own) {
+        const Classified c = classify(scene, n, point, cost);
+        if (!(uniformOf(random.z) * own < c.extinction)) return std::nullopt;
+        return Collision{place, point, n, c.position};
+      }
+      pick -= own;
+    }
+    return std::nullopt;
   }
 };
 struct TestAllChannels {
   /// Fetches channel after channel until the drawn share of the bound is used up.
-  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, const float* bounds, Place place,
-                                                   glm::vec3 point, const RandomBlock& random,
+  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, std::size_t, float bound,
+                                                   Place place, glm::vec3 point, const RandomBlock& random,
                                                    SampleCost* cost) {
-    float left = uniformOf(random.y) * bounds[0];
+    float left = uniformOf(random.y) * bound;
     for (int n = 0; n < scene.channelCount; ++n) {
       const Classified c = classify(scene, n, point, cost);
       if (left < c.extinction) return Collision{place, point, n, c.position};
@@ -66,11 +72,11 @@ struct TestAllChannels {
 };
 /// The same for max and mix, whose bound is the largest of the channels'.
 struct TestLargest {
-  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, const float* bounds, Place place,
-                                                   glm::vec3 point, const RandomBlock& random,
+  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, std::size_t, float bound,
+                                                   Place place, glm::vec3 point, const RandomBlock& random,
                                                    SampleCost* cost) {
     const Largest largest = largestOf(scene, point, cost);
-    if (!(uniformOf(random.z) * bounds[0] < largest.extinction)) return std::nullopt;
+    if (!(uniformOf(random.z) * bound < largest.extinction)) return std::nullopt;
     return Collision{place, point, largest.channel, largest.position};
   }
 };

@@ -24,8 +24,8 @@ SCOLOPAX_HD void march(const SceneView& scene, const Ray& ray, Interval inside, 
   int steps = 0;
   do {
     ++cost->cellSteps;
-    if (!(scene.majorants.values[walk.index() * std::size_t(1 + scene.channelCount) + std::size_t(bound)] >
-          0.0f))
+    const std::size_t cell = walk.index();
+    if (!((bound == 0 ? scene.majorants.total(cell) : scene.majorants.bound(cell, bound - 1)) > 0.0f))
       continue;
     // First sample in the cell. Rounding may put the guess too low, which two steps mend; a sample is never
     // taken twice, because k only grows.

@@ -8,6 +8,7 @@
 
 #include "renderer/core/scalar_type.h"
 #include "renderer/kernel/camera_rays.h"
+#include "renderer/kernel/majorants.h"
 
 namespace scolopax::kernel {
 
@@ -49,14 +50,6 @@ struct ChannelView {
   float weight;                ///< of the colour in blend mode mix
   MaterialView material;
   float inverseRange;  ///< 1 / |hi - lo| of the range in stored values
-};
-
-/// Bounds of the extinction per macrocell. Cell (i,j,k) covers voxel coordinates [i, i+1] * cellSize; the
-/// outer cells reach to the faces of the box. Per cell: the sum over channels, then one bound per channel.
-struct MajorantView {
-  glm::ivec3 cells;
-  float cellSize;
-  const float* values;  ///< cells.x * cells.y * cells.z * (1 + channelCount), x fastest
 };
 
 struct SceneView {

@@ -25,8 +25,7 @@ struct PrintedNDda {
                            std::optional<kernel::Collision>* nearest, kernel::SampleCost* cost) {
     kernel::CellWalk walk(ray, inside, scene.majorants);
     do {
-      const float bound =
-          scene.majorants.values[walk.index() * std::size_t(1 + scene.channelCount) + std::size_t(1 + n)];
+      const float bound = scene.majorants.bound(walk.index(), n);
       if (!(bound > 0)) continue;
       float t = walk.enter();
       while (true) {

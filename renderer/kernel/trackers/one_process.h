@@ -19,16 +19,17 @@ SCOLOPAX_HD std::optional<Collision> trackOneProcess(const SceneView& scene, con
   std::uint32_t tentative = 0;
   do {
     ++cost->cellSteps;
-    const float* bounds = scene.majorants.values + walk.index() * std::size_t(1 + scene.channelCount);
-    if (!(bounds[0] > 0.0f)) continue;
+    const float bound = scene.majorants.total(walk.index());
+    if (!(bound > 0.0f)) continue;
     // Optical depth since the cell's entry: kept instead of t, so that a step shorter than the resolution of
     // t still makes progress.
-    const float total = bounds[0] * (walk.exit() - walk.enter());
+    const float total = bound * (walk.exit() - walk.enter());
     float passed = 0.0f;
     while (depth < total - passed) {
       passed += depth;
-      const Place place{walk.enter(), passed / bounds[0]};
-      if (const auto hit = Test::test(scene, bounds, place, walk.pointAt(place.t()), random, cost))
+      const Place place{walk.enter(), passed / bound};
+      if (const auto hit =
+              Test::test(scene, walk.index(), bound, place, walk.pointAt(place.t()), random, cost))
         return hit;
       if (++tentative >= kMaxTentativeCollisions) {
         cost->truncated = 1;

@@ -13,8 +13,7 @@ template <class Blend>
 SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, int n, const CellWalk& walk, Sampler& sampler,
                                   std::optional<Collision>* nearest, std::uint32_t* tentative,
                                   SampleCost* cost) {
-  const float bound =
-      scene.majorants.values[walk.index() * std::size_t(1 + scene.channelCount) + std::size_t(1 + n)];
+  const float bound = scene.majorants.bound(walk.index(), n);
   if (!(bound > 0.0f)) return CellOutcome::nothing;
   const float total = bound * (walk.exit() - walk.enter());
   float passed = 0.0f;
@@ -71,7 +70,7 @@ struct SyncDda {
     std::uint32_t tentative = 0;
     do {
       ++cost->cellSteps;
-      if (!(scene.majorants.values[walk.index() * std::size_t(1 + scene.channelCount)] > 0.0f)) continue;
+      if (!(scene.majorants.total(walk.index()) > 0.0f)) continue;
       std::optional<Collision> nearest;
       for (int n = 0; n < scene.channelCount; ++n)
         if (trackCell<Blend>(scene, n, walk, sampler, &nearest, &tentative, cost) == CellOutcome::exhausted) {

@@ -134,11 +134,13 @@ TEST(CpuRenderer, RebuildsOnlyTheEditedChannelAndNothingForAColour) {
   Scene scene = orbitalScene(*volume);
   RebuildStats stats = renderer->setScene(scene);
   EXPECT_EQ(stats.majorantChannels, 3);
+  EXPECT_EQ(stats.majorantCells, 6u * 6 * 6);
   EXPECT_TRUE(stats.filmReset);
 
   scene.channels[1].opacity = {{0, 0}, {0.5, 1}};
   stats = renderer->setScene(scene);
   EXPECT_EQ(stats.majorantChannels, 1);
+  EXPECT_GT(stats.majorantCells, 0u);
   EXPECT_EQ(stats.macrocellChannels, 0);
   EXPECT_TRUE(stats.filmReset);
 
@@ -146,6 +148,7 @@ TEST(CpuRenderer, RebuildsOnlyTheEditedChannelAndNothingForAColour) {
   scene.camera.eye.x += 1;
   stats = renderer->setScene(scene);
   EXPECT_EQ(stats.majorantChannels, 0);
+  EXPECT_EQ(stats.majorantCells, 0u);
   EXPECT_TRUE(stats.filmReset);
 
   scene.background = {1, 1, 1};  // added to the finished image

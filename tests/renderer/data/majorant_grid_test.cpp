@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "renderer/kernel/classify.h"
@@ -32,6 +33,17 @@ std::vector<OpacityKnot> randomCurve(std::mt19937& random) {
   return knots;
 }
 
+/// The bounds of one channel alone.
+MajorantGrid majorantsOf(const std::shared_ptr<const MacrocellGrid>& cells,
+                         const TransferFunction& transfer) {
+  MajorantGrid majorants;
+  majorants.update(cells, {buildBounds(cells->levels[0], transfer, 0)}, true);
+  return majorants;
+}
+std::shared_ptr<const MacrocellGrid> macrocellsOf(const Volume& volume, int size) {
+  return std::make_shared<const MacrocellGrid>(buildMacrocells(volume, size));
+}
+
 /// Every point that a tracker can fetch for a cell: corners, faces and the inside.
 template <class T, class F>
 void expectBound(F&& value, glm::ivec3 dims, double rangeLo, double rangeHi, unsigned seed) {
@@ -40,7 +52,8 @@ void expectBound(F&& value, glm::ivec3 dims, double rangeLo, double rangeHi, uns
   const auto volume = volumeOf(gridOf(dims), channelOf<T>(dims, value));
   const Channel& channel = volume->channels()[0];
   for (const int size : {1, 2, 3, 4, 7, 16}) {
-    const MacrocellGrid cells = buildMacrocells(*volume, size);
+    const auto macrocells = macrocellsOf(*volume, size);
+    const MacrocellGrid& cells = *macrocells;
     for (int trial = 0; trial < 12; ++trial) {
       ChannelAppearance a;
       a.opacity = randomCurve(random);
@@ -49,7 +62,8 @@ void expectBound(F&& value, glm::ivec3 dims, double rangeLo, double rangeHi, uns
       a.gamma = trial % 3 == 2 ? 0.5 + 2 * double(uniform(random)) : 1;
       a.density = 3.7;
       const TransferFunction transfer(channel, a);
-      const std::vector<float> bounds = buildMajorants(cells.channels[0], transfer);
+      const MajorantGrid majorants = majorantsOf(macrocells, transfer);
+      const kernel::MajorantView bounds = majorants.view();
       const kernel::ChannelView view = transfer.view(channel);
       for (int sample = 0; sample < 4000; ++sample) {
         const glm::ivec3 cell(int(uniform(random) * float(cells.cells.x)),
@@ -69,7 +83,9 @@ void expectBound(F&& value, glm::ivec3 dims, double rangeLo, double rangeHi, uns
         const std::size_t index = (std::size_t(cell.z) * std::size_t(cells.cells.y) + std::size_t(cell.y)) *
                                       std::size_t(cells.cells.x) +
                                   std::size_t(cell.x);
-        ASSERT_LE(sigma, bounds[index]) << "size " << size << " trial " << trial << " gamma " << a.gamma;
+        ASSERT_LE(sigma, bounds.total(index)) << "size " << size << " trial " << trial;
+        ASSERT_LE(sigma, bounds.bound(index, 0))
+            << "size " << size << " trial " << trial << " gamma " << a.gamma;
       }
     }
   }
@@ -118,6 +134,32 @@ TEST(MajorantGrid, IsNeverBelowTheClassifiedValueForValuesThatAreNotFinite) {
       {9, 8, 7}, -3e38, 3e38, 8);
 }
 
+TEST(MajorantGrid, IsNeverBelowTheClassifiedValueForWordsOfManyValues) {
+  std::mt19937 random(9);
+  const auto value = [&](int, int, int) { return random() % 5 == 0 ? 0 : random() % 65536; };
+  expectBound<std::uint16_t>(value, {17, 14, 15}, 1000, 60000, 10);
+  expectBound<std::uint16_t>(value, {17, 14, 15}, 60000, 1000, 11);  // reversed
+}
+
+TEST(MajorantGrid, IsNeverBelowTheClassifiedValueForFloatsOfManyValuesAndScales) {
+  std::mt19937 random(12);
+  std::uniform_real_distribution<double> exponent(-44, 3);
+  const auto value = [&](int, int, int) {  // denormals to thousands, either sign
+    return (random() % 2 ? 1 : -1) * std::pow(10.0, exponent(random));
+  };
+  expectBound<float>(value, {15, 14, 13}, -1, 1, 13);
+  expectBound<float>(value, {15, 14, 13}, 0, 1e-38, 14);
+  expectBound<float>(value, {15, 14, 13}, 1e-3, 1e-3, 15);  // a step
+}
+
+TEST(MajorantGrid, IsNeverBelowTheClassifiedValueForConstantVolumesAndAStepAtTheirValue) {
+  for (const float constant : {0.0f, -0.0f, 1.0f, -7.5f, 1e-40f}) {
+    const auto value = [&](int, int, int) { return constant; };
+    expectBound<float>(value, {5, 6, 7}, constant, constant, 16);
+    expectBound<float>(value, {5, 6, 7}, double(constant) - 1, double(constant) + 1, 17);
+  }
+}
+
 TEST(MajorantGrid, IsZeroExactlyWhereNoSampleOfTheCellHasExtinction) {
   // One bright voxel in the middle: only the cells its interpolation reaches may be other than zero.
   const glm::ivec3 dims(17);
@@ -126,14 +168,17 @@ TEST(MajorantGrid, IsZeroExactlyWhereNoSampleOfTheCellHasExtinction) {
                                }));
   ChannelAppearance a;
   a.rangeHi = 255;
-  const MacrocellGrid cells = buildMacrocells(*volume, 4);
-  EXPECT_EQ(cells.cells, glm::ivec3(4));
-  const std::vector<float> bounds =
-      buildMajorants(cells.channels[0], TransferFunction(volume->channels()[0], a));
+  const auto cells = macrocellsOf(*volume, 4);
+  EXPECT_EQ(cells->cells, glm::ivec3(4));
+  const MajorantGrid majorants = majorantsOf(cells, TransferFunction(volume->channels()[0], a));
   int positive = 0;
-  for (const float b : bounds) positive += b > 0;
+  for (std::size_t cell = 0; cell < cells->cellCount(); ++cell) {
+    const float bound = majorants.view().bound(cell, 0);
+    positive += bound > 0;
+    EXPECT_TRUE(bound == 0 || bound == 1);
+    EXPECT_EQ(majorants.view().total(cell) > 0, bound > 0);
+  }
   EXPECT_EQ(positive, 8);  // voxel 8 is the corner of eight cells
-  EXPECT_EQ(*std::max_element(bounds.begin(), bounds.end()), 1.0f);
 }
 
 TEST(MajorantGrid, TakesTheKnotsInsideAnIntervalAndBothSidesOfAJump) {
@@ -151,6 +196,135 @@ TEST(MajorantGrid, TakesTheKnotsInsideAnIntervalAndBothSidesOfAJump) {
   EXPECT_EQ(majorantOf({{0, 0}, {0.5, 0.8}, {0.5, 0}, {1, 0}}, {0.25f, 0.5f}), 0.8f);
   EXPECT_EQ(majorantOf({{0, 0}, {0.5, 0.8}, {0.5, 0}, {1, 0}}, {0.5f, 1.0f}), 0.0f);
   EXPECT_EQ(majorantOf({{0, 0}, {1, 1}}, {1.0f, 0.0f}), 0.0f);  // no finite sample
+}
+
+TEST(MajorantGrid, BoundsEveryIntervalOfLevelsByItsLeastUpperBound) {
+  std::mt19937 random(18);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const glm::ivec3 dims(20);
+  const auto volume =
+      volumeOf(gridOf(dims), channelOf<float>(dims, [&](int, int, int) { return uniform(random); }));
+  ValueLevels levels = buildMacrocells(*volume, 2).levels[0];
+  ASSERT_GT(levels.values.size(), 200u);
+  for (const float slack : {0.0f, 1e-4f}) {
+    levels.slack = slack;
+    for (int trial = 0; trial < 8; ++trial) {
+      ChannelAppearance a;
+      a.opacity = randomCurve(random);
+      a.gamma = trial % 2 ? 1 : 1.7;
+      const TransferFunction transfer(volume->channels()[0], a);
+      const kernel::BoundTable table = buildBounds(levels, transfer, 0);
+      for (std::size_t lo = 0; lo < levels.values.size(); ++lo)
+        for (std::size_t hi = lo; hi < levels.values.size(); ++hi) {
+          const kernel::LevelInterval interval{std::uint8_t(lo), std::uint8_t(hi)};
+          ASSERT_EQ(table.over(interval), transfer.majorant(levels.decode(interval))) << lo << " to " << hi;
+        }
+    }
+  }
+}
+
+/// Three channels of different types in one volume.
+std::shared_ptr<const Volume> threeChannels() {
+  const glm::ivec3 dims(23, 18, 21);
+  const auto wave = [](double phase) {
+    return [phase](int x, int y, int z) {
+      return 100 + 99 * std::sin(0.3 * x + phase) * std::cos(0.25 * y - phase) * std::sin(0.2 * z);
+    };
+  };
+  return volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, wave(0)),
+                  channelOf<std::uint16_t>(dims, [&](int x, int y, int z) { return 300 * wave(1)(x, y, z); }),
+                  channelOf<float>(dims, wave(2)));
+}
+
+TEST(MajorantGrid, IsAfterAnySeriesOfEditsWhatAFreshOneIs) {
+  std::mt19937 random(19);
+  const auto volume = threeChannels();
+  const double largest[] = {255, 65535, 200};
+  std::vector<ChannelAppearance> looks(3);
+  std::vector<bool> visible(3, true);
+  for (std::size_t i = 0; i < 3; ++i) looks[i].rangeHi = largest[i];
+  auto macrocells = macrocellsOf(*volume, 3);
+  MajorantGrid edited;
+  bool sums = true;
+  for (int edit = 0; edit < 200; ++edit) {
+    const std::size_t n = random() % 3;
+    switch (random() % 8) {
+      case 0:
+        visible[n] = !visible[n];
+        break;
+      case 1:
+        looks[n].density = double(random() % 3) * 0.75;
+        break;
+      case 2:
+        if (random() % 3 == 0) sums = !sums;
+        break;
+      case 3:
+        if (random() % 3 == 0) macrocells = macrocellsOf(*volume, 1 + int(random() % 5));
+        break;
+      default:
+        looks[n].opacity = randomCurve(random);
+    }
+    std::vector<kernel::BoundTable> tables;
+    for (std::size_t i = 0; i < 3; ++i)
+      if (visible[i])
+        tables.push_back(
+            buildBounds(macrocells->levels[i], TransferFunction(volume->channels()[i], looks[i]), int(i)));
+    MajorantGrid fresh;
+    edited.update(macrocells, tables, sums);
+    EXPECT_EQ(fresh.update(macrocells, tables, sums), macrocells->cellCount());
+    const kernel::MajorantView a = edited.view(), b = fresh.view();
+    for (std::size_t cell = 0; cell < macrocells->cellCount(); ++cell) {
+      ASSERT_EQ(a.total(cell), b.total(cell)) << "edit " << edit << " cell " << cell;
+      float sum = 0;
+      for (int i = 0; i < int(tables.size()); ++i) {
+        ASSERT_EQ(a.bound(cell, i), b.bound(cell, i));
+        sum = sums ? sum + a.bound(cell, i) : std::max(sum, a.bound(cell, i));
+      }
+      ASSERT_GE(a.total(cell), sum);
+      ASSERT_EQ(a.total(cell) > 0, sum > 0);
+    }
+  }
+}
+
+TEST(MajorantGrid, WorksOutOnlyTheCellsWhoseValuesAnEditChanges) {
+  const auto volume = threeChannels();
+  const auto macrocells = macrocellsOf(*volume, 2);
+  const auto curve = [](double bump) {
+    return std::vector<OpacityKnot>{{0, 0}, {60 / 255.0, 0.1}, {65 / 255.0, bump}, {70 / 255.0, 0.1}, {1, 1}};
+  };
+  std::vector<ChannelAppearance> looks(3);
+  for (auto& look : looks) {
+    look.rangeHi = 255;
+    look.opacity = curve(0.1);
+  }
+  MajorantGrid majorants;
+  const auto update = [&] {
+    std::vector<kernel::BoundTable> tables;
+    for (std::size_t i = 0; i < 3; ++i)
+      tables.push_back(
+          buildBounds(macrocells->levels[i], TransferFunction(volume->channels()[i], looks[i]), int(i)));
+    return majorants.update(macrocells, tables, true);
+  };
+  EXPECT_EQ(update(), macrocells->cellCount());
+  EXPECT_EQ(update(), 0u);
+  looks[2].color = {{0, {1, 0, 0}}};
+  EXPECT_EQ(update(), 0u);
+  // Bytes are told apart exactly: a bump over values 60 to 70 is the business of cells that have some of them
+  // and of no others. At its ends rounding decides.
+  std::size_t least = 0, most = 0;
+  for (std::size_t cell = 0; cell < macrocells->cellCount(); ++cell) {
+    const ValueInterval v = macrocells->interval(cell, 0);
+    least += v.hi > 60.5f && v.lo < 69.5f;
+    most += v.hi > 59.5f && v.lo < 70.5f;
+  }
+  ASSERT_GT(least, 0u);
+  ASSERT_LT(most, macrocells->cellCount() / 3);
+  for (const double bump : {0.9, 0.2, 0.1}) {
+    looks[0].opacity = curve(bump);
+    const std::size_t touched = update();
+    EXPECT_GE(touched, least);
+    EXPECT_LE(touched, most);
+  }
 }
 
 }  // namespace

@@ -20,7 +20,10 @@ constexpr float kLargest = std::numeric_limits<float>::max();
 
 /// A grid of macrocells without values: walks read none.
 MajorantView gridFor(glm::ivec3 dims, int size) {
-  return {glm::max(glm::ivec3(1), (dims - 2 + size) / size), float(size), nullptr};
+  MajorantView grid{};
+  grid.cells = glm::max(glm::ivec3(1), (dims - 2 + size) / size);
+  grid.cellSize = float(size);
+  return grid;
 }
 int longestWalk(const MajorantView& grid) { return grid.cells.x + grid.cells.y + grid.cells.z - 2; }
 std::size_t cellCount(const MajorantView& grid) {

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bounds of the extinction per macrocell, as data/majorant_grid keeps them: the only place that knows their
+// layout.
+#pragma once
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+
+#include "renderer/kernel/portable.h"
+
+namespace scolopax::kernel {
+
+/// Most levels that a channel's stored values are told apart by in macrocells.
+inline constexpr int kMaxLevels = 256;
+
+/// What a sample of one channel can be in a macrocell: from level lo to level hi of the channel's, lo <= hi.
+struct LevelInterval {
+  std::uint8_t lo, hi;
+};
+
+/// Largest extinction of one channel over an interval of its levels, in constant time (a sparse table).
+struct BoundTable {
+  /// [0][i]: at level i alone; [1 + k][i]: over the 2^k gaps between neighbouring levels from level i on.
+  float largest[9][kMaxLevels];
+  int column;  ///< of the channel's intervals in a cell's
+
+  SCOLOPAX_HD float over(LevelInterval values) const {
+    const int gaps = values.hi - values.lo;
+    // The exponent of 2 gaps + 1 is the number of bits of gaps, 0 for none.
+    const int row = int(std::bit_cast<std::uint32_t>(float(2 * gaps + 1)) >> 23) - 127;
+    const int span = (1 << row) >> 1;  // the largest power of two that is not above gaps
+    const float a = largest[row][values.lo], b = largest[row][values.hi - span];
+    return a > b ? a : b;
+  }
+};
+
+/// Cell (i,j,k), at cells' index (k * cells.y + j) * cells.x + i, covers voxel coordinates [i, i+1] *
+/// cellSize; the outer cells reach to the faces of the box.
+struct MajorantView {
+  glm::ivec3 cells;
+  float cellSize;
+  const float* totals;             ///< per cell
+  const LevelInterval* intervals;  ///< per cell: those of `columns` channels of the volume
+  int columns;
+  const BoundTable* tables;  ///< per visible channel
+
+  /// Bound of all visible channels together: of the sum of their extinctions, or, for blend modes that show
+  /// one channel at a point, of the largest. Not below the sum (or maximum) of their bounds.
+  SCOLOPAX_HD float total(std::size_t cell) const { return totals[cell]; }
+  /// Bound of visible channel n.
+  SCOLOPAX_HD float bound(std::size_t cell, int n) const {
+    return tables[n].over(intervals[cell * std::size_t(columns) + std::size_t(tables[n].column)]);
+  }
+};
+
+}  // namespace scolopax::kernel
