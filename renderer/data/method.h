@@ -67,6 +67,10 @@ SCOLOPAX_DECLARE_ENUM(PixelFilter, SCOLOPAX_PIXEL_FILTERS, kPixelFilters)
 SCOLOPAX_DECLARE_ENUM(Sampling, SCOLOPAX_SAMPLINGS, kSamplings)
 SCOLOPAX_DECLARE_ENUM(Aov, SCOLOPAX_AOVS, kAovs)
 
+/// Whether Scene::step is of account, and with it a bias that goes to 0 with the step; the others are
+/// unbiased.
+constexpr bool hasStep(Method method) { return method == Method::raymarch; }
+
 #undef SCOLOPAX_ENUM_ENTRY
 #undef SCOLOPAX_NAMED_ENTRY
 

@@ -4,6 +4,7 @@
 #include "server/commands/bench.h"
 
 #include <fmt/core.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <chrono>
@@ -11,68 +12,43 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "renderer/core/error.h"
+#include "renderer/data/macrocell_grid.h"
+#include "renderer/io/image_file.h"
 #include "renderer/io/output_file.h"
 #include "renderer/metrics/flip.h"
 #include "renderer/metrics/metrics.h"
 #include "renderer/reference/render.h"
-#include "renderer/renderer.h"
+#include "server/commands/bench_points.h"
 #include "server/commands/scene_arguments.h"
 #include "server/commands/validators.h"
 
 namespace scolopax {
 namespace {
 
+using bench::Point;
+using bench::Setting;
 using nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
-
-constexpr double kTargets[] = {1e-2, 1e-3};  // RMSE
 
 struct Options {
   SceneArguments scene;
   std::vector<std::string> methods;
   std::vector<std::uint32_t> samples{1, 4, 16, 64};
   std::vector<double> steps{4, 2, 1, 0.5};
+  std::vector<int> macrocells;  // none: the scene's
+  std::vector<int> threads{0};
   int repetitions = 3;
-  int threads = 0;
-  std::filesystem::path json;
+  double longest = 10;
+  std::filesystem::path truth, json;
+  bool timesOnly = false;
 };
 
-/// What one method is measured with, and what came out.
-struct Point {
-  Method method;
-  std::uint32_t samples;
-  double step;  ///< of the marcher; 0 for trackers
-  std::vector<double> seconds, squaredErrors;
-  std::vector<glm::dvec4> sum;  ///< of the pictures of all repetitions
-  double flip = 0;
-  RenderStats counts;
-  std::uint32_t samplesTimed = 0;
+const std::atomic<bool> kNeverCancel = false;
 
-  double time() const {
-    std::vector<double> sorted = seconds;
-    std::nth_element(sorted.begin(), sorted.begin() + std::ptrdiff_t(sorted.size() / 2), sorted.end());
-    return sorted[sorted.size() / 2];
-  }
-  double mse() const {
-    double all = 0;
-    for (const double e : squaredErrors) all += e;
-    return all / double(squaredErrors.size());
-  }
-  double rmse() const { return std::sqrt(mse()); }
-  double efficiency() const { return 1 / (mse() * time()); }
-};
-
-/// Squared error that stays when pictures of independent seeds are averaged: that of the mean of k pictures
-/// is bias^2 + noise / k, of one bias^2 + noise.
-double biasOf(const Point& point, const Image& truth) {
-  const double k = double(point.seconds.size());
-  Image mean{truth.width, truth.height, {}};
-  for (const glm::dvec4& v : point.sum) mean.pixels.push_back(glm::vec4(v / k));
-  const double ofMean = std::pow(compareImages(mean, truth).rmse, 2);
-  return std::sqrt(std::max(0.0, (k * ofMean - point.mse()) / (k - 1)));
+double secondsSince(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 /// Rising, each number once.
@@ -83,124 +59,142 @@ std::vector<Number> ordered(std::vector<Number> numbers) {
   return numbers;
 }
 
-std::vector<Point> pointsOf(const Options& options) {
-  std::vector<Point> points;
+/// All settings asked for, without samples; those of one method stand together.
+std::vector<Setting> settingsOf(const Options& options) {
+  std::vector<Setting> settings;
   for (std::size_t i = 0; i < std::size(kMethods); ++i) {
     const auto method = Method(i);
     if (!options.methods.empty() &&
         std::find(options.methods.begin(), options.methods.end(), nameOf(method)) == options.methods.end())
       continue;
-    if (method == Method::raymarch)
-      for (const double step : ordered(options.steps)) points.push_back({method, 1, step, {}, {}, {}, 0, {}});
-    else
-      for (const std::uint32_t samples : ordered(options.samples))
-        points.push_back({method, samples, 0, {}, {}, {}, 0, {}});
+    for (const int macrocell : ordered(options.macrocells))
+      for (const int threads : ordered(options.threads))
+        for (const double step : hasStep(method) ? ordered(options.steps) : std::vector<double>{0})
+          settings.push_back({method, 1, step, macrocell, threads});
+  }
+  return settings;
+}
+
+Scene sceneOf(Scene scene, const Setting& setting) {
+  scene.method = setting.method;
+  scene.macrocell = setting.macrocell;
+  if (hasStep(setting.method)) scene.step = setting.step;
+  return scene;
+}
+
+/// One renderer for every number of threads.
+using Renderers = std::map<int, std::unique_ptr<Renderer>>;
+
+Renderers renderersFor(const std::shared_ptr<const Volume>& volume, const Options& options) {
+  Renderers renderers;
+  for (const int threads : options.threads) renderers[threads] = makeCpuRenderer(volume, threads);
+  return renderers;
+}
+
+/// The settings with every number of samples that stays within the longest time, as one sample, which also
+/// warms up, foretells it. At least the fewest samples are kept. Costs are counted by other renderers, since
+/// counting slows down.
+std::vector<Point> pointsOf(const Options& options, const Renderers& renderers, const Renderers& counting,
+                            const Scene& scene) {
+  std::vector<Point> points;
+  const std::vector<std::uint32_t> samples = ordered(options.samples);
+  for (const Setting& setting : settingsOf(options)) {
+    Point point{setting, {}, {}, {}, 0, {}, 0, 0};
+    Renderer& counter = *counting.at(setting.threads);
+    counter.setScene(sceneOf(scene, setting));
+    counter.renderSample(kNeverCancel);
+    point.counts = counter.stats();
+    Renderer& renderer = *renderers.at(setting.threads);
+    point.rebuildMs = renderer.setScene(sceneOf(scene, setting)).rebuildMs;
+    const auto begin = Clock::now();
+    renderer.renderSample(kNeverCancel);
+    const double one = secondsSince(begin);
+    for (const std::uint32_t count : samples) {
+      if (count > samples.front() && count * one > options.longest) {
+        fmt::print(stderr, "scolopax: {} with {} samples{} is left out: it would take {:.0f} s\n",
+                   nameOf(setting.method), count,
+                   setting.step > 0 ? fmt::format(" at step {:g}", setting.step) : "", count * one);
+        continue;
+      }
+      point.samples = count;
+      points.push_back(point);
+    }
   }
   return points;
 }
 
-void measure(Point& point, Renderer& renderer, Scene scene, const Image& truth) {
-  // Another picture first: else the film would go on with the samples of the point before.
-  scene.method = point.method == Method::raymarch ? Method::superposed : Method::raymarch;
-  renderer.setScene(scene);
-  scene.method = point.method;
-  if (point.step > 0) scene.step = point.step;
-  renderer.setScene(scene);
-  const std::atomic<bool> cancel = false;
+/// The pixels whose centres are those of a picture `factor` (odd) times smaller.
+Image thinned(const Image& image, int factor) {
+  Image small{image.width / factor, image.height / factor, {}};
+  for (int y = factor / 2; y < image.height; y += factor)
+    for (int x = factor / 2; x < image.width; x += factor)
+      small.pixels.push_back(image.pixels[std::size_t(y) * std::size_t(image.width) + std::size_t(x)]);
+  return small;
+}
+
+void measure(Point& point, Renderer& renderer, const Scene& scene, const std::optional<Image>& truth) {
+  renderer.setScene(sceneOf(scene, point));
   const auto begin = Clock::now();
   point.samplesTimed = 0;
-  for (; renderer.samples() < point.samples; ++point.samplesTimed) renderer.renderSample(cancel);
-  point.seconds.push_back(std::chrono::duration<double>(Clock::now() - begin).count());
-  const Image image = renderer.image();
-  point.squaredErrors.push_back(std::pow(compareImages(image, truth).rmse, 2));
-  if (point.seconds.size() == 1) point.flip = flipDifference(image, truth).mean;
+  for (; renderer.samples() < point.samples; ++point.samplesTimed) renderer.renderSample(kNeverCancel);
+  point.seconds.push_back(secondsSince(begin));
+  if (!truth) return;
+  const Image image = thinned(renderer.image(), scene.width / truth->width);
+  point.squaredErrors.push_back(std::pow(compareImages(image, *truth).rmse, 2));
+  if (point.seconds.size() == 1) point.flip = flipDifference(image, *truth).mean;
   point.sum.resize(image.pixels.size(), glm::dvec4(0));
   for (std::size_t i = 0; i < image.pixels.size(); ++i) point.sum[i] += glm::dvec4(image.pixels[i]);
 }
 
-/// Counts, apart from the timings, which counting would slow down.
-void count(Point& point, const std::shared_ptr<const Volume>& volume, Scene scene, int threads) {
-  const auto renderer = makeCpuRenderer(volume, threads);
-  renderer->countCosts();
-  scene.method = point.method;
-  if (point.step > 0) scene.step = point.step;
+/// What is allocated in all of the program.
+std::size_t heapBytes() {
+  const struct mallinfo2 info = mallinfo2();
+  return info.uordblks + info.hblkhd;
+}
+
+/// Bytes of the data and of what is made from them, as the heap grows by each.
+ordered_json memoryOf(const std::shared_ptr<const Volume>& volume, Scene scene, int macrocell) {
+  std::size_t data = 0;
+  for (const Channel& channel : volume->channels()) data += channel.voxels.sizeBytes();
+  const auto grown = [](std::size_t from, std::size_t to) { return to > from ? to - from : 0; };
+  const auto renderer = makeCpuRenderer(volume, 0);
+  const glm::ivec2 size(scene.width, scene.height);
+  scene.macrocell = macrocell;
+  scene.width = scene.height = 1;
+  const std::size_t before = heapBytes();
+  const auto cells = sharedMacrocells(volume, macrocell);
+  const std::size_t withCells = heapBytes();
   renderer->setScene(scene);
-  const std::atomic<bool> cancel = false;
-  renderer->renderSample(cancel);
-  point.counts = renderer->stats();
+  const std::size_t withMajorants = heapBytes();
+  scene.width = size.x;
+  scene.height = size.y;
+  renderer->setScene(scene);
+  return {{"macrocell", macrocell},
+          {"voxels", volume->grid().voxelCount()},
+          {"channels", volume->channels().size()},
+          {"pixels", size.x * size.y},
+          {"data", data},
+          {"macrocells", grown(before, withCells)},
+          {"majorants", grown(withCells, withMajorants)},
+          {"film", grown(withMajorants, heapBytes())}};
 }
 
-/// Seconds to an RMSE: of an unbiased method by the law of its noise, of a marcher by its fastest picture
-/// that is good enough; null when there is none.
-ordered_json timeTo(double target, Method method, const std::vector<Point>& points) {
-  const Point* best = nullptr;
-  for (const Point& point : points) {
-    if (point.method != method) continue;
-    if (method != Method::raymarch)
-      best = &point;  // the last has the most samples
-    else if (point.rmse() <= target && (!best || point.time() < best->time()))
-      best = &point;
+std::optional<Image> truthOf(const Options& options, const Volume& volume, const Scene& scene) {
+  if (options.timesOnly) return std::nullopt;
+  if (options.truth.empty()) {
+    fmt::print(stderr, "scolopax: rendering the reference\n");
+    return reference::renderReference(volume, scene, 1).image;
   }
-  if (!best) return nullptr;
-  return method == Method::raymarch ? best->time() : best->time() * best->mse() / (target * target);
+  Image truth = io::readImage(options.truth);
+  const int factor = scene.width / std::max(truth.width, 1);
+  if (factor % 2 == 0 || truth.width * factor != scene.width || truth.height * factor != scene.height)
+    throw Error(ErrorCode::badInput,
+                fmt::format("{}: expected {}x{} pixels or an odd number of times less, found {}x{}",
+                            options.truth.string(), scene.width, scene.height, truth.width, truth.height));
+  return truth;
 }
 
-ordered_json report(const std::vector<Point>& points, const Image& truth, const Scene& scene) {
-  std::map<std::uint32_t, double> yardstick;  // efficiency of sync-dda by samples
-  for (const Point& point : points)
-    if (point.method == Method::syncDda) yardstick[point.samples] = point.efficiency();
-  ordered_json rows = ordered_json::array();
-  for (const Point& point : points) {
-    const double rays = double(point.samples) * double(scene.width) * double(scene.height);
-    const double counted = double(std::max<std::uint64_t>(point.counts.rays, 1));
-    ordered_json row = {{"method", nameOf(point.method)},
-                        {"samples", point.samples},
-                        {"step", point.step > 0 ? ordered_json(point.step) : ordered_json()},
-                        {"seconds", point.time()},
-                        {"samplesTimed", point.samplesTimed},
-                        {"nsPerRay", 1e9 * point.time() / rays},
-                        {"rmse", point.rmse()},
-                        {"psnr", -20 * std::log10(point.rmse())},
-                        {"flip", point.flip},
-                        {"bias", biasOf(point, truth)},
-                        {"fetchesPerRay", double(point.counts.fetches) / counted},
-                        {"cellStepsPerRay", double(point.counts.cellSteps) / counted},
-                        {"randomBlocksPerRay", double(point.counts.randomBlocks) / counted}};
-    if (point.method != Method::raymarch && yardstick.contains(point.samples))
-      row["efficiencyToSyncDda"] = point.efficiency() / yardstick[point.samples];
-    rows.push_back(row);
-  }
-  ordered_json times = ordered_json::array();
-  for (std::size_t i = 0; i < std::size(kMethods); ++i) {
-    const auto method = Method(i);
-    if (std::none_of(points.begin(), points.end(), [&](const Point& p) { return p.method == method; }))
-      continue;
-    ordered_json row = {{"method", nameOf(method)}};
-    for (const double target : kTargets)
-      row[fmt::format("secondsToRmse{:g}", target)] = timeTo(target, method, points);
-    times.push_back(row);
-  }
-  return {{"points", rows}, {"timeToError", times}};
-}
-
-void print(const ordered_json& result) {
-  fmt::print("{:<11}{:>8}{:>6}{:>11}{:>9}{:>11}{:>8}{:>9}{:>11}{:>9}{:>8}{:>9}{:>10}\n", "method", "samples",
-             "step", "seconds", "ns/ray", "RMSE", "PSNR", "FLIP", "bias", "fetches", "cells", "randoms",
-             "to sync");
-  for (const auto& row : result["points"])
-    fmt::print(
-        "{:<11}{:>8}{:>6}{:>11.4g}{:>9.0f}{:>11.3e}{:>8.2f}{:>9.4f}{:>11.2e}{:>9.2f}{:>8.2f}{:>9.2f}{:>10}\n",
-        row["method"].get<std::string>(), row["samples"].get<std::uint32_t>(),
-        row["step"].is_null() ? "" : fmt::format("{:g}", row["step"].get<double>()),
-        row["seconds"].get<double>(), row["nsPerRay"].get<double>(), row["rmse"].get<double>(),
-        row["psnr"].get<double>(), row["flip"].get<double>(), row["bias"].get<double>(),
-        row["fetchesPerRay"].get<double>(), row["cellStepsPerRay"].get<double>(),
-        row["randomBlocksPerRay"].get<double>(),
-        row.contains("efficiencyToSyncDda") ? fmt::format("x{:.2f}", row["efficiencyToSyncDda"].get<double>())
-                                            : "");
-}
-
-void bench(const Options& options) {
+void run(Options options) {
   for (const std::string& method : options.methods)
     if (std::none_of(std::begin(kMethods), std::end(kMethods),
                      [&](const NamedValue& known) { return known.name == method; }))
@@ -213,23 +207,32 @@ void bench(const Options& options) {
   const auto volume = resolved->dataset->volume;
   Scene scene = resolved->render;
   scene.filter = PixelFilter::point;  // where the reference has no noise
-  fmt::print(stderr, "scolopax: rendering the reference\n");
-  const Image truth = reference::renderReference(*volume, scene, 1).image;
+  if (options.macrocells.empty()) options.macrocells = {scene.macrocell};
+  const std::optional<Image> truth = truthOf(options, *volume, scene);
 
-  std::vector<Point> points = pointsOf(options);
-  const auto renderer = makeCpuRenderer(volume, options.threads);
-  for (Point& point : points) count(point, volume, scene, options.threads);  // and warms up
+  ordered_json memory = ordered_json::array();
+  for (const int macrocell : ordered(options.macrocells))
+    memory.push_back(memoryOf(volume, scene, macrocell));
+  std::vector<std::shared_ptr<const MacrocellGrid>> held;  // so that a change of size builds majorants only
+  for (const int macrocell : options.macrocells) held.push_back(sharedMacrocells(volume, macrocell));
+  const Renderers renderers = renderersFor(volume, options), counting = renderersFor(volume, options);
+  for (const auto& [threads, renderer] : counting) renderer->countCosts();
+  std::vector<Point> points = pointsOf(options, renderers, counting, scene);
+  // A seed of its own for every picture: none goes on with the samples of the one before.
+  scene.seed = resolved->render.seed;
   for (int repetition = 0; repetition < options.repetitions; ++repetition)
     for (Point& point : points) {
-      scene.seed = resolved->render.seed + std::uint32_t(repetition);
-      measure(point, *renderer, scene, truth);
+      ++scene.seed;
+      measure(point, *renderers.at(point.threads), scene, truth);
     }
-  ordered_json result = report(points, truth, scene);
+
+  ordered_json result = bench::report(points, truth, std::size_t(scene.width) * std::size_t(scene.height));
+  result["memory"] = memory;
   result["scene"] = ordered_json::parse(resolved->resolved.dump());
+  result["picked"] = nameOf(resolved->render.method);
   result["repetitions"] = options.repetitions;
-  result["threads"] = options.threads;
   if (options.json.empty())
-    print(result);
+    bench::print(result);
   else
     io::writeFile(options.json, result.dump(1) + '\n');
 }
@@ -242,23 +245,42 @@ CLI::App* addBenchCommand(CLI::App& root) {
   const auto o = std::make_shared<Options>();
   addSceneArguments(*command, o->scene);
   command->add_option("--methods", o->methods, "Methods to measure; all without this")->delimiter(',');
-  command->add_option("--samples", o->samples, "Sample counts of the trackers")
+  command->add_option("--samples", o->samples, "Sample counts")
       ->delimiter(',')
       ->check(CLI::Range(1u, 1u << 24));
-  command->add_option("--steps", o->steps, "Steps of the marcher, in voxels")
+  command->add_option("--steps", o->steps, "Steps of the methods that have one, in voxels")
       ->delimiter(',')
       ->check(CLI::Range(0.01, 100.0) & numberUpTo(100, false));
+  command->add_option("--macrocells", o->macrocells, "Macrocell edges, in voxels; the scene's without this")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 64));
+  command->add_option("--threads", o->threads, "Numbers of threads; 0 takes all")
+      ->delimiter(',')
+      ->check(CLI::Range(0, 1024));
   command->add_option("--repetitions", o->repetitions, "Seeds and timings of every point; medians are told")
-      ->check(CLI::Range(2, 1000));
-  command->add_option("--threads", o->threads, "Threads to use; 0 takes all")->check(CLI::Range(0, 1024));
+      ->check(CLI::Range(2, 1000))
+      ->capture_default_str();
+  command
+      ->add_option("--longest", o->longest,
+                   "Leave out sample counts that would take more seconds than this, all but the smallest")
+      ->check(numberUpTo(1e9, false))
+      ->capture_default_str();
+  auto* truth = command->add_option("--truth", o->truth,
+                                    "Picture that errors are counted from, made by scolopax reference with "
+                                    "image.filter=point; it may be an odd "
+                                    "number\nof times smaller: then only pixels at its pixels' centres "
+                                    "count. Without it the reference is rendered");
+  command->add_flag("--times-only", o->timesOnly, "Times and counts only, no reference and no errors")
+      ->excludes(truth);
   command->add_option("--json", o->json, "Write the numbers here instead of printing a table");
   command->footer(
-      "Samples go through the pixels' centres, where the reference has no noise. Unbiased methods are "
-      "compared\n"
-      "by 1 / (MSE x seconds) with sync-dda at the same number of samples (to sync); the bias of a marcher "
-      "is\n"
-      "what stays when the pictures of all repetitions are averaged.");
-  command->callback([o] { bench(*o); });
+      "Samples go through the pixels' centres, where the reference has no noise. Methods without a step are "
+      "unbiased and\n"
+      "compared by 1 / (MSE x seconds) with sync-dda at the same number of samples (to sync). The bias is "
+      "what "
+      "stays\n"
+      "when the pictures of all repetitions are averaged.");
+  command->callback([o] { run(*o); });
   return command;
 }
 

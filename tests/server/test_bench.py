@@ -30,7 +30,7 @@ class Bench(unittest.TestCase):
         with open(self.path("b.json"), encoding="utf-8") as file:
             told = json.load(file)
         points = {(p["method"], p["samples"], p["step"]): p for p in told["points"]}
-        self.assertEqual(len(points), 4 * 2 + 2)
+        self.assertEqual(len(points), 4 * 2 + 2 * 2)
         for (method, samples, step), p in points.items():
             self.assertGreater(p["rmse"], 0)
             self.assertAlmostEqual(p["nsPerRay"], p["seconds"] * 1e9 / (24 * 20 * samples), delta=1e-6 * p["nsPerRay"])
@@ -44,10 +44,59 @@ class Bench(unittest.TestCase):
             # Every point is measured from its first sample on.
             self.assertEqual(points[method, 64, None]["samplesTimed"], 64)
             self.assertEqual(points[method, 4, None]["samplesTimed"], 4)
-        self.assertLess(points["raymarch", 1, 0.25]["rmse"], points["raymarch", 1, 2]["rmse"])
-        self.assertGreater(points["raymarch", 1, 0.25]["fetchesPerRay"], 4 * points["raymarch", 1, 2]["fetchesPerRay"])
+        self.assertLess(points["raymarch", 64, 0.25]["rmse"], points["raymarch", 64, 2]["rmse"])
+        self.assertGreater(points["raymarch", 4, 0.25]["fetchesPerRay"], 4 * points["raymarch", 4, 2]["fetchesPerRay"])
         self.assertEqual([t["method"] for t in told["timeToError"]],
                          ["superposed", "cumulative", "sync-dda", "n-dda", "raymarch"])
+        for t in told["timeToError"][:4]:
+            # A tenth of the error of a tracker takes a hundred times the samples.
+            self.assertAlmostEqual(t["secondsToRmse0.001"], 100 * t["secondsToRmse0.01"], delta=t["secondsToRmse0.01"])
+
+    def test_takes_its_truth_from_a_picture_of_the_same_pixel_centres(self):
+        truth = []
+        for width, height in ((24, 20), (8, 4), (12, 10)):
+            truth.append(self.path(f"{width}.exr"))
+            done = subprocess.run([PROGRAM, "reference", "--data", *self.data, "-o", truth[-1], "--set", "image.filter=point",
+                                   "--set", f"image.width={width}", "--set", f"image.height={height}"], capture_output=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        told = {}
+        for name, options in {"rendered": [], "read": ["--truth", truth[0]], "times": ["--times-only"],
+                              "smaller": ["--truth", truth[1], "--set", "image.height=12"]}.items():
+            done = self.bench("--methods", "raymarch", "--samples", "4", "--steps", "0.25", *options, "--json", self.path("b.json"))
+            self.assertEqual(done.returncode, 0, done.stderr)
+            with open(self.path("b.json"), encoding="utf-8") as file:
+                told[name] = json.load(file)["points"][0]
+        self.assertEqual(told["read"]["rmse"], told["rendered"]["rmse"])
+        self.assertNotIn("rmse", told["times"])
+        # Rays beside the truth's would make errors as large as the picture's detail, about 0.1.
+        self.assertLess(told["smaller"]["rmse"], 3 * told["rendered"]["rmse"])
+        done = self.bench("--truth", truth[2])
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("expected 24x20 pixels or an odd number of times less, found 12x10", done.stderr)
+
+    def test_varies_macrocells_and_threads_and_tells_the_memory(self):
+        done = self.bench("--methods", "sync-dda", "--samples", "4", "--macrocells", "8,2", "--threads", "1,2", "--json",
+                          self.path("b.json"))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with open(self.path("b.json"), encoding="utf-8") as file:
+            told = json.load(file)
+        points = {(p["macrocell"], p["threads"]): p for p in told["points"]}
+        self.assertEqual(sorted(points), [(2, 1), (2, 2), (8, 1), (8, 2)])
+        for count in ("fetchesPerRay", "cellStepsPerRay"):
+            self.assertEqual(points[2, 1][count], points[2, 2][count])
+        self.assertGreater(points[2, 1]["cellStepsPerRay"], 2 * points[8, 1]["cellStepsPerRay"])
+        self.assertGreaterEqual(points[8, 1]["fetchesPerRay"], points[2, 1]["fetchesPerRay"])
+        memory = {m["macrocell"]: m for m in told["memory"]}
+        self.assertEqual(memory[2]["data"], 2 * 16**3)
+        # 8^3 cells of two channels, at least two bytes each; a 64th of them.
+        self.assertGreaterEqual(memory[2]["macrocells"], 8**3 * 2 * 2)
+        self.assertLess(memory[8]["macrocells"], memory[2]["macrocells"])
+
+    def test_leaves_out_what_would_take_too_long_but_never_all(self):
+        done = self.bench("--methods", "n-dda", "--samples", "1,16777216", "--longest", "0.1")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("n-dda with 16777216 samples is left out", done.stderr)
+        self.assertEqual(done.stdout.count("n-dda"), 1)
 
     def test_takes_the_methods_that_it_is_given(self):
         done = self.bench("--methods", "superposed", "--samples", "1")
