@@ -98,6 +98,7 @@ std::vector<Point> pointsOf(const Options& options, const Renderers& renderers, 
                             const Scene& scene) {
   std::vector<Point> points;
   const std::vector<std::uint32_t> samples = ordered(options.samples);
+  int leftOut = 0;
   for (const Setting& setting : settingsOf(options)) {
     Point point{setting, {}, {}, {}, 0, {}, 0, 0};
     Renderer& counter = *counting.at(setting.threads);
@@ -111,15 +112,16 @@ std::vector<Point> pointsOf(const Options& options, const Renderers& renderers, 
     const double one = secondsSince(begin);
     for (const std::uint32_t count : samples) {
       if (count > samples.front() && count * one > options.longest) {
-        fmt::print(stderr, "scolopax: {} with {} samples{} is left out: it would take {:.0f} s\n",
-                   nameOf(setting.method), count,
-                   setting.step > 0 ? fmt::format(" at step {:g}", setting.step) : "", count * one);
+        ++leftOut;
         continue;
       }
       point.samples = count;
       points.push_back(point);
     }
   }
+  if (leftOut > 0)
+    fmt::print(stderr, "scolopax: {} points left out that would take longer than {:g} s\n", leftOut,
+               options.longest);
   return points;
 }
 

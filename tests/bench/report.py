@@ -1,64 +1,65 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of what run.py has measured, as Markdown: report.py IN.json > OUT.md"""
+"""Makes the report's tables and plots of what run.py has measured, with the sentences of remarks.md. Needs Debian's
+python3-matplotlib."""
+import argparse
 import json
-import sys
+import os
+import re
+
+from common import HERE
+from plots import save
+from sections import REPORT
 
 
-def table(header, rows):
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows]) + "\n"
+def remarks():
+    """What a person wrote about each experiment."""
+    with open(os.path.join(HERE, "remarks.md"), encoding="utf-8") as file:
+        parts = re.split(r"^## (\w+)\n", file.read(), flags=re.MULTILINE)
+    return {name: text.strip() for name, text in zip(parts[1::2], parts[2::2])}
 
 
-def seconds(value):
-    return "-" if value is None else f"{value:.3g} s"
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("measured", metavar="MEASURED.json", nargs="+", help="of run.py; later files take the place of earlier")
+    parser.add_argument("--rebuild", metavar="REBUILD.json", help="what bench_rebuild --json printed")
+    parser.add_argument("--out", metavar="FOLDER", default=os.path.join(HERE, "report"))
+    options = parser.parse_args()
+    measured = {}
+    for path in options.measured:
+        with open(path, encoding="utf-8") as file:
+            measured.update(json.load(file))
+    if options.rebuild:
+        with open(options.rebuild, encoding="utf-8") as file:
+            measured["rebuild"] = {"found": json.load(file)}
+    os.makedirs(options.out, exist_ok=True)
+    written = remarks()
 
+    def plot(name, figure):
+        save(figure, os.path.join(options.out, f"{name}.svg"))
+        return f"![{name}]({name}.svg)"
 
-def times(scenes):
-    """Time to an error, and how many times less that is than sync-dda's."""
-    rows = []
-    for scene, configurations in scenes.items():
-        for configuration, found in configurations.items():
-            by_method = {row["method"]: row for row in found["timeToError"]}
-            for target in ("secondsToRmse0.01", "secondsToRmse0.001"):
-                yardstick = by_method["sync-dda"][target]
-                cells = []
-                for method in ("sync-dda", "superposed", "cumulative", "n-dda", "raymarch"):
-                    value = by_method[method][target]
-                    cells.append(seconds(value) + (f" (x{yardstick / value:.3g})" if value and method != "sync-dda" else ""))
-                rows.append([scene, configuration, target.removeprefix("secondsToRmse"), *cells])
-    return table(["scene", "light", "RMSE", "sync-dda", "superposed", "cumulative", "n-dda", "raymarch"], rows)
-
-
-def counts(scenes):
-    """What does not depend on the machine, at the largest number of samples or the step of one voxel."""
-    rows = []
-    for scene, configurations in scenes.items():
-        for configuration, found in configurations.items():
-            most = max(point["samples"] for point in found["points"])
-            for point in found["points"]:
-                if point["step"] == 1 or (point["step"] is None and point["samples"] == most):
-                    rows.append([scene, configuration, point["method"], f"{point['nsPerRay']:.0f}", f"{point['rmse']:.2e}",
-                                 f"{point['flip']:.4f}", f"{point['bias']:.1e}", f"{point['fetchesPerRay']:.2f}",
-                                 f"{point['cellStepsPerRay']:.1f}", f"{point['randomBlocksPerRay']:.2f}"])
-    return table(["scene", "light", "method", "ns/ray", "RMSE", "FLIP", "bias", "fetches/ray", "cells/ray", "randoms/ray"],
-                 rows)
-
-
-def main(path):
-    with open(path, encoding="utf-8") as file:
-        measured = json.load(file)
-    image = next(iter(next(iter(measured["scenes"].values())).values()))["scene"]["image"]
-    print(f"# Speed against error\nMachine: {measured['machine']}. Pictures of {image['width']}x{image['height']} through "
-          "pixel centres, errors against the "
-          "double-precision\nreference. Made by `tests/bench/run.py out.json` and `tests/bench/report.py out.json`.\n\n"
-          "## Time to an error\nOf trackers by the law of their noise from the most samples measured; of the marcher by "
-          "its fastest step\nthat is good enough (-: none of 4, 2, 1, 0.5 is). In brackets: how many times less than "
-          f"sync-dda in the same run.\n\n{times(measured['scenes'])}\n## Counts and errors\n{counts(measured['scenes'])}",
-          end="")
+    for name, (title, sections) in REPORT.items():
+        entries = [(section, measured[section.__name__]) for section in sections if section.__name__ in measured]
+        if not entries:
+            continue
+        text = f"# {title}\nMade by `tests/bench/run.py` and `tests/bench/report.py`; "
+        known = [entry for _, entry in entries if "machine" in entry]
+        text += f"machine: {known[0]['machine']}.\n" if known else "see there for the machine.\n"
+        if name in ("speed", "quality", "channels"):
+            text += (f"Pictures of {known[0]['side']}x{known[0]['side']} rays through pixel centres; errors over every third "
+                     "pixel each way, against the\ndouble-precision reference.\n")
+        if any(entry["quick"] for entry in known):
+            text += "\n**Made with --quick: a test of the scripts, not a measurement.**\n"
+        for section, entry in entries:
+            if len(sections) > 1:
+                text += f"\n## {section.__name__.capitalize()}\n"
+            if section.__name__ in written:
+                text += "\n" + written[section.__name__] + "\n"
+            text += "\n" + section(entry, plot)
+        with open(os.path.join(options.out, f"{name}.md"), "w", encoding="utf-8") as file:
+            file.write(text)
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit(__doc__)
-    main(sys.argv[1])
+    main()

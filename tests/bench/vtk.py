@@ -13,7 +13,7 @@ import sys
 import tempfile
 
 import numpy
-from run import DATA, PROGRAM, SCENES, processor
+from common import DATA, PROGRAM, SCENES, processor
 from vtk_mapper import VERSION, VtkMapper, read_nifti
 
 SINGLE = {name: [f"scalar/{name}.nii.gz"] for name in ("heptane", "bonsai", "engine")}

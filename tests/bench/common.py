@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the experiments share: the program, the scenes and their data, truths, and calls of `scolopax bench`."""
+import hashlib
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+PROGRAM = os.environ.get("SCOLOPAX", os.path.join(HERE, "../../build/release/scolopax"))
+DATA = os.environ.get("SCOLOPAX_DATA_DIR", os.path.join(HERE, "../../../shared/data"))
+# The four of the paper's Figure 8: (shading, shadows).
+LIGHTS = {"emission-absorption": (False, False), "shading": (True, False), "shadows": (False, True), "both": (True, True)}
+
+TCGA = "multichannel/tcga_du_7294/TCGA-DU-7294_"
+# Files below the data folder; a number is that many generated orbitals.
+SCENES = {
+    "orbitals": 4,
+    "tcga": [f"{TCGA}{name}_bet.nii.gz" for name in ("fla", "t1", "t1c", "t2")],
+    "stroke": [f"multichannel/stroke_mri/{name}.nii.gz" for name in ("FLAIR", "T1", "T2")],
+    "cells": ["multichannel/tiff/xyzc_16bit__spots.tif"],
+    "heptane": ["scalar/heptane.nii.gz"],
+    "bonsai": ["scalar/bonsai.nii.gz"],
+    "many": 12,
+}
+MULTICHANNEL = ("orbitals", "tcga", "stroke", "cells", "many")
+
+
+def processor():
+    with open("/proc/cpuinfo", encoding="utf-8") as file:
+        names = [line.split(":")[1].strip() for line in file if line.startswith("model name")]
+    return f"{names[0]}, {len(names)} threads" if names else platform.processor()
+
+
+def median(values):
+    return sorted(values)[len(values) // 2]
+
+
+def assignments(settings):
+    return [word for path, value in settings.items() for word in ("--set", f"{path}={json.dumps(value)}")]
+
+
+def light_settings(light):
+    return dict(zip(("shading", "shadows"), LIGHTS[light]))
+
+
+class Bench:
+    """Runs the program on scenes; everything it makes lies in `folder`, truths in `truths`."""
+
+    def __init__(self, folder, truths, quick):
+        self.folder, self.truths, self.quick = folder, truths or folder, quick
+        os.makedirs(self.truths, exist_ok=True)
+        # A truth has every third pixel: the reference takes seconds a ray where shadows fall on many curves.
+        self.side, self.truth_side = (48, 16) if quick else (96, 32)
+        self.repetitions = 2 if quick else 3
+        self.scenes = [name for name in SCENES if not quick or name in ("orbitals", "cells", "bonsai")]
+        self.lights = [light for light in LIGHTS if not quick or light in ("emission-absorption", "both")]
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def orbitals(self, channels=4, size=128):
+        out = self.path(f"orbitals-{size}-{channels}.nrrd")
+        if not os.path.exists(out):
+            self.run("generate", "orbitals", out, "--channels", channels, "--size", size)
+        return [out]
+
+    def data(self, name):
+        """Files of a scene; None, with a message, when they are not there."""
+        if isinstance(SCENES[name], int):
+            return self.orbitals(SCENES[name])
+        files = [os.path.join(DATA, file) for file in SCENES[name]]
+        missing = [file for file in files if not os.path.exists(file)]
+        if missing:
+            print(f"{name}: left out, there is no {missing[0]}", file=sys.stderr)
+        return None if missing else files
+
+    @staticmethod
+    def scene(name):
+        return os.path.join(HERE, f"scenes/{name}.json")
+
+    @staticmethod
+    def run(*words):
+        return subprocess.run([PROGRAM, *map(str, words)], check=True, stdout=subprocess.PIPE, text=True).stdout
+
+    def truth(self, name, data, settings):
+        with open(self.scene(name), encoding="utf-8") as file:
+            key = [file.read(), [(os.path.basename(path), os.path.getsize(path)) for path in data], settings, self.truth_side]
+        out = os.path.join(self.truths, hashlib.sha256(json.dumps(key).encode()).hexdigest()[:20] + ".exr")
+        if not os.path.exists(out):
+            size = {"image.width": self.truth_side, "image.height": self.truth_side, "image.filter": "point"}
+            self.run("reference", self.scene(name), "--data", *data, "-o", out, *assignments({**settings, **size}))
+        return out
+
+    def bench(self, name, settings=None, data=None, truth=True, side=None, **options):
+        """The JSON of `scolopax bench` of a scene with `settings`; options as samples=[1, 4]. Without a truth it has no
+        errors."""
+        data, settings = data or self.data(name), settings or {}
+        if data is None:
+            return None
+        out, side = self.path("bench.json"), side or self.side
+        words = ["--truth", self.truth(name, data, settings)] if truth else ["--times-only"]
+        for option, value in {"repetitions": self.repetitions, **options}.items():
+            words += [f"--{option}", ",".join(map(str, value)) if isinstance(value, (list, tuple)) else value]
+        begin = time.monotonic()
+        self.run("bench", self.scene(name), "--data", *data, "--json", out, *words,
+                 *assignments({**settings, "image.width": side, "image.height": side}))
+        with open(out, encoding="utf-8") as file:
+            result = json.load(file)
+        result.pop("scene")
+        print(f"  {name} {settings}: {time.monotonic() - begin:.1f} s", file=sys.stderr, flush=True)
+        return result
+
+
+def resources(words):
+    """(seconds, peak bytes resident) of a command, output dropped."""
+    begin = time.monotonic()
+    with open(os.devnull, "w", encoding="utf-8") as null:
+        process = subprocess.Popen(words, stdout=null, stderr=null)
+        _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        raise RuntimeError(f"{words}: exit status {process.returncode}")
+    return time.monotonic() - begin, used.ru_maxrss * 1024
+
+
+def scratch():
+    return tempfile.TemporaryDirectory()

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The experiments of the report: one function each, and one list of them. Each takes a common.Bench and returns what goes
+into the JSON file under its name."""
+import json
+import os
+import time
+
+from common import MULTICHANNEL, PROGRAM, SCENES, light_settings, median, resources
+
+
+def speed(bench):
+    """All methods, scenes and lights: time against error (measuring.md's points; the paper's Figure 8 configurations)."""
+    found = {}
+    for name in bench.scenes:
+        for light in bench.lights:
+            result = bench.bench(name, light_settings(light), samples=[1, 16, 64], steps=[4, 2, 1, 0.5, 0.25],
+                                 longest=0.02 if bench.quick else 0.25)
+            if result:
+                found.setdefault(name, {})[light] = result
+    return found
+
+
+def macrocells(bench):
+    """Section 5.1: macrocell sizes 1 to 32."""
+    found = {}
+    lit = ("orbitals", "tcga", "heptane")
+    for name in bench.scenes:
+        for light in ("emission-absorption", "both") if name in lit and not bench.quick else ("emission-absorption",):
+            result = bench.bench(name, light_settings(light), truth=False, macrocells=[1, 2, 4, 8, 16, 32], samples=[1, 8],
+                                 methods=["superposed", "cumulative", "sync-dda", "n-dda", "raymarch"], steps=[1],
+                                 longest=0.05 if bench.quick else 0.5)
+            if result:
+                found.setdefault(name, {})[light] = result
+    return found
+
+
+def channels(bench):
+    """Section 5.2: the first 1 to 12 of twelve orbitals."""
+    found = {}
+    data = bench.orbitals(12)
+    for light in ("emission-absorption", "both"):
+        for count in (1, 4, 12) if bench.quick else (1, 2, 3, 4, 6, 8, 10, 12):
+            hidden = {f"channels.{i}.visible": False for i in range(count, 12)}
+            # The reference of twelve channels with shadows is slow and told by `speed`.
+            found.setdefault(light, {})[count] = bench.bench(
+                "many", {**hidden, **light_settings(light)}, data, truth=light == "emission-absorption",
+                samples=[4] if bench.quick else [32], steps=[1], longest=1)
+    return found
+
+
+def quality(bench):
+    """Section 5.3: growing samples of the trackers, shrinking steps of the marcher."""
+    found = {}
+    for name in ("bonsai",) if bench.quick else ("orbitals", "tcga", "bonsai"):
+        result = bench.bench(name, samples=[1, 4, 16, 64, 256], steps=[8, 4, 2, 1, 0.5, 0.25, 0.125],
+                             longest=0.05 if bench.quick else 1.5)
+        if result:
+            found[name] = result
+    return found
+
+
+def blends(bench):
+    """Section 5.4: max, mix and composite against density, on finely marched pictures without noise to speak of."""
+    found = {}
+    side, samples = (64, 4) if bench.quick else (256, 8)
+    for name in MULTICHANNEL:
+        data = bench.data(name) if name in bench.scenes else None
+        if not data:
+            continue
+        for mode in ("density", "max", "mix", "composite"):
+            out = bench.path(f"{mode}.exr")
+            bench.run("render", bench.scene(name), "--data", *data, "-o", out, "--samples", samples, "--set",
+                      f"blend.mode={mode}", "--set", "integrator.method=raymarch", "--set", "integrator.step=0.5", "--set",
+                      f"image.width={side}", "--set", f"image.height={side}")
+            if mode != "density":
+                told = bench.run("compare", out, bench.path("density.exr"), "--json")
+                found.setdefault(name, {})[mode] = {key: json.loads(told)[key] for key in ("flip", "psnr", "rmse")}
+    return found
+
+
+def memory(bench):
+    """Table 1: bytes of data, macrocells and majorants at the default macrocell size, and of the film."""
+    found = {}
+    for name in bench.scenes:
+        result = bench.bench(name, truth=False, methods=["superposed"], samples=[1], repetitions=2, side=512)
+        if result:
+            found[name] = result["memory"][0]
+    return found
+
+
+def sizes(bench):
+    """Time per ray and peak memory as a volume of one content grows; rounds take turns, medians."""
+    rows = {}
+    edges = (32, 64) if bench.quick else (64, 128, 256, 512)
+    for _ in range(2 if bench.quick else 3):
+        for edge in edges:
+            data = bench.orbitals(4, edge)
+            result = bench.bench("orbitals", {}, data, truth=False, samples=[16], steps=[1], repetitions=2, longest=1,
+                                 methods=["superposed", "sync-dda", "raymarch"], side=128)
+            row = rows.setdefault(edge, {"memory": result["memory"][0], "points": {}})
+            for point in result["points"]:
+                row["points"].setdefault(point["method"], []).append(point)
+    for edge, row in rows.items():
+        row["points"] = {method: {key: median([p[key] for p in points])
+                                  for key in ("nsPerRay", "fetchesPerRay", "cellStepsPerRay")}
+                         for method, points in row["points"].items()}
+        command = [PROGRAM, "render", bench.scene("orbitals"), "--data", *bench.orbitals(4, edge), "-o",
+                   bench.path("sizes.exr"), "--samples", "1"]
+        # Above what the program and its libraries take before they do anything.
+        row["peakBytes"] = resources(command)[1] - resources([PROGRAM, "--version"])[1]
+    return rows
+
+
+def threads(bench):
+    """Efficiency t1 / (n tn), numbers of threads taking turns in one process."""
+    counts, most = [1], os.cpu_count() or 1
+    while 2 * counts[-1] <= most:
+        counts.append(2 * counts[-1])
+    found = {}
+    for name in ("orbitals",) if bench.quick else ("orbitals", "tcga", "heptane"):
+        for light in ("emission-absorption", "both"):
+            result = bench.bench(name, light_settings(light), truth=False, threads=counts, samples=[4], steps=[1],
+                                 methods=["superposed", "sync-dda", "raymarch"], side=64 if bench.quick else 256,
+                                 repetitions=bench.repetitions + 2)
+            if result:
+                found.setdefault(name, {})[light] = result["points"]
+    return found
+
+
+def loading(bench):
+    """Loading (with its histograms, by `scolopax info`) against reading the file's bytes and against unpacking them
+    with gzip, all warm; medians."""
+    found = {}
+    cases = {"orbitals 128^3, NRRD, not packed": bench.orbitals(4)}
+    if not bench.quick:
+        cases["orbitals 256^3, NRRD, not packed"] = bench.orbitals(4, 256)
+    for name in bench.scenes:
+        if not isinstance(SCENES[name], int) and bench.data(name):
+            cases[f"{name}, {os.path.basename(bench.data(name)[0]).split('.', 1)[1]}"] = bench.data(name)
+    for case, files in cases.items():
+        times = {"load": [], "read": [], "gzip": []}
+        for _ in range(bench.repetitions + 2):
+            times["load"].append(resources([PROGRAM, "info", *files])[0])
+            begin = time.monotonic()
+            for file in files:
+                with open(file, "rb") as opened:
+                    while opened.read(1 << 20):
+                        pass
+            times["read"].append(time.monotonic() - begin)
+            if files[0].endswith(".gz"):
+                times["gzip"].append(resources(["gzip", "-dc", *files])[0])
+        found[case] = {"bytes": sum(map(os.path.getsize, files)), "start": median([resources([PROGRAM, "--version"])[0] for _ in range(5)]),
+                       **{key: median(values) if values else None for key, values in times.items()}}
+    return found
+
+
+EXPERIMENTS = {f.__name__: f for f in (speed, macrocells, channels, quality, blends, memory, sizes, threads, loading)}
