@@ -25,7 +25,8 @@ struct FrameInfo {
   float error = 0;             ///< estimated RMSE over linear premultiplied RGB; NaN below two samples
   std::uint32_t rebuildUs = 0, renderUs = 0,
                 encodeUs = 0;  ///< the last rebuild, the last pass, this encoding
-  bool interactive = false;    ///< made while edits arrive: maybe smaller, more compressed
+  bool interactive = false;    ///< made while edits arrive: maybe smaller
+  bool reduced = false;        ///< smaller than the scene's picture; to be enlarged
   bool final = false;          ///< the stop rule is met: nothing better follows at this revision
 };
 

@@ -12,8 +12,9 @@
 namespace scolopax::server {
 namespace {
 
-constexpr int kDivisors[] = {1, 2, 3, 4, 6, 8, 12, 16};
-constexpr int kProbeDivisor = 4;
+constexpr double kDivisors[] = {1, 1.5, 2, 3, 4, 6, 8, 12, 16};
+constexpr double kProbeDivisor = 4;
+constexpr double kFiner = 0.7, kKept = 1.2;  ///< shares of the target at which the divisor changes
 /// As many as a scene may ask for; numbers of samples beyond 2^31 would repeat draws.
 constexpr std::uint32_t kMaxSamples = 1u << 24;
 
@@ -23,18 +24,25 @@ double secondsBetween(TimePoint from, TimePoint to) {
 
 std::uint32_t microseconds(double seconds) { return std::uint32_t(std::clamp(seconds * 1e6, 0.0, 4e9)); }
 
-Scene atDivisor(Scene scene, int divisor) {
-  scene.width = (scene.width + divisor - 1) / divisor;
-  scene.height = (scene.height + divisor - 1) / divisor;
-  return scene;
-}
+const std::atomic<bool> kNever{false};
 
 }  // namespace
 
-int divisorForTarget(std::uint64_t pixels, double secondsPerPixel, double targetSeconds) {
-  for (const int divisor : kDivisors)
-    if (double(pixels) / (divisor * divisor) * secondsPerPixel <= targetSeconds) return divisor;
+double divisorForTarget(std::uint64_t pixels, double secondsPerPixel, double targetSeconds, double current) {
+  for (const double divisor : kDivisors) {
+    const double share = current == 0 || divisor > current ? 1 : divisor < current ? kFiner : kKept;
+    if (double(pixels) / (divisor * divisor) * secondsPerPixel <= targetSeconds * share) return divisor;
+  }
   return kDivisors[std::size(kDivisors) - 1];
+}
+
+Scene atDivisor(Scene scene, double divisor) {
+  if (divisor == 1) return scene;
+  const int height = int(std::ceil(scene.height / divisor));
+  scene.width = int((std::int64_t(scene.width) * height + scene.height - 1) / scene.height);
+  scene.height = height;
+  scene.filter = PixelFilter::point;
+  return scene;
 }
 
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
@@ -46,12 +54,13 @@ bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
 }
 
 ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer,
-                                     Options options, Now now, Log log)
+                                     Options options, Now now, Log log, const std::atomic<bool>& interrupted)
     : session_(std::move(session)),
       makeRenderer_(std::move(makeRenderer)),
       options_(options),
       now_(std::move(now)),
-      log_(std::move(log)) {}
+      log_(std::move(log)),
+      interrupted_(interrupted) {}
 
 bool ProgressiveRender::sceneStale(const RenderRequest& request) const {
   // Back to full resolution when edits have stopped; a film that already has it goes on.
@@ -59,10 +68,16 @@ bool ProgressiveRender::sceneStale(const RenderRequest& request) const {
          (request.aovs && !recording_);
 }
 
-/// Whether a pass whose scene is stale goes on all the same: a small one, and one that follows an abandoned
-/// one, for a while. However fast edits come, pictures are shown between them.
+/// Whether a pass whose scene is stale goes on all the same, for a while: the first of a small picture, and
+/// of one that follows an abandoned pass. However fast edits come, pictures are shown between them.
 bool ProgressiveRender::keepsPass(const RenderRequest& request) const {
-  return unfinished_ && (request.interactive || abandoned_) && now_() - passBegan_ < options_.shield;
+  return unfinished_ && shown_.revision != revision_ && ((request.interactive && small_) || abandoned_) &&
+         now_() - passBegan_ < options_.shield;
+}
+
+/// Whether somebody waits for the first picture that has an edit in it.
+bool ProgressiveRender::firstOfEdit(const RenderRequest& request) const {
+  return request.interactive && shown_.revision != request.revision;
 }
 
 bool ProgressiveRender::finished(const RenderRequest& request) const {
@@ -83,30 +98,37 @@ bool ProgressiveRender::showDue(const RenderRequest& request) const {
          now_() - shownAt_ >= (request.interactive ? options_.interactiveInterval : options_.stillInterval);
 }
 
-bool ProgressiveRender::due() const {
+ProgressiveRender::Work ProgressiveRender::work() const {
   const RenderRequest request = session_->request();
-  return request.wanted && (sceneStale(request) || !finished(request) || showDue(request));
+  if (!request.wanted || !(sceneStale(request) || !finished(request) || showDue(request))) return Work::none;
+  return firstOfEdit(request) ? Work::urgent : request.interactive ? Work::refine : Work::still;
+}
+
+bool ProgressiveRender::edited() const {
+  const RenderRequest request = session_->request();
+  return request.wanted && request.interactive;
 }
 
 std::optional<TimePoint> ProgressiveRender::dueAt() const {
   const RenderRequest request = session_->request();
   if (!request.wanted) return std::nullopt;
-  // Also when the end has just passed, between due() and here: then it is due at once.
+  // Also when the end has just passed, between work() and here: then it is due at once.
   if (request.interactive || shown_.interactive) return request.interactiveEnd;
   return std::nullopt;
 }
 
-int ProgressiveRender::wantedDivisor(const RenderRequest& request) const {
+double ProgressiveRender::wantedDivisor(const RenderRequest& request, int editedOthers) const {
   if (!request.interactive) return 1;
   // What a pass costs is not known before the first: a small one tells.
   if (!secondsPerPixel_) return kProbeDivisor;
   const auto pixels =
       std::uint64_t(request.scene->render.width) * std::uint64_t(request.scene->render.height);
-  return divisorForTarget(pixels, *secondsPerPixel_,
-                          std::chrono::duration<double>(options_.frameTarget).count());
+  const auto target = std::max(options_.frameTarget / (1 + editedOthers), options_.leastTarget);
+  return divisorForTarget(pixels, *secondsPerPixel_, std::chrono::duration<double>(target).count(),
+                          interactiveDivisor_);
 }
 
-void ProgressiveRender::takeScene(const RenderRequest& request, PassResult& result) {
+void ProgressiveRender::takeScene(const RenderRequest& request, const Others& others, PassResult& result) {
   const TimePoint begin = now_();
   if (!renderer_ || volume_ != request.scene->dataset->volume) {
     renderer_.reset();
@@ -114,15 +136,16 @@ void ProgressiveRender::takeScene(const RenderRequest& request, PassResult& resu
     renderer_ = makeRenderer_(volume_);
     recording_ = false;
     secondsPerPixel_.reset();
+    interactiveDivisor_ = 0;
   }
-  const int divisor = wantedDivisor(request);
+  const double divisor = wantedDivisor(request, others.edited);
   const Scene scene = atDivisor(request.scene->render, divisor);
   // What is recorded of AOVs takes up to twice as much again, with all channels there may be.
   const auto pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height) * (request.aovs ? 3 : 1);
-  if (pixels > filmPixels_ && othersPixels_ + pixels > options_.filmPixels)
+  if (pixels > filmPixels_ && others.filmPixels + pixels > options_.filmPixels)
     throw Error(ErrorCode::tooLarge, "image: all sessions together may have " +
                                          std::to_string(options_.filmPixels) + " pixels, " +
-                                         std::to_string(othersPixels_) + " of them are taken");
+                                         std::to_string(others.filmPixels) + " of them are taken");
   RebuildStats stats = renderer_->setScene(scene);
   if (request.aovs && !recording_) {
     renderer_->recordAovs();
@@ -136,23 +159,27 @@ void ProgressiveRender::takeScene(const RenderRequest& request, PassResult& resu
   scene_ = request.scene;
   revision_ = request.revision;
   divisor_ = divisor;
+  small_ = request.interactive;
+  if (small_ && secondsPerPixel_) interactiveDivisor_ = divisor;
   result.rebuildSeconds = secondsBetween(begin, now_());
   rebuildUs_ = microseconds(result.rebuildSeconds);
 }
 
-void ProgressiveRender::addSample(PassResult& result) {
+void ProgressiveRender::addSample(bool urgent, bool othersUrgent, PassResult& result) {
   const TimePoint begin = now_();
   if (!unfinished_) passBegan_ = begin, passSeconds_ = 0;
-  result.rendered = renderer_->renderSample(session_->cancel(), options_.slice);
-  result.cancelled = !result.rendered && session_->cancel();
+  // The turn between two urgent ones is short, and its own: however fast edits come, it gets on.
+  const bool whole = urgent || othersUrgent;
+  result.rendered = renderer_->renderSample(
+      whole ? kNever : interrupted_, othersUrgent && !urgent ? options_.politeSlice : options_.slice);
+  result.cancelled = !result.rendered && !whole && interrupted_;
   passSeconds_ += secondsBetween(begin, now_());
-  unfinished_ = !result.rendered && !result.cancelled;
+  unfinished_ = !result.rendered;
   if (!result.rendered) return;
   abandoned_ = false;
   result.renderSeconds = passSeconds_;
-  const Scene& scene = scene_->render;
-  result.pixels = std::uint64_t((scene.width + divisor_ - 1) / divisor_) *
-                  std::uint64_t((scene.height + divisor_ - 1) / divisor_);
+  const Scene scene = atDivisor(scene_->render, divisor_);
+  result.pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height);
   filmSeconds_ += result.renderSeconds;
   renderUs_ = microseconds(result.renderSeconds);
   const double perPixel = result.renderSeconds / double(result.pixels);
@@ -167,6 +194,7 @@ void ProgressiveRender::show(const RenderRequest& request) {
   info.rebuildUs = rebuildUs_;
   info.renderUs = renderUs_;
   info.interactive = request.interactive;
+  info.reduced = divisor_ != 1;
   info.final = !request.interactive && finished(request);
   RenderedFrame frame{info, std::make_shared<const Image>(renderer_->image()), scene_->render.background, {}};
   if (recording_ && !request.interactive) {
@@ -179,15 +207,14 @@ void ProgressiveRender::show(const RenderRequest& request) {
   shownAt_ = now_();
 }
 
-PassResult ProgressiveRender::run() {
+PassResult ProgressiveRender::run(const Others& others) {
   PassResult result;
-  const RenderRequest request = session_->startPass();
+  const RenderRequest request = session_->request();
   if (!request.wanted) return result;
   try {
-    if (sceneStale(request) && !keepsPass(request)) takeScene(request, result);
-    if (!finished(request)) addSample(result);
-    session_->passEnded(result.cancelled);
-    if (!result.cancelled && !unfinished_ && showDue(request)) show(request);
+    if (sceneStale(request) && !keepsPass(request)) takeScene(request, others, result);
+    if (!finished(request)) addSample(firstOfEdit(request), others.urgent, result);
+    if (!unfinished_ && showDue(request)) show(request);
     return result;
   } catch (const Error& error) {
     session_->fail(request.revision, error.what());
@@ -197,7 +224,6 @@ PassResult ProgressiveRender::run() {
     log_(std::string("session ") + session_->id() + ": the renderer failed: " + error.what());
     session_->fail(request.revision, "the renderer failed");  // the cause is not for a client
   }
-  session_->passEnded(false);
   // What an error has left behind is not worth keeping.
   scene_.reset();
   renderer_.reset();

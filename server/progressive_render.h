@@ -2,6 +2,7 @@
 // One session's renderer and film, and the policy of what to render and show next. Used by the render
 // thread alone; takes scenes from Session and hands pictures back to it.
 #pragma once
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -26,37 +27,55 @@ struct PassResult {
 class ProgressiveRender {
  public:
   struct Options {
-    std::chrono::microseconds frameTarget{40'000};      ///< for one pass while edits arrive
+    std::chrono::microseconds frameTarget{25'000};      ///< for one pass while edits arrive
+    std::chrono::microseconds leastTarget{4'000};       ///< that many edited sessions leave each other
     std::chrono::milliseconds interactiveInterval{33};  ///< between frames while edits arrive
     std::chrono::milliseconds stillInterval{500};       ///< between frames once samples are many
-    std::chrono::milliseconds slice{100};   ///< of a slow pass, before other sessions have their turn
+    std::chrono::milliseconds slice{100};  ///< of a slow pass, before other sessions have their turn
+    std::chrono::milliseconds politeSlice{
+        8};                                 ///< the same, when one of them waits for an edit's first picture
     std::chrono::milliseconds shield{300};  ///< for so long a pass goes on when its scene is stale
     std::uint64_t filmPixels = 67'108'864;  ///< of all sessions' films together, at 120 bytes each
   };
+  /// What its pass must leave to the other sessions.
+  struct Others {
+    std::uint64_t filmPixels = 0;  ///< memory that they take
+    int edited = 0;                ///< those that edits arrive at
+    bool urgent = false;           ///< one of them has urgent work
+  };
+  /// What there is to do, the least important first.
+  enum class Work {
+    none,
+    refine,  ///< a better picture while edits arrive, which the next will replace
+    still,   ///< the picture at rest
+    urgent   ///< the first picture after an edit
+  };
+  /// `interrupted` ends passes early that are not urgent; they go on in their next turn.
   ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer, Options options, Now now,
-                    Log log);
+                    Log log, const std::atomic<bool>& interrupted);
 
   const std::shared_ptr<Session>& session() const { return session_; }
-  /// Whether run() has something to do now.
-  bool due() const;
-  /// When due() may become true without being woken.
+  /// What run() would do now.
+  Work work() const;
+  /// Whether edits arrive.
+  bool edited() const;
+  /// When there may be work without being woken.
   std::optional<TimePoint> dueAt() const;
   /// One sample pass at most, with the rebuild before it and the submission after it. Never throws: what
   /// cannot be rendered is told to the session.
-  PassResult run();
+  PassResult run(const Others& others);
   /// Memory that the film takes, in pixels.
   std::uint64_t filmPixels() const { return filmPixels_; }
-  /// What other sessions' films take, told before run().
-  void setOthersPixels(std::uint64_t pixels) { othersPixels_ = pixels; }
 
  private:
   bool sceneStale(const RenderRequest& request) const;
   bool keepsPass(const RenderRequest& request) const;
   bool finished(const RenderRequest& request) const;
   bool showDue(const RenderRequest& request) const;
-  int wantedDivisor(const RenderRequest& request) const;
-  void takeScene(const RenderRequest& request, PassResult& result);
-  void addSample(PassResult& result);
+  bool firstOfEdit(const RenderRequest& request) const;
+  double wantedDivisor(const RenderRequest& request, int editedOthers) const;
+  void takeScene(const RenderRequest& request, const Others& others, PassResult& result);
+  void addSample(bool urgent, bool othersUrgent, PassResult& result);
   void show(const RenderRequest& request);
 
   const std::shared_ptr<Session> session_;
@@ -64,22 +83,25 @@ class ProgressiveRender {
   const Options options_;
   const Now now_;
   const Log log_;
+  const std::atomic<bool>& interrupted_;
 
   std::shared_ptr<const Volume> volume_;
   std::unique_ptr<Renderer> renderer_;
   std::shared_ptr<const ResolvedScene> scene_;  ///< that the film shows; null before the first
   std::uint32_t revision_ = 0;
   bool recording_ = false;   ///< the renderer keeps AOVs
-  bool unfinished_ = false;  ///< a pass has used up its slice
+  bool unfinished_ = false;  ///< a pass has begun and was interrupted, or has used up its slice
   bool abandoned_ = false;   ///< the pass before it was given up for a newer scene
+  bool small_ = false;       ///< the film was begun while edits arrived
   TimePoint passBegan_;
   double passSeconds_ = 0;                 ///< spent on the pass so far
-  int divisor_ = 1;                        ///< of width and height
+  double divisor_ = 1;                     ///< of width and height
+  double interactiveDivisor_ = 0;          ///< the last one while edits arrived; 0 before
   double filmSeconds_ = 0;                 ///< spent on the film's samples
   std::optional<double> secondsPerPixel_;  ///< of one sample, from earlier passes
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
 
-  std::uint64_t filmPixels_ = 0, othersPixels_ = 0;
+  std::uint64_t filmPixels_ = 0;
   FrameInfo shown_;  ///< the last frame handed in; revision 0 before the first
   TimePoint shownAt_;
 };
@@ -87,8 +109,15 @@ class ProgressiveRender {
 /// Whether rendering ends at what `renderer` has and the seconds it took.
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds);
 
-/// The smallest of 1, 2, 3, 4, 6, 8, ... by which width and height must be divided so that a pass fits the
-/// target.
-int divisorForTarget(std::uint64_t pixels, double secondsPerPixel, double targetSeconds);
+/// The smallest of 1, 1.5, 2, 3, 4, 6, 8, ... by which width and height must be divided so that a pass fits
+/// the target. `current`, that of the pass before (0: none), is kept until another fits clearly better: a
+/// picture that changes its resolution to and fro is worse than one that is a little late.
+double divisorForTarget(std::uint64_t pixels, double secondsPerPixel, double targetSeconds,
+                        double current = 0);
+
+/// The scene for a smaller picture of the same view: its height divided and rounded up, its width the least
+/// that shows as much as the whole picture. One sample at the centre of a pixel says more of a small picture,
+/// which is smoothly enlarged, than one anywhere in the pixel.
+Scene atDivisor(Scene scene, double divisor);
 
 }  // namespace scolopax::server

@@ -36,21 +36,44 @@ void RenderLoop::followStore() {
   });
   for (const auto& session : sessions)
     if (!known(session))
-      renders_.push_back(std::make_unique<ProgressiveRender>(session, makeRenderer_, options_, now_, log_));
+      renders_.push_back(
+          std::make_unique<ProgressiveRender>(session, makeRenderer_, options_, now_, log_, interrupted_));
+}
+
+RenderLoop::Renders::iterator RenderLoop::nextTurn() {
+  using Work = ProgressiveRender::Work;
+  auto urgent = renders_.end(), still = renders_.end(), any = renders_.end();
+  int urgents = 0;
+  for (auto render = renders_.begin(); render != renders_.end(); ++render) {
+    const Work work = (*render)->work();
+    if (work == Work::none) continue;
+    if (any == renders_.end()) any = render;
+    if (work == Work::still && still == renders_.end()) still = render;
+    if (work == Work::urgent && urgents++ == 0) urgent = render;
+  }
+  const bool stillsTurn = lastUrgent_ && still != renders_.end();
+  const auto turn = urgents == 0 ? any : stillsTurn ? still : urgent;
+  lastUrgent_ = urgents > 0 && turn == urgent;
+  othersUrgent_ = urgents > 0 && turn != urgent;
+  return turn;
 }
 
 std::optional<TimePoint> RenderLoop::step() {
   std::optional<TimePoint> next = store_.expire();
   followStore();
-  const auto turn = std::find_if(renders_.begin(), renders_.end(), [](const auto& r) { return r->due(); });
+  interrupted_ = false;  // an edit from here on interrupts the pass; those before are seen by nextTurn()
+  const auto turn = nextTurn();
   if (turn != renders_.end()) {
     // Behind all others before it runs: a session of slow passes gets one turn in the round as well.
     std::rotate(turn, turn + 1, renders_.end());
-    std::uint64_t others = 0;
-    for (const auto& render : renders_)
-      if (render != renders_.back()) others += render->filmPixels();
-    renders_.back()->setOthersPixels(others);
-    onPass_(renders_.back()->run());
+    ProgressiveRender::Others others;
+    others.urgent = othersUrgent_;
+    for (const auto& render : renders_) {
+      if (render == renders_.back()) continue;
+      others.filmPixels += render->filmPixels();
+      others.edited += render->edited();
+    }
+    onPass_(renders_.back()->run(others));
     return now_();
   }
   for (const auto& render : renders_) keepEarlier(next, render->dueAt());
@@ -60,7 +83,8 @@ std::optional<TimePoint> RenderLoop::step() {
 EncodedFrame encodeFrame(const RenderedFrame& rendered, const Now& now) {
   const TimePoint begin = now();
   const Image& image = *rendered.image;
-  const bool quick = rendered.info.interactive;
+  // A picture that will be enlarged has few bytes, and its compression would show enlarged as well.
+  const int quality = rendered.info.reduced ? 95 : rendered.info.interactive ? 80 : 90;
   EncodedFrame frame;
   frame.info = rendered.info;
   frame.width = image.width;
@@ -68,8 +92,7 @@ EncodedFrame encodeFrame(const RenderedFrame& rendered, const Now& now) {
   frame.background = rendered.background;
   frame.aovs = rendered.aovs;
   frame.jpeg = std::make_shared<const std::vector<unsigned char>>(
-      encodeJpeg(toSrgb8(image, rendered.background), quick ? 75 : 90,
-                 quick ? ChromaSampling::half420 : ChromaSampling::full444));
+      encodeJpeg(toSrgb8(image, rendered.background), quality, ChromaSampling::full444));
   frame.image = rendered.image;
   frame.info.encodeUs =
       std::uint32_t(std::chrono::duration_cast<std::chrono::microseconds>(now() - begin).count());

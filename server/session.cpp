@@ -60,7 +60,7 @@ Session::SceneState Session::edit(std::shared_ptr<const ResolvedScene> next, con
   lastUsed_ = hooks_.now();
   if (pictureChanges) {
     lastEdit_ = lastUsed_;
-    if (cancellable_) cancel_ = true;
+    hooks_.interruptRender();
   }
   for (auto& [id, viewer] : viewers_) {
     if (id != origin.viewer) {
@@ -152,7 +152,7 @@ std::shared_ptr<const EncodedFrame> Session::latestFrame() const {
 void Session::close(const std::string& reason) {
   const std::lock_guard lock(mutex_);
   if (std::exchange(closed_, true)) return;
-  cancel_ = true;
+  hooks_.interruptRender();
   for (auto& [id, viewer] : viewers_) viewer.sink->sessionClosed(reason);
   viewers_.clear();
   frameCame_.notify_all();
@@ -165,10 +165,6 @@ TimePoint Session::lastUsed() const {
 
 RenderRequest Session::request() const {
   const std::lock_guard lock(mutex_);
-  return requestLocked();
-}
-
-RenderRequest Session::requestLocked() const {
   RenderRequest request;
   request.scene = scene_;
   request.revision = revision_;
@@ -182,22 +178,6 @@ RenderRequest Session::requestLocked() const {
     request.interactive = hooks_.now() < request.interactiveEnd;
   }
   return request;
-}
-
-RenderRequest Session::startPass() {
-  const std::lock_guard lock(mutex_);
-  cancel_ = closed_;
-  RenderRequest request = requestLocked();
-  // A small pass is let through, and so is one that follows a cancelled one: however fast edits come,
-  // pictures are shown between them.
-  cancellable_ = !request.interactive && !lastPassCancelled_;
-  return request;
-}
-
-void Session::passEnded(bool cancelled) {
-  const std::lock_guard lock(mutex_);
-  cancellable_ = false;
-  lastPassCancelled_ = cancelled;
 }
 
 void Session::submit(RenderedFrame frame) {

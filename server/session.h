@@ -11,9 +11,8 @@
 //  5. Only the encoder thread offers frames to viewers, so an older frame can never replace a newer one.
 //  6. Viewers are called with the mutex held, so that they see edits in order: a ViewerSink only queues, it
 //     neither blocks nor calls back.
-//  7. An edit raises cancel() under the mutex; startPass() lowers it under the mutex while it takes the
-//  scene,
-//     so no edit is lost between the two.
+//  7. An edit interrupts the running pass after it has changed the scene; RenderLoop takes the interruption
+//     back before it looks at any scene, so no edit is lost between the two.
 //  8. Waking a loop takes the loop's own, innermost mutex. The store's mutex is never held with a session's.
 #pragma once
 #include <atomic>
@@ -74,17 +73,18 @@ struct RenderRequest {
   bool aovs = false;                       ///< somebody has asked for AOVs
 };
 
-/// Functions that wake the loops; called with or without the session's mutex held.
+/// Functions that act on the loops; called with or without the session's mutex held.
 struct SessionHooks {
   Now now;
   std::function<void()> wakeRender;
   std::function<void()> wakeEncoder;
+  std::function<void()> interruptRender;  ///< ends the running pass early, unless it is itself for an edit
 };
 
 class Session {
  public:
   /// The time after an edit during which speed counts more than quality.
-  static constexpr std::chrono::milliseconds kInteractiveTime{300};
+  static constexpr std::chrono::milliseconds kInteractiveTime{200};
 
   /// Scripts that may wait at once.
   static constexpr std::size_t kMaxPolls = 8;
@@ -128,11 +128,6 @@ class Session {
   // --- render thread
   // -----------------------------------------------------------------------------------------
   RenderRequest request() const;
-  /// The same, and lowers cancel() for the pass that follows.
-  RenderRequest startPass();
-  /// Raised when the running pass is of no use any more.
-  const std::atomic<bool>& cancel() const { return cancel_; }
-  void passEnded(bool cancelled);
   /// Takes the one waiting place of the encoder, replacing what is there.
   void submit(RenderedFrame frame);
   /// Nothing is rendered until the next edit.
@@ -162,7 +157,6 @@ class Session {
 
   SceneState edit(std::shared_ptr<const ResolvedScene> next, const EditOrigin& origin);
   void checkRevision(const EditOrigin& origin) const;
-  RenderRequest requestLocked() const;
 
   const std::string id_, token_;
   const std::shared_ptr<const SceneResolver> resolver_;
@@ -184,10 +178,6 @@ class Session {
   std::optional<RenderedFrame> rendered_;  ///< waits for the encoder
   std::shared_ptr<const EncodedFrame> frame_;
   std::uint32_t frameNumber_ = 0;
-
-  std::atomic<bool> cancel_{false};
-  bool cancellable_ = false;  ///< of the running pass
-  bool lastPassCancelled_ = false;
 };
 
 }  // namespace scolopax::server

@@ -139,7 +139,8 @@ struct Workshop {
   FakeClock clock;
   std::shared_ptr<FakeControl> control = std::make_shared<FakeControl>();
   int renderWakes = 0, encoderWakes = 0;
-  SessionHooks hooks{clock.now(), [this] { ++renderWakes; }, [this] { ++encoderWakes; }};
+  SessionHooks hooks{clock.now(), [this] { ++renderWakes; }, [this] { ++encoderWakes; },
+                     [this] { render.interrupt(); }};
   std::shared_ptr<const SceneResolver> resolver =
       std::make_shared<const SceneResolver>(smallStore(), SceneResolver::Options{4096, 16'777'216});
   SessionStore store;

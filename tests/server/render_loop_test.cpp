@@ -117,7 +117,7 @@ TEST(RenderLoop, KeepsTheFilmOfACancelledPass) {
   const auto viewer = std::make_shared<FakeViewer>();
   session->addViewer(viewer);
   workshop.steps(2);
-  // The edit cancels the pass; undoing it within the pass leaves the scene the film is of.
+  // The edit interrupts the pass; undoing it within the pass leaves the scene the film is of.
   workshop.control->duringPass = [&] {
     workshop.control->duringPass = nullptr;
     session->patch(seedPatch(5), {});
@@ -179,7 +179,7 @@ TEST(RenderLoop, ShowsPicturesHoweverFastEditsCome) {
 
 TEST(RenderLoop, RendersSmallWhileEditsArriveAndWholeWhenTheyStop) {
   Workshop workshop;
-  workshop.control->secondsPerPixel = 1e-6;  // a pass of 400 x 300 takes 120 ms, three times the target
+  workshop.control->secondsPerPixel = 1e-6;  // a pass of 400 x 300 takes 120 ms, five times the target
   const auto session =
       workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}, {"stop", {{"samples", 50}}}});
   const auto viewer = std::make_shared<FakeViewer>();
@@ -191,11 +191,11 @@ TEST(RenderLoop, RendersSmallWhileEditsArriveAndWholeWhenTheyStop) {
   session->patch(seedPatch(1), {});
   workshop.step();
   ASSERT_EQ(viewer->frames.size(), 2u);
-  EXPECT_EQ(viewer->frames[1].width, 200);
-  EXPECT_EQ(viewer->frames[1].height, 150);
+  EXPECT_EQ(viewer->frames[1].width, 134);  // as much as 400 x 300 shows, and less than a pixel more
+  EXPECT_EQ(viewer->frames[1].height, 100);
   EXPECT_TRUE(viewer->frames[1].info.interactive);
   EXPECT_FALSE(viewer->frames[1].info.final);
-  workshop.clock.advance(300ms);
+  workshop.clock.advance(Session::kInteractiveTime);
   workshop.step();
   ASSERT_EQ(viewer->frames.size(), 3u);
   EXPECT_EQ(viewer->frames[2].width, 400);
@@ -238,9 +238,55 @@ TEST(RenderLoop, SleepsUntilQualityIsDueWhenTheSmallPictureIsDone) {
 TEST(RenderLoop, ChoosesTheLargestResolutionThatFitsTheTarget) {
   EXPECT_EQ(divisorForTarget(1000, 0, 0.04), 1);
   EXPECT_EQ(divisorForTarget(1000, 1e-5, 0.04), 1);
+  EXPECT_EQ(divisorForTarget(1000, 8e-5, 0.04), 1.5);
   EXPECT_EQ(divisorForTarget(1000, 1e-4, 0.04), 2);
   EXPECT_EQ(divisorForTarget(1000, 3e-4, 0.04), 3);
   EXPECT_EQ(divisorForTarget(1000, 1, 0.04), 16);
+}
+
+TEST(RenderLoop, KeepsItsResolutionUntilAnotherFitsClearlyBetter) {
+  const auto next = [](double current, double secondsAtOne) {
+    return divisorForTarget(100, secondsAtOne / 100, 0.04, current);
+  };
+  EXPECT_EQ(next(2, 4 * 0.047), 2);     // a little late
+  EXPECT_EQ(next(2, 4 * 0.049), 3);     // too late
+  EXPECT_EQ(next(2, 2.25 * 0.029), 2);  // 1.5 would fit, but not clearly
+  EXPECT_EQ(next(2, 2.25 * 0.027), 1.5);
+}
+
+TEST(RenderLoop, ShowsAsMuchInASmallPictureAsInTheWholeAndLessThanAPixelMore) {
+  Scene scene;
+  for (const auto& [width, height] :
+       {std::pair{643, 561}, {512, 512}, {1, 1}, {7680, 1}, {3, 4096}, {1919, 1079}})
+    for (const double divisor : {1.0, 1.5, 2.0, 3.0, 4.0, 16.0}) {
+      scene.width = width, scene.height = height;
+      const Scene small = atDivisor(scene, divisor);
+      const double scale = double(height) / small.height;  // the vertical field of view is the same
+      EXPECT_LE(scale, divisor);
+      EXPECT_GE(small.width * scale, width - 1e-9) << width << "x" << height << " by " << divisor;
+      EXPECT_LT((small.width - 1) * scale, width) << width << "x" << height << " by " << divisor;
+      EXPECT_EQ(small.filter, divisor == 1 ? PixelFilter::box : PixelFilter::point);
+    }
+}
+
+TEST(RenderLoop, SharesTheTimeForAPassBetweenTheSessionsThatAreEdited) {
+  Workshop workshop;
+  workshop.control->secondsPerPixel = 1e-6;  // 90 ms a pass
+  std::vector<std::shared_ptr<Session>> sessions;
+  std::vector<std::shared_ptr<FakeViewer>> viewers;
+  for (int i = 0; i < 4; ++i) {
+    sessions.push_back(workshop.store.create({{"image", {{"width", 300}, {"height", 300}}}}));
+    viewers.push_back(std::make_shared<FakeViewer>());
+    sessions.back()->addViewer(viewers.back());
+  }
+  workshop.steps(8);
+  sessions[0]->patch(seedPatch(1), {});
+  workshop.step();
+  EXPECT_EQ(viewers[0]->frames.back().width, 150);  // 22.5 ms, alone
+  workshop.clock.advance(Session::kInteractiveTime);
+  for (const auto& session : sessions) session->patch(seedPatch(2), {});
+  workshop.step();
+  EXPECT_EQ(viewers[1]->frames.back().width, 75);  // 5.6 ms, one of four
 }
 
 TEST(RenderLoop, LetsSessionsTakeTurns) {
@@ -256,6 +302,69 @@ TEST(RenderLoop, LetsSessionsTakeTurns) {
   EXPECT_EQ(turns, (std::map<std::uint32_t, int>{{1, 10}, {2, 10}, {3, 10}}));
 }
 
+TEST(RenderLoop, GivesTheFirstPictureAfterAnEditItsTurnBeforeAllOthers) {
+  Workshop workshop;
+  std::vector<std::shared_ptr<Session>> sessions;
+  for (std::uint32_t i = 1; i <= 5; ++i) {
+    sessions.push_back(workshop.store.create(seedPatch(i)));
+    sessions.back()->addViewer(std::make_shared<FakeViewer>());
+  }
+  workshop.steps(10);
+  for (int i = 0; i < 5; ++i) {
+    const auto seed = std::uint32_t(100 + i);
+    sessions[std::size_t(i)]->patch(seedPatch(seed), {});
+    workshop.step();
+    EXPECT_EQ(workshop.control->passes.back(), seed);
+    workshop.clock.advance(Session::kInteractiveTime);
+    workshop.step();  // somebody else's turn
+  }
+}
+
+TEST(RenderLoop, InterruptsAPassAtRestForAnEditOfAnotherSessionAndGoesOnWithItAfterwards) {
+  Workshop workshop;
+  const auto calm = workshop.store.create(seedPatch(1000));
+  const auto calmViewer = std::make_shared<FakeViewer>(), busyViewer = std::make_shared<FakeViewer>();
+  calm->addViewer(calmViewer);
+  workshop.steps(2);
+  const auto busy = workshop.store.create(seedPatch(1));
+  busy->addViewer(busyViewer);
+  workshop.control->duringPass = [&] {
+    workshop.control->duringPass = nullptr;
+    busy->patch(seedPatch(2), {});
+  };
+  workshop.step();
+  EXPECT_EQ(workshop.control->passes.size(), 2u);  // interrupted
+  workshop.step();
+  EXPECT_EQ(workshop.control->passes.back(), 2u);
+  EXPECT_TRUE(busyViewer->frames.back().info.interactive);
+  workshop.step();
+  EXPECT_EQ(workshop.control->passes.back(), 1000u);
+  EXPECT_EQ(calmViewer->frames.back().info.revision, 1u);
+}
+
+TEST(RenderLoop, LetsTheFirstPictureAfterAnEditEndAndInterruptsWhatOnlyRefinesIt) {
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.step();
+  session->patch(seedPatch(1), {});
+  workshop.control->duringPass = [&] {
+    workshop.control->duringPass = nullptr;
+    session->patch(seedPatch(2), {});
+  };
+  workshop.step();
+  EXPECT_EQ(workshop.control->passes, (std::vector<std::uint32_t>{0, 1}));
+  workshop.step();
+  EXPECT_EQ(workshop.control->passes, (std::vector<std::uint32_t>{0, 1, 2}));
+  workshop.control->duringPass = [&] {
+    workshop.control->duringPass = nullptr;
+    session->patch(seedPatch(3), {});
+  };
+  workshop.steps(2);  // the second sample of seed 2 is not taken to its end
+  EXPECT_EQ(workshop.control->passes, (std::vector<std::uint32_t>{0, 1, 2, 3}));
+}
+
 TEST(RenderLoop, LetsAnEditedSessionStarveNobody) {
   Workshop workshop;
   const auto busy = workshop.store.create(seedPatch(1));
@@ -265,7 +374,8 @@ TEST(RenderLoop, LetsAnEditedSessionStarveNobody) {
   std::uint32_t seed = 1;
   workshop.control->duringPass = [&] { busy->patch(seedPatch(++seed), {}); };
   workshop.steps(40);
-  EXPECT_EQ(std::count(workshop.control->passes.begin(), workshop.control->passes.end(), 1000u), 20);
+  // The first edit interrupts the first turn; from then on every second one is the other's.
+  EXPECT_EQ(std::count(workshop.control->passes.begin(), workshop.control->passes.end(), 1000u), 19);
 }
 
 TEST(RenderLoop, MakesAnotherRendererForAnotherDataset) {

@@ -24,7 +24,8 @@ struct RunningServer {
   LoopThread renderThread, encodeThread;
   std::shared_ptr<FakeControl> control = std::make_shared<FakeControl>();
   Now now = [] { return std::chrono::steady_clock::now(); };
-  SessionHooks hooks{now, [this] { renderThread.wake(); }, [this] { encodeThread.wake(); }};
+  SessionHooks hooks{now, [this] { renderThread.wake(); }, [this] { encodeThread.wake(); },
+                     [this] { render.interrupt(); }};
   SessionStore store{std::make_shared<const SceneResolver>(testing::smallStore(), SceneResolver::Options{}),
                      {1000, 5min},
                      hooks};
