@@ -2,6 +2,7 @@
 // Draws the stream's pictures on a canvas: decodes off the main thread, skips what a newer picture has
 // overtaken, and reports each as done, so that the server knows how far behind this viewer is.
 import { decodeFrameHeader, type FrameHeader } from './frame-header';
+import { enlarged, type Size } from './image-size';
 
 export class FrameView {
   private readonly context: CanvasRenderingContext2D;
@@ -12,6 +13,8 @@ export class FrameView {
     private readonly canvas: HTMLCanvasElement,
     /** Called once for each frame that came: after it is drawn, or when it is skipped (`drawn` false). */
     private readonly onDone: (header: FrameHeader, drawn: boolean) => void,
+    /** Size of the scene's picture, to which the smaller ones that come while edits arrive are enlarged. */
+    private readonly fullSize: () => Size | undefined = () => undefined,
   ) {
     this.context = canvas.getContext('2d', { alpha: false })!;
   }
@@ -38,13 +41,17 @@ export class FrameView {
     try {
       const bytes = new Uint8Array(message, header.headerBytes);
       const picture = await createImageBitmap(new Blob([bytes], { type: header.mime }));
+      const full = (header.interactive && this.fullSize()) || picture;
       // Setting the size clears the canvas, so it happens only when the size changes and just before drawing.
-      if (this.canvas.width !== picture.width || this.canvas.height !== picture.height) {
-        this.canvas.width = picture.width;
-        this.canvas.height = picture.height;
+      if (this.canvas.width !== full.width || this.canvas.height !== full.height) {
+        this.canvas.width = full.width;
+        this.canvas.height = full.height;
       }
-      this.context.drawImage(picture, 0, 0);
+      const place = enlarged(picture, full);
+      this.context.imageSmoothingQuality = 'high'; // cubic, where the browser's own scaling is linear
+      this.context.drawImage(picture, place.x, place.y, place.width, place.height);
       picture.close();
+      this.canvas.dataset.pictureWidth = String(header.width);
       this.canvas.dataset.revision = String(header.revision); // which scene is on screen, for whoever asks the page
       this.canvas.dataset.samples = String(header.samples);
       return true;

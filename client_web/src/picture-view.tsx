@@ -16,7 +16,8 @@ export function PictureView({ store, attach }: { store: Store; attach(view: Fram
 
   useEffect(() => {
     const element = box.current!;
-    attach(new FrameView(canvas.current!, (header, drawn) => store.frameDone(header, drawn)));
+    const fullSize = () => store.imageSize;
+    attach(new FrameView(canvas.current!, (header, drawn) => store.frameDone(header, drawn), fullSize));
     let timer: ReturnType<typeof setTimeout> | undefined;
     const measure = () => {
       const ratio = Math.min(kMostPixelRatio, window.devicePixelRatio || 1);

@@ -99,6 +99,12 @@ export class Store {
     this.applySize();
   }
 
+  /** Of the scene's picture; undefined until the server has told the scene. */
+  get imageSize(): Size | undefined {
+    const { width, height } = this.scene.peek()?.image ?? {};
+    return width && height ? { width, height } : undefined;
+  }
+
   setVisible(visible: boolean): void {
     this.link.send({ type: 'view', visible });
   }

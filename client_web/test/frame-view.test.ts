@@ -45,3 +45,18 @@ it('a damaged picture is skipped and does not stop the next', async () => {
   view.show(message(2));
   await vi.waitFor(() => expect(done[1]).toEqual([2, true]));
 });
+
+it('a smaller picture of a scene that is edited is enlarged to the whole, about the centre', async () => {
+  vi.stubGlobal('createImageBitmap', vi.fn().mockResolvedValue({ width: 134, height: 100, close() {} }));
+  const drawImage = vi.fn();
+  const context = { drawImage, imageSmoothingQuality: 'low' };
+  const canvas = { width: 1, height: 1, dataset: {}, getContext: () => context } as unknown as HTMLCanvasElement;
+  const view = new FrameView(canvas, () => {}, () => ({ width: 400, height: 300 }));
+  const interactive = message(1);
+  new DataView(interactive).setUint8(9, 1);
+  view.show(interactive);
+  await vi.waitFor(() => expect(drawImage).toHaveBeenCalled());
+  expect([canvas.width, canvas.height]).toEqual([400, 300]);
+  expect(drawImage.mock.calls[0]!.slice(1)).toEqual([-1, 0, 402, 300]);
+  expect(context.imageSmoothingQuality).toBe('high');
+});

@@ -157,10 +157,10 @@ export async function steadyPicture(page, samples = 16, timeoutMs = 90_000) {
   await eventually(
     () =>
       page.locator('canvas').evaluate(
-        ({ dataset, width, parentElement }, wanted) =>
+        ({ dataset, parentElement }, wanted) =>
           Number(dataset.revision) >= wanted.revision &&
           Number(dataset.samples) >= wanted.samples &&
-          width === Math.round(parentElement.clientWidth * Math.min(2, devicePixelRatio)),
+          Number(dataset.pictureWidth) === Math.round(parentElement.clientWidth * Math.min(2, devicePixelRatio)),
         { revision, samples },
       ),
     `no full picture of revision ${revision} with ${samples} samples`,
