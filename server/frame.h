@@ -25,8 +25,9 @@ struct FrameInfo {
   float error = 0;             ///< estimated RMSE over linear premultiplied RGB; NaN below two samples
   std::uint32_t rebuildUs = 0, renderUs = 0,
                 encodeUs = 0;  ///< the last rebuild, the last pass, this encoding
-  bool interactive = false;    ///< made while edits arrive: maybe smaller
+  bool interactive = false;    ///< made while edits arrive, or soon after: maybe smaller
   bool reduced = false;        ///< smaller than the scene's picture; to be enlarged
+  bool mixed = false;          ///< with the reduced picture before it, see blend.h; not for scripts
   bool final = false;          ///< the stop rule is met: nothing better follows at this revision
 };
 

@@ -8,12 +8,14 @@
 #include <utility>
 
 #include "renderer/core/error.h"
+#include "server/blend.h"
 
 namespace scolopax::server {
 namespace {
 
 constexpr double kDivisors[] = {1, 1.5, 2, 3, 4, 6, 8, 12, 16};
 constexpr double kProbeDivisor = 4;
+constexpr double kMostDivisor = 16;
 constexpr double kFiner = 0.7, kKept = 1.2;  ///< shares of the target at which the divisor changes
 /// As many as a scene may ask for; numbers of samples beyond 2^31 would repeat draws.
 constexpr std::uint32_t kMaxSamples = 1u << 24;
@@ -63,8 +65,9 @@ ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, MakeRende
       interrupted_(interrupted) {}
 
 bool ProgressiveRender::sceneStale(const RenderRequest& request) const {
-  // Back to full resolution when edits have stopped; a film that already has it goes on.
-  return !scene_ || request.revision != revision_ || (!request.interactive && divisor_ != 1) ||
+  // Back to full resolution when edits have stopped, in steps; a film that already has it goes on.
+  const bool finerDue = divisor_ != 1 && (small_ || restShown_ || !request.pollSamples.empty());
+  return !scene_ || request.revision != revision_ || (!request.interactive && finerDue) ||
          (request.aovs && !recording_);
 }
 
@@ -73,6 +76,12 @@ bool ProgressiveRender::sceneStale(const RenderRequest& request) const {
 bool ProgressiveRender::keepsPass(const RenderRequest& request) const {
   return unfinished_ && shown_.revision != revision_ && ((request.interactive && small_) || abandoned_) &&
          now_() - passBegan_ < options_.shield;
+}
+
+/// Whether the first picture of an edit turns out to cost much more than the passes before it.
+bool ProgressiveRender::lateForEdit(const RenderRequest& request) const {
+  return unfinished_ && small_ && firstOfEdit(request) && divisor_ < kMostDivisor &&
+         passSeconds_ >= std::chrono::duration<double>(options_.tooLate).count();
 }
 
 /// Whether somebody waits for the first picture that has an edit in it.
@@ -89,7 +98,8 @@ bool ProgressiveRender::showDue(const RenderRequest& request) const {
   const std::uint32_t samples = renderer_->samples();
   if (samples == 0) return false;
   if (shown_.revision != revision_ || shown_.interactive != request.interactive) return true;
-  if (!request.interactive && finished(request)) return !shown_.final;
+  if (shown_.mixed && !request.pollSamples.empty()) return true;
+  if (!request.interactive && divisor_ == 1 && finished(request)) return !shown_.final;
   if (samples == shown_.samples) return false;
   if (std::any_of(request.pollSamples.begin(), request.pollSamples.end(),
                   [&](std::uint32_t wanted) { return shown_.samples < wanted && wanted <= samples; }))
@@ -118,18 +128,38 @@ std::optional<TimePoint> ProgressiveRender::dueAt() const {
 }
 
 double ProgressiveRender::wantedDivisor(const RenderRequest& request, int editedOthers) const {
-  if (!request.interactive) return 1;
+  if (!request.interactive && (!request.pollSamples.empty() || !secondsPerPixel_)) return 1;
   // What a pass costs is not known before the first: a small one tells.
   if (!secondsPerPixel_) return kProbeDivisor;
   const auto pixels =
       std::uint64_t(request.scene->render.width) * std::uint64_t(request.scene->render.height);
+  if (!request.interactive) {
+    const bool reducedShown = shown_.revision == request.revision && shown_.reduced;
+    double seconds = std::chrono::duration<double>(options_.frameTarget).count(), divisor = 1;
+    do divisor = divisorForTarget(pixels, *secondsPerPixel_, seconds *= options_.restFactor);
+    while (divisor > 1 && reducedShown && divisor >= divisor_);
+    return divisor;
+  }
   const auto target = std::max(options_.frameTarget / (1 + editedOthers), options_.leastTarget);
   return divisorForTarget(pixels, *secondsPerPixel_, std::chrono::duration<double>(target).count(),
                           interactiveDivisor_);
 }
 
+std::uint64_t ProgressiveRender::filmSize() const {
+  const Scene scene = atDivisor(scene_->render, divisor_);
+  return std::uint64_t(scene.width) * std::uint64_t(scene.height);
+}
+
+/// A pass that is given up has cost as much as it had until then; how much was missing is not known: say
+/// half.
+void ProgressiveRender::learnFromUnfinished() {
+  if (!unfinished_ || !scene_) return;
+  secondsPerPixel_ = std::max(secondsPerPixel_.value_or(0), 2 * passSeconds_ / double(filmSize()));
+}
+
 void ProgressiveRender::takeScene(const RenderRequest& request, const Others& others, PassResult& result) {
   const TimePoint begin = now_();
+  if (small_) learnFromUnfinished();
   if (!renderer_ || volume_ != request.scene->dataset->volume) {
     renderer_.reset();
     volume_ = request.scene->dataset->volume;
@@ -156,10 +186,12 @@ void ProgressiveRender::takeScene(const RenderRequest& request, const Others& ot
   abandoned_ = unfinished_;
   unfinished_ = false;
   if (stats.filmReset) filmSeconds_ = 0;
+  if (request.interactive || revision_ != request.revision) reduced_.reset();
   scene_ = request.scene;
   revision_ = request.revision;
   divisor_ = divisor;
   small_ = request.interactive;
+  restShown_ = false;
   if (small_ && secondsPerPixel_) interactiveDivisor_ = divisor;
   result.rebuildSeconds = secondsBetween(begin, now_());
   rebuildUs_ = microseconds(result.rebuildSeconds);
@@ -170,20 +202,28 @@ void ProgressiveRender::addSample(bool urgent, bool othersUrgent, PassResult& re
   if (!unfinished_) passBegan_ = begin, passSeconds_ = 0;
   // The turn between two urgent ones is short, and its own: however fast edits come, it gets on.
   const bool whole = urgent || othersUrgent;
-  result.rendered = renderer_->renderSample(
-      whole ? kNever : interrupted_, othersUrgent && !urgent ? options_.politeSlice : options_.slice);
+  const auto slice = urgent ? options_.tooLate : othersUrgent ? options_.politeSlice : options_.slice;
+  result.rendered = renderer_->renderSample(whole ? kNever : interrupted_, slice);
   result.cancelled = !result.rendered && !whole && interrupted_;
   passSeconds_ += secondsBetween(begin, now_());
   unfinished_ = !result.rendered;
   if (!result.rendered) return;
   abandoned_ = false;
   result.renderSeconds = passSeconds_;
-  const Scene scene = atDivisor(scene_->render, divisor_);
-  result.pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height);
+  result.pixels = filmSize();
   filmSeconds_ += result.renderSeconds;
   renderUs_ = microseconds(result.renderSeconds);
   const double perPixel = result.renderSeconds / double(result.pixels);
   secondsPerPixel_ = secondsPerPixel_ ? 0.5 * (*secondsPerPixel_ + perPixel) : perPixel;
+}
+
+/// Mixes the reduced picture that is on screen into the one that takes its place; whether there was one.
+bool ProgressiveRender::mix(Image* image) {
+  if (!reduced_) return false;
+  const double error = renderer_->samples() > 1 ? renderer_->estimatedError() : sampleError_;
+  const double share = mixIn(enlarged(*reduced_, image->width, image->height), error, image);
+  if (share > 0.98) reduced_.reset();
+  return true;
 }
 
 void ProgressiveRender::show(const RenderRequest& request) {
@@ -193,10 +233,18 @@ void ProgressiveRender::show(const RenderRequest& request) {
   info.error = float(renderer_->estimatedError());
   info.rebuildUs = rebuildUs_;
   info.renderUs = renderUs_;
-  info.interactive = request.interactive;
   info.reduced = divisor_ != 1;
-  info.final = !request.interactive && finished(request);
-  RenderedFrame frame{info, std::make_shared<const Image>(renderer_->image()), scene_->render.background, {}};
+  info.interactive = request.interactive || info.reduced;
+  info.final = !info.interactive && finished(request);
+  Image picture = renderer_->image();
+  if (!request.interactive && !info.final && request.pollSamples.empty()) info.mixed = mix(&picture);
+  auto image = std::make_shared<const Image>(std::move(picture));
+  if (info.reduced) {
+    reduced_ = image;
+    if (request.interactive) sampleError_ = info.samples > 1 ? info.error * std::sqrt(info.samples) : 0;
+  }
+  restShown_ = !request.interactive;
+  RenderedFrame frame{info, std::move(image), scene_->render.background, {}};
   if (recording_ && !request.interactive) {
     std::vector<AovValues> aovs;
     for (std::size_t i = 0; i < std::size(kAovs); ++i) aovs.push_back(renderer_->aov(Aov(i)));
@@ -212,7 +260,8 @@ PassResult ProgressiveRender::run(const Others& others) {
   const RenderRequest request = session_->request();
   if (!request.wanted) return result;
   try {
-    if (sceneStale(request) && !keepsPass(request)) takeScene(request, others, result);
+    if ((sceneStale(request) && !keepsPass(request)) || lateForEdit(request))
+      takeScene(request, others, result);
     if (!finished(request)) addSample(firstOfEdit(request), others.urgent, result);
     if (!unfinished_ && showDue(request)) show(request);
     return result;

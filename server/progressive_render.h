@@ -31,11 +31,12 @@ class ProgressiveRender {
     std::chrono::microseconds leastTarget{4'000};       ///< that many edited sessions leave each other
     std::chrono::milliseconds interactiveInterval{33};  ///< between frames while edits arrive
     std::chrono::milliseconds stillInterval{500};       ///< between frames once samples are many
-    std::chrono::milliseconds slice{100};  ///< of a slow pass, before other sessions have their turn
-    std::chrono::milliseconds politeSlice{
-        8};                                 ///< the same, when one of them waits for an edit's first picture
-    std::chrono::milliseconds shield{300};  ///< for so long a pass goes on when its scene is stale
-    std::uint64_t filmPixels = 67'108'864;  ///< of all sessions' films together, at 120 bytes each
+    std::chrono::milliseconds tooLate{75};  ///< the first picture of an edit is begun anew, coarser
+    int restFactor = 12;  ///< a pass may last so much longer at each step from small to whole
+    std::chrono::milliseconds slice{100};      ///< of a slow pass, before other sessions have their turn
+    std::chrono::milliseconds politeSlice{8};  ///< when one of them waits for an edit's first picture
+    std::chrono::milliseconds shield{300};     ///< for so long a pass goes on when its scene is stale
+    std::uint64_t filmPixels = 67'108'864;     ///< of all sessions' films together, at 120 bytes each
   };
   /// What its pass must leave to the other sessions.
   struct Others {
@@ -73,7 +74,11 @@ class ProgressiveRender {
   bool finished(const RenderRequest& request) const;
   bool showDue(const RenderRequest& request) const;
   bool firstOfEdit(const RenderRequest& request) const;
+  bool lateForEdit(const RenderRequest& request) const;
   double wantedDivisor(const RenderRequest& request, int editedOthers) const;
+  std::uint64_t filmSize() const;
+  void learnFromUnfinished();
+  bool mix(Image* image);
   void takeScene(const RenderRequest& request, const Others& others, PassResult& result);
   void addSample(bool urgent, bool othersUrgent, PassResult& result);
   void show(const RenderRequest& request);
@@ -93,6 +98,7 @@ class ProgressiveRender {
   bool unfinished_ = false;  ///< a pass has begun and was interrupted, or has used up its slice
   bool abandoned_ = false;   ///< the pass before it was given up for a newer scene
   bool small_ = false;       ///< the film was begun while edits arrived
+  bool restShown_ = false;   ///< the film has been shown since they stopped
   TimePoint passBegan_;
   double passSeconds_ = 0;                 ///< spent on the pass so far
   double divisor_ = 1;                     ///< of width and height
@@ -102,7 +108,9 @@ class ProgressiveRender {
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
 
   std::uint64_t filmPixels_ = 0;
-  FrameInfo shown_;  ///< the last frame handed in; revision 0 before the first
+  FrameInfo shown_;                       ///< the last frame handed in; revision 0 before the first
+  std::shared_ptr<const Image> reduced_;  ///< the last reduced picture of this revision, while it is of use
+  double sampleError_ = 0;                ///< estimated RMSE of one sample while edits arrived; 0: not known
   TimePoint shownAt_;
 };
 

@@ -126,7 +126,7 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
   const auto isGone = [&] { return query.gone && *query.gone; };
   const auto fits = [&] {
     return frame_ && frame_->info.number > query.after && frame_->info.revision >= revision &&
-           !frame_->info.interactive && (frame_->aovs || !query.aovs) &&
+           !frame_->info.interactive && !frame_->info.mixed && (frame_->aovs || !query.aovs) &&
            (frame_->info.samples >= query.minSamples || frame_->info.final);
   };
   const auto poll = pollSamples_.insert(query.minSamples);

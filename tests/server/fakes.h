@@ -56,8 +56,12 @@ class FakeRenderer : public Renderer {
     scene_ = scene;
     return stats;
   }
-  bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds) override {
-    if (control_->incompletePasses > 0) return --control_->incompletePasses, false;
+  bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
+    if (control_->incompletePasses > 0) {
+      if (control_->clock)
+        control_->clock->advance(std::chrono::duration_cast<std::chrono::microseconds>(budget));
+      return --control_->incompletePasses, false;
+    }
     const auto pixels = double(scene_.width) * scene_.height;
     if (control_->clock)
       control_->clock->advance(

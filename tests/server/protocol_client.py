@@ -42,7 +42,7 @@ class Frame:
             "revision": self.revision >= (before.revision if before else 1),
             "patch": self.patch >= (before.patch if before else 0),
             "samples within a revision": not before or before.revision != self.revision
-            or self.samples >= before.samples,
+            or self.samples >= before.samples or (self.width > before.width and before.flags & INTERACTIVE),
             "final": not before or before.revision != self.revision or not before.flags & FINAL}
         return [name for name, good in found.items() if not good]
 

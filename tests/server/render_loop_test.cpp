@@ -203,6 +203,75 @@ TEST(RenderLoop, RendersSmallWhileEditsArriveAndWholeWhenTheyStop) {
   EXPECT_FALSE(viewer->frames[2].info.interactive);
 }
 
+TEST(RenderLoop, GetsFromSmallToWholeInStepsWhereAPassTakesLong) {
+  Workshop workshop;
+  workshop.control->secondsPerPixel = 1e-4;  // 12 s for the whole picture
+  const auto session = workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.step();
+  session->patch(seedPatch(1), {});
+  workshop.step();
+  EXPECT_EQ(viewer->frames.back().height, 19);  // 49 ms: less than this is not asked for
+  workshop.clock.advance(Session::kInteractiveTime);
+  viewer->frames.clear();
+  workshop.steps(4);
+  ASSERT_EQ(viewer->frames.size(), 4u);
+  EXPECT_EQ(viewer->frames[0].height, 38);   // within 0.3 s
+  EXPECT_EQ(viewer->frames[1].height, 150);  // within 3.6 s
+  EXPECT_EQ(viewer->frames[2].height, 300);
+  EXPECT_EQ(viewer->frames[3].height, 300);
+  for (const int i : {0, 1, 2, 3}) EXPECT_EQ(viewer->frames[std::size_t(i)].info.interactive, i < 2);
+  EXPECT_EQ(viewer->frames[3].info.samples, 2u);
+  EXPECT_EQ(session->waitForFrame({}, 0ms)->height, 300);
+}
+
+TEST(RenderLoop, MixesTheSmallPictureIntoTheNoisyWholeOneInTheProportionOfLeastError) {
+  Workshop workshop;
+  workshop.control->secondsPerPixel = 1e-6;
+  workshop.control->error = [](std::uint32_t) { return 1.5; };
+  const auto session =
+      workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}, {"stop", {{"samples", 9}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.step();
+  session->patch(seedPatch(1), {});
+  workshop.steps(8);
+  // Green is the number of samples: the difference between two pictures, a third of it in the mean of r, g
+  // and b.
+  const auto green = [&] { return double(session->latestFrame()->image->pixels[0].g); };
+  ASSERT_EQ(viewer->frames.back().info.samples, 8u);
+  ASSERT_TRUE(viewer->frames.back().info.interactive);
+  workshop.clock.advance(Session::kInteractiveTime);
+  workshop.step();
+  EXPECT_EQ(viewer->frames.back().width, 400);
+  EXPECT_DOUBLE_EQ(green(), 8);  // one sample has an error of 1.5 sqrt(8), more than it differs
+  workshop.step();
+  const double share = 1 - 1.5 * 1.5 / (6 * 6 / 3.0);
+  EXPECT_NEAR(green(), 8 * (1 - share) + 2 * share, 1e-5);
+  EXPECT_FALSE(viewer->frames.back().info.interactive);
+  EXPECT_EQ(session->waitForFrame({}, 0ms), nullptr);  // a script gets samples alone
+  workshop.steps(8);
+  ASSERT_TRUE(viewer->frames.back().info.final);
+  EXPECT_DOUBLE_EQ(green(), 9);  // and so is the final picture
+  EXPECT_NE(session->waitForFrame({}, 0ms), nullptr);
+}
+
+TEST(RenderLoop, BeginsThePictureOfAnEditAnewCoarserWhenItTakesTooLong) {
+  Workshop workshop;
+  workshop.control->secondsPerPixel = 1e-7;
+  const auto session = workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.step();
+  session->patch(seedPatch(1), {});
+  workshop.control->incompletePasses = 1;  // 75 ms are used up
+  workshop.steps(2);
+  EXPECT_EQ(viewer->frames.back().height, 100);
+  EXPECT_EQ(viewer->frames.back().info.revision, 2u);
+  EXPECT_TRUE(viewer->frames.back().info.interactive);
+}
+
 TEST(RenderLoop, BeginsSmallWhenTheFirstPassWasCancelled) {
   Workshop workshop;
   const auto session = workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}});
