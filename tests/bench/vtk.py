@@ -96,10 +96,10 @@ class Workplace:
                              check=True, capture_output=True, text=True).stdout
         return {name: json.loads(out)[name] for name in ("rmse", "psnr")}
 
-    def bench(self, scene, steps):
+    def bench(self, scene, steps, *options):
         """Of the marcher: no tracker comes near the errors of VTK in its time."""
-        self.run("bench", scene, "--methods", "raymarch", "--steps", ",".join(map(str, steps)), "--repetitions",
-                 str(2 * ROUNDS), "--json", self.path("bench.json"))
+        self.run("bench", scene, "--methods", "raymarch", "--steps", ",".join(map(str, steps)), "--samples", "1",
+                 "--repetitions", str(2 * ROUNDS), "--json", self.path("bench.json"), *options)
         with open(self.path("bench.json"), encoding="utf-8") as file:
             return json.load(file)["points"]
 
@@ -141,7 +141,8 @@ def single(channels, scene, folder):
         for step in STEPS:
             mapper.draw(step)
             errors[name, step] = place.error(mapper.picture())
-    seconds, points = take_turns(mappers, STEPS, lambda: place.bench(scene, STEPS + BETWEEN))
+    truth = place.path("truth.exr")
+    seconds, points = take_turns(mappers, STEPS, lambda: place.bench(scene, STEPS + BETWEEN, "--truth", truth))
     return {"vtk": [row(*key, halves, errors[key]) for key, halves in seconds.items()], "scolopax": points}
 
 
@@ -151,7 +152,8 @@ def multiple(channels, scene, folder):
     for shading in (False, True):
         scene["shading"] = shading
         mapper = VtkMapper(channels, scene)
-        seconds, points = take_turns({"i16": mapper}, FRAME_STEPS, lambda: place.bench(scene, FRAME_STEPS))
+        seconds, points = take_turns({"i16": mapper}, FRAME_STEPS,
+                                     lambda: place.bench(scene, FRAME_STEPS, "--times-only"))
         found.append({"shading": shading, "vtk": [row(*key, halves, {}) for key, halves in seconds.items()],
                       "scolopax": points})
     return {"lights": found}

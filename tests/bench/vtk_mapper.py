@@ -36,11 +36,10 @@ def opacity_of(channel):
     """Opacity of a unit length. The mapper looks opacity up, linear between entries, which 1 - exp(-extinction) is
     not: an entry for every value that it tells apart (at most 2^15)."""
     lo, hi = channel["range"]
+    positions = numpy.linspace(0, 1, min(int(hi - lo), 32768) + 1)
+    extinctions = channel["density"] * numpy.interp(positions, *zip(*channel["opacity"]))
     function = vtkPiecewiseFunction()
-    for value in numpy.linspace(lo, hi, min(int(hi - lo), 32768) + 1):
-        positions, heights = zip(*channel["opacity"])
-        extinction = channel["density"] * numpy.interp((value - lo) / (hi - lo), positions, heights)
-        function.AddPoint(value, 1 - numpy.exp(-extinction))
+    function.BuildFunctionFromTable(lo, hi, len(positions), (1 - numpy.exp(-extinctions)).tolist())
     return function
 
 
