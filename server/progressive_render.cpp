@@ -140,7 +140,9 @@ double ProgressiveRender::wantedDivisor(const RenderRequest& request, int edited
     while (divisor > 1 && reducedShown && divisor >= divisor_);
     return divisor;
   }
-  const auto target = std::max(options_.frameTarget / (1 + editedOthers), options_.leastTarget);
+  // All that are edited together have two targets a round, so that the picture stays sharp when they are few.
+  const auto target =
+      std::max(2 * options_.frameTarget / std::max(2, 1 + editedOthers), options_.leastTarget);
   return divisorForTarget(pixels, *secondsPerPixel_, std::chrono::duration<double>(target).count(),
                           interactiveDivisor_);
 }

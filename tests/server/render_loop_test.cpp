@@ -355,7 +355,7 @@ TEST(RenderLoop, SharesTheTimeForAPassBetweenTheSessionsThatAreEdited) {
   workshop.clock.advance(Session::kInteractiveTime);
   for (const auto& session : sessions) session->patch(seedPatch(2), {});
   workshop.step();
-  EXPECT_EQ(viewers[1]->frames.back().width, 75);  // 5.6 ms, one of four
+  EXPECT_EQ(viewers[1]->frames.back().width, 100);  // 10 ms, one of four that have 50 together
 }
 
 TEST(RenderLoop, LetsSessionsTakeTurns) {
