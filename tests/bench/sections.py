@@ -116,7 +116,8 @@ def quality(entry, plot):
         for scene, found in entry["found"].items():
             series = []
             for method, points in by_method(found["points"]).items():
-                chosen = sorted((p for p in points if p["step"] is None or p["samples"] == 1), key=lambda p: p["seconds"])
+                chosen = sorted((p for p in points if p["step"] is None or p["samples"] == 1),
+                                key=lambda p: (p["samples"], -(p["step"] or 0)))
                 series.append((method, [1e3 * p["seconds"] for p in chosen], [p[measure] for p in chosen]))
             panels.append((scene, series))
         text += plot(f"quality-{measure}", lines(panels, "ms a picture", name, logy=measure != "psnr")) + "\n"
