@@ -111,7 +111,8 @@ class Bench:
         with open(out, encoding="utf-8") as file:
             result = json.load(file)
         result.pop("scene")
-        print(f"  {name} {settings}: {time.monotonic() - begin:.1f} s", file=sys.stderr, flush=True)
+        told = {path: value for path, value in settings.items() if not path.startswith("channels")}
+        print(f"  {name} {told}: {time.monotonic() - begin:.1f} s", file=sys.stderr, flush=True)
         return result
 
 
