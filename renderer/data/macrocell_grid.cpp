@@ -101,6 +101,18 @@ MacrocellGrid buildMacrocells(const Volume& volume, int size) {
       grid.levels.push_back(std::move(levels));
     });
   }
+  const CellBlocks blocks(grid.cells);
+  grid.blocks.resize(blocks.count() * channels, {255, 0});
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.count(), 64), [&](const auto& range) {
+    for (std::size_t block = range.begin(); block < range.end(); ++block)
+      blocks.visitCells(block, [&](std::size_t cell) {
+        for (std::size_t n = 0; n < channels; ++n) {
+          kernel::LevelInterval& all = grid.blocks[block * channels + n];
+          const kernel::LevelInterval one = grid.intervals[cell * channels + n];
+          all = {std::min(all.lo, one.lo), std::max(all.hi, one.hi)};
+        }
+      });
+  });
   return grid;
 }
 

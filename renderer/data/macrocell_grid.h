@@ -2,6 +2,7 @@
 // Per macrocell and channel: the interval of stored values that any sample inside can take. Made from a
 // Volume once; majorant_grid and the kernels read it.
 #pragma once
+#include <glm/common.hpp>
 #include <memory>
 #include <vector>
 
@@ -27,11 +28,34 @@ struct ValueLevels {
   ValueInterval decode(kernel::LevelInterval interval) const;
 };
 
+/// The blocks of kernel::kBlockEdge cells on an edge that a grid of cells is divided into.
+struct CellBlocks {
+  glm::ivec3 cells, size;  ///< per axis: cells of the grid, and blocks
+  explicit CellBlocks(glm::ivec3 cellsOfGrid)
+      : cells(cellsOfGrid), size((cellsOfGrid + (kernel::kBlockEdge - 1)) / kernel::kBlockEdge) {}
+  std::size_t count() const { return std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z); }
+  /// Calls f(cell) for the cells of a block.
+  template <class F>
+  void visitCells(std::size_t block, F&& f) const {
+    const std::size_t x = std::size_t(size.x), y = std::size_t(size.y);
+    const glm::ivec3 first =
+        glm::ivec3(int(block % x), int(block / x % y), int(block / x / y)) * kernel::kBlockEdge;
+    const glm::ivec3 end = glm::min(first + kernel::kBlockEdge, cells);
+    for (int k = first.z; k < end.z; ++k)
+      for (int j = first.y; j < end.y; ++j) {
+        const std::size_t row =
+            (std::size_t(k) * std::size_t(cells.y) + std::size_t(j)) * std::size_t(cells.x);
+        for (int i = first.x; i < end.x; ++i) f(row + std::size_t(i));
+      }
+  }
+};
+
 struct MacrocellGrid {
   int size = 0;                     ///< voxels per edge
   glm::ivec3 cells{0};              ///< per axis; cell (i,j,k) covers voxel coordinates [i, i+1] * size
   std::vector<ValueLevels> levels;  ///< per channel of the volume
   std::vector<kernel::LevelInterval> intervals;  ///< per cell, x fastest, those of all channels
+  std::vector<kernel::LevelInterval> blocks;     ///< the same of blocks of cells (CellBlocks): what is in any
 
   std::size_t cellCount() const { return std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z); }
   ValueInterval interval(std::size_t cell, std::size_t channel) const {

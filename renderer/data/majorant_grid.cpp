@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <glm/common.hpp>
 
 namespace scolopax {
 namespace {
@@ -13,6 +14,7 @@ namespace {
 using kernel::BoundTable;
 using kernel::kMaxLevels;
 using kernel::LevelInterval;
+using kernel::TotalCode;
 
 /// The intervals of one channel over which two tables may differ: those that reach `first` and begin no later
 /// than `last`.
@@ -33,6 +35,37 @@ void addChange(const BoundTable* before, const BoundTable* after, std::vector<Ch
     last = i;
   }
   if (last >= 0) changes.push_back({(before ? before : after)->column, (first + 1) / 2, last / 2});
+}
+
+/// Calls f(block) for all, from many threads.
+template <class F>
+void forBlocks(const CellBlocks& blocks, F&& f) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.count(), 256), [&](const auto& range) {
+    for (std::size_t block = range.begin(); block < range.end(); ++block) f(block);
+  });
+}
+
+/// From 0 for blocks that are not empty, and kMaxEmptyRadius for the others, to the distance of each to the
+/// nearest that is not empty: the largest of the distances along the axes, and so found axis by axis.
+void measureRadii(glm::ivec3 size, std::vector<std::uint8_t>& radii, std::vector<std::uint8_t>& scratch) {
+  std::size_t stride = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t length = std::size_t(size[axis]);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, radii.size(), 1024), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+        const std::size_t at = i / stride % length;
+        int nearest = radii[i];
+        for (int away = 1; away < nearest; ++away) {
+          const auto step = std::size_t(away);
+          if (at >= step) nearest = std::min(nearest, std::max(away, int(radii[i - step * stride])));
+          if (at + step < length) nearest = std::min(nearest, std::max(away, int(radii[i + step * stride])));
+        }
+        scratch[i] = std::uint8_t(nearest);
+      }
+    });
+    radii.swap(scratch);
+    stride *= length;
+  }
 }
 
 const BoundTable* tableOf(const std::vector<BoundTable>& tables, int column) {
@@ -60,30 +93,66 @@ BoundTable buildBounds(const ValueLevels& levels, const TransferFunction& transf
 
 std::size_t MajorantGrid::update(std::shared_ptr<const MacrocellGrid> macrocells,
                                  std::vector<BoundTable> tables, bool sums) {
-  const bool all = macrocells != macrocells_ || sums != sums_;
+  const bool newCells = macrocells != macrocells_, all = newCells || sums != sums_;
+  const CellBlocks blocks(macrocells->cells);
   std::vector<Change> changes;
   for (int column = 0; column < int(macrocells->levels.size()); ++column)
     addChange(tableOf(tables_, column), tableOf(tables, column), changes);
-  if (macrocells != macrocells_) totals_ = std::vector<float>(macrocells->cellCount());
+  if (!all && changes.empty()) {  // perhaps there are channels more or less that have no extinction anywhere
+    tables_ = std::move(tables);
+    return 0;
+  }
+  std::vector<std::uint8_t> radii(blocks.count()), scratch(blocks.count()), stale(blocks.count());
+  if (newCells) {
+    std::vector<std::uint8_t> noRadii(blocks.count());
+    totals_ = std::vector<TotalCode>(macrocells->cellCount());
+    radii_ = std::move(noRadii);
+  }
   macrocells_ = std::move(macrocells);
   tables_ = std::move(tables);
   sums_ = sums;
-  if (!all && changes.empty()) return 0;
 
   const std::size_t columns = macrocells_->levels.size();
   std::atomic<std::size_t> touched = 0;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, totals_.size(), 4096), [&](const auto& range) {
+  std::atomic<bool> other = false;  // whether other blocks are empty than before
+  const auto meets = [&](const LevelInterval* intervals) {
+    return all || std::any_of(changes.begin(), changes.end(),
+                              [&](const Change& change) { return change.meets(intervals[change.column]); });
+  };
+  // Blocks first: most of them have none of the values that an edit changes.
+  forBlocks(blocks, [&](std::size_t block) {
+    radii[block] = radii_[block] > 0 ? kernel::kMaxEmptyRadius : 0;
+    if (!meets(&macrocells_->blocks[block * columns])) return;
     std::size_t count = 0;
-    for (std::size_t cell = range.begin(); cell < range.end(); ++cell) {
+    bool empty = true;
+    blocks.visitCells(block, [&](std::size_t cell) {
       const LevelInterval* intervals = &macrocells_->intervals[cell * columns];
-      if (!all && std::none_of(changes.begin(), changes.end(),
-                               [&](const Change& change) { return change.meets(intervals[change.column]); }))
-        continue;
-      totals_[cell] = totalOf(intervals);
-      ++count;
-    }
-    touched += count;
+      if (meets(intervals)) {
+        totals_[cell] = kernel::codeOfTotal(totalOf(intervals));
+        ++count;
+      }
+      empty = empty && (totals_[cell] == 0 || totals_[cell] >= kernel::codeOfEmpty(0));
+    });
+    radii[block] = empty ? kernel::kMaxEmptyRadius : 0;
+    stale[block] = count > 0;
+    if (count > 0) touched += count;
+    if (empty != (radii_[block] > 0)) other = true;
   });
+
+  if (other)
+    measureRadii(blocks.size, radii, scratch);
+  else
+    radii = radii_;
+  forBlocks(blocks, [&](std::size_t block) {
+    if (radii[block] == radii_[block] && !(stale[block] && radii[block] > 0)) return;
+    blocks.visitCells(block, [&](std::size_t cell) {
+      if (radii[block] > 0)
+        totals_[cell] = kernel::codeOfEmpty(radii[block]);
+      else if (totals_[cell] >= kernel::codeOfEmpty(0))
+        totals_[cell] = 0;
+    });
+  });
+  radii_ = std::move(radii);
   return touched;
 }
 

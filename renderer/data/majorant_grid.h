@@ -26,11 +26,11 @@ class MajorantGrid {
 
  private:
   float totalOf(const kernel::LevelInterval* intervals) const;
-
   std::shared_ptr<const MacrocellGrid> macrocells_;
   std::vector<kernel::BoundTable> tables_;
   bool sums_ = true;
-  std::vector<float> totals_;
+  std::vector<kernel::TotalCode> totals_;
+  std::vector<std::uint8_t> radii_;  // per block
 };
 
 }  // namespace scolopax

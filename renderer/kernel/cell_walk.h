@@ -31,31 +31,40 @@ SCOLOPAX_HD inline Interval clipToBox(const Ray& ray, glm::ivec3 dims) {
   return inside;
 }
 
+/// Cell after cell along a ray; but where blocks of cells are empty, many cells are one step: from the entry
+/// of the first to the exit of the last, at which the walk then stands. What is not empty is visited as
+/// without that, to the last bit.
 class CellWalk {
  public:
   SCOLOPAX_HD CellWalk(const Ray& ray, Interval inside, const MajorantView& grid)
-      : ray_(ray), grid_(grid), end_(inside.exit), enter_(inside.enter) {
-    const float inverseSize = 1.0f / grid.cellSize;
+      : ray_(ray), grid_(grid), end_(inside.exit), enter_(inside.enter), inverseSize_(1.0f / grid.cellSize) {
+    std::int64_t stride = 1;
     for (int axis = 0; axis < 3; ++axis) {
-      const float at = (ray.origin[axis] + inside.enter * ray.direction[axis]) * inverseSize;
-      cell_[axis] = int(clamp(at, 0.0f, float(grid.cells[axis] - 1)));
+      const float at = (ray.origin[axis] + inside.enter * ray.direction[axis]) * inverseSize_;
+      const int last = grid.cells[axis] - 1, cell = int(clamp(at, 0.0f, float(last)));
+      const bool up = ray.direction[axis] > 0.0f;
+      cell_[axis] = cell;
+      last_[axis] = ray.direction[axis] == 0.0f ? cell : up ? last : 0;
+      step_[axis] = up ? 1 : -1;
+      stride_[axis] = up ? stride : -stride;
+      index_ += cell * stride;
+      stride *= grid.cells[axis];
+      plane_[axis] = float(cell + (up ? 1 : 0)) * grid.cellSize;
+      planeStep_[axis] = up ? grid.cellSize : -grid.cellSize;
       // Finite also for a denormal direction: a plane at distance 0 is at t = 0, not NaN.
       inverseDirection_[axis] = clamp(1.0f / ray.direction[axis], -kLargestFinite, kLargestFinite);
-      next_[axis] = planeAfter(axis);
+      next_[axis] = exitThrough(axis);
     }
     leave();
+    leapIfEmpty();
   }
 
-  /// Segment of the ray in the current cell; exit >= enter.
+  /// Segment of the ray in the current cell, or the cells that were leapt over with it; exit >= enter.
   SCOLOPAX_HD float enter() const { return enter_; }
   SCOLOPAX_HD float exit() const { return exit_; }
 
   /// Offset of the current cell's entry, in cells.
-  SCOLOPAX_HD std::size_t index() const {
-    return (std::size_t(cell_.z) * std::size_t(grid_.cells.y) + std::size_t(cell_.y)) *
-               std::size_t(grid_.cells.x) +
-           std::size_t(cell_.x);
-  }
+  SCOLOPAX_HD std::size_t index() const { return std::size_t(index_); }
 
   /// Moves to the next cell; false at the end of the ray.
   SCOLOPAX_HD bool advance() {
@@ -63,11 +72,14 @@ class CellWalk {
     // A loop over constant indices: what a variable indexes cannot stay in a GPU's registers.
     for (int axis = 0; axis < 3; ++axis) {
       if (axis != axis_) continue;
-      cell_[axis] += ray_.direction[axis] > 0.0f ? 1 : -1;
-      next_[axis] = planeAfter(axis);
+      cell_[axis] += step_[axis];
+      index_ += stride_[axis];
+      plane_[axis] += planeStep_[axis];  // whole numbers: exact
+      next_[axis] = exitThrough(axis);
     }
     enter_ = exit_;
     leave();
+    leapIfEmpty();
     return true;
   }
 
@@ -86,24 +98,72 @@ class CellWalk {
   }
 
  private:
+  /// Where the ray crosses the k-th plane of cells on its way, 0 being the next.
+  SCOLOPAX_HD float planeAt(int axis, int k) const {
+    return (plane_[axis] + float(k) * planeStep_[axis] - ray_.origin[axis]) * inverseDirection_[axis];
+  }
   /// Where the ray leaves the current cell through `axis`; infinity where the box ends or it never does.
-  SCOLOPAX_HD float planeAfter(int axis) const {
-    const bool up = ray_.direction[axis] > 0.0f;
-    if (ray_.direction[axis] == 0.0f || cell_[axis] == (up ? grid_.cells[axis] - 1 : 0)) return kInfinity;
-    const float plane = float(cell_[axis] + (up ? 1 : 0)) * grid_.cellSize;
-    return (plane - ray_.origin[axis]) * inverseDirection_[axis];
+  SCOLOPAX_HD float exitThrough(int axis) const {
+    return cell_[axis] == last_[axis] ? kInfinity : planeAt(axis, 0);
   }
   SCOLOPAX_HD void leave() {
-    axis_ = next_.x <= next_.y ? (next_.x <= next_.z ? 0 : 2) : (next_.y <= next_.z ? 1 : 2);
+    axis_ = nearestOf(next_);
     exit_ = maximum(enter_, minimum(axis_ == 0 ? next_.x : axis_ == 1 ? next_.y : next_.z, end_));
+  }
+  /// A leap costs as much as some steps, so that one over a single block does not pay.
+  SCOLOPAX_HD void leapIfEmpty() {
+    if (!grid_.totals) return;
+    const int radius = grid_.emptyRadius(index());
+    if (radius > 1) leap(radius);
+  }
+  SCOLOPAX_HD static int nearestOf(const glm::vec3& t) {
+    return t.x <= t.y ? (t.x <= t.z ? 0 : 2) : (t.y <= t.z ? 1 : 2);
+  }
+
+  /// Goes on to the last cell along the ray of the empty cube of blocks around the current one: over all
+  /// planes that come before the cube's own, in the order in which leave() takes them.
+  SCOLOPAX_HD void leap(int radius) {
+    glm::ivec3 most;  // steps to the side of the cube that the ray goes to
+    glm::vec3 side;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int into = cell_[axis] & (kBlockEdge - 1);
+      const int toSide = (step_[axis] > 0 ? kBlockEdge - 1 - into : into) + kBlockEdge * (radius - 1);
+      const int toLast = (last_[axis] - cell_[axis]) * step_[axis];
+      most[axis] = toSide < toLast ? toSide : toLast;
+      side[axis] = toSide < toLast ? planeAt(axis, toSide) : kInfinity;
+    }
+    const int out = nearestOf(side);
+    const float nearest = out == 0 ? side.x : out == 1 ? side.y : side.z;
+    if (!(nearest < end_)) {  // nothing but empty cells is left
+      exit_ = maximum(enter_, end_);
+      return;
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto crosses = [&](int k) {
+        return axis < out ? planeAt(axis, k) <= nearest : planeAt(axis, k) < nearest;
+      };
+      int steps = most[axis];
+      if (axis != out) {
+        const float way = ray_.origin[axis] + nearest * ray_.direction[axis] - plane_[axis];
+        steps = int(clamp(way * float(step_[axis]) * inverseSize_ + 1.0f, 0.0f, float(steps)));
+        while (steps < most[axis] && crosses(steps)) ++steps;
+        while (steps > 0 && !crosses(steps - 1)) --steps;
+      }
+      cell_[axis] += steps * step_[axis];
+      index_ += steps * stride_[axis];
+      plane_[axis] += float(steps) * planeStep_[axis];
+      next_[axis] = exitThrough(axis);
+    }
+    leave();
   }
 
   Ray ray_;
   MajorantView grid_;
-  float end_, enter_, exit_ = 0.0f;
+  float end_, enter_, inverseSize_, exit_ = 0.0f;
   int axis_ = 0;
-  glm::ivec3 cell_;
-  glm::vec3 inverseDirection_, next_;
+  glm::ivec3 cell_, last_, step_;
+  std::int64_t index_ = 0, stride_[3];
+  glm::vec3 plane_, planeStep_, inverseDirection_, next_;
 };
 
 }  // namespace scolopax::kernel

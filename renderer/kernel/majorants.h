@@ -35,19 +35,38 @@ struct BoundTable {
   }
 };
 
+/// Cells form blocks of this many on an edge, which a walk leaps over where they are empty.
+inline constexpr int kBlockEdge = 4;
+inline constexpr int kMaxEmptyRadius = 8;
+
+/// Bound of all visible channels together in a cell: the upper half of a float, so that it is rounded up by
+/// at most 1/128. With the sign bit, the bound is 0, and the rest is how far around nothing is (emptyRadius).
+using TotalCode = std::uint16_t;
+SCOLOPAX_HD inline TotalCode codeOfTotal(float total) {
+  return TotalCode((std::bit_cast<std::uint32_t>(total) + 0xffffu) >> 16);
+}
+SCOLOPAX_HD inline TotalCode codeOfEmpty(int radius) { return TotalCode(0x8000 | radius); }
+
 /// Cell (i,j,k), at cells' index (k * cells.y + j) * cells.x + i, covers voxel coordinates [i, i+1] *
 /// cellSize; the outer cells reach to the faces of the box.
 struct MajorantView {
   glm::ivec3 cells;
   float cellSize;
-  const float* totals;             ///< per cell
+  const TotalCode* totals;         ///< per cell
   const LevelInterval* intervals;  ///< per cell: those of `columns` channels of the volume
   int columns;
   const BoundTable* tables;  ///< per visible channel
 
   /// Bound of all visible channels together: of the sum of their extinctions, or, for blend modes that show
   /// one channel at a point, of the largest. Not below the sum (or maximum) of their bounds.
-  SCOLOPAX_HD float total(std::size_t cell) const { return totals[cell]; }
+  SCOLOPAX_HD float total(std::size_t cell) const {
+    return totals[cell] < 0x8000u ? std::bit_cast<float>(std::uint32_t(totals[cell]) << 16) : 0.0f;
+  }
+  /// Greatest r such that the blocks that are less than r blocks away from the cell's, along every axis, are
+  /// empty; at most kMaxEmptyRadius.
+  SCOLOPAX_HD int emptyRadius(std::size_t cell) const {
+    return totals[cell] < 0x8000u ? 0 : totals[cell] - 0x8000;
+  }
   /// Bound of visible channel n.
   SCOLOPAX_HD float bound(std::size_t cell, int n) const {
     return tables[n].over(intervals[cell * std::size_t(columns) + std::size_t(tables[n].column)]);

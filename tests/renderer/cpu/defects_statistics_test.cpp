@@ -101,10 +101,12 @@ class Defect : public testing::Test {
   }
   /// Bounds of all channels together, and of each, that a test can write to.
   struct Bounds {
-    std::vector<float> totals;
+    std::vector<kernel::TotalCode> totals;
     std::vector<kernel::BoundTable> tables;
     void scale(float factor) {
-      for (float& total : totals) total *= factor;
+      for (kernel::TotalCode& total : totals)
+        if (total < kernel::codeOfEmpty(0))
+          total = kernel::codeOfTotal(std::bit_cast<float>(std::uint32_t(total) << 16) * factor);
       for (kernel::BoundTable& table : tables)
         for (auto& row : table.largest)
           for (float& bound : row) bound *= factor;
@@ -158,8 +160,8 @@ TEST_F(Defect, OfTheBoundOfMaxInBlendModeDensityIsFound) {
   EXPECT_FALSE((passes<kernel::Cumulative, kernel::BlendDensity>([&](SceneView& view) {
     auto& totals = ownMajorants(view).totals;
     for (std::size_t i = 0; i < totals.size(); ++i)
-      totals[i] =
-          std::max({view.majorants.bound(i, 0), view.majorants.bound(i, 1), view.majorants.bound(i, 2)});
+      totals[i] = kernel::codeOfTotal(
+          std::max({view.majorants.bound(i, 0), view.majorants.bound(i, 1), view.majorants.bound(i, 2)}));
   })));
 }
 

@@ -176,5 +176,108 @@ TEST(CellWalk, OfRaysWithoutSenseIsBoundedAndSeesNothingWhereTheyAreNotFinite) {
   }
 }
 
+/// Totals of a grid with some cells that are not empty, and the same without what makes a walk leap.
+struct Emptiness {
+  std::vector<TotalCode> leaping, plain;
+  Emptiness(const MajorantView& grid, std::mt19937& random, int filled) : plain(cellCount(grid)) {
+    const glm::ivec3 n = grid.cells;
+    const auto blockOf = [&](std::size_t i) {
+      return glm::ivec3(int(i) % n.x, int(i) / n.x % n.y, int(i) / n.x / n.y) / kBlockEdge;
+    };
+    std::vector<glm::ivec3> blocks;
+    for (int i = 0; i < filled; ++i) {
+      const std::size_t cell = random() % plain.size();
+      plain[cell] = codeOfTotal(1);
+      blocks.push_back(blockOf(cell));
+    }
+    leaping = plain;
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+      int radius = kMaxEmptyRadius;
+      for (const glm::ivec3 block : blocks) {
+        const glm::ivec3 away = glm::abs(blockOf(i) - block);
+        radius = std::min(radius, std::max({away.x, away.y, away.z}));
+      }
+      if (radius > 0) leaping[i] = codeOfEmpty(radius);
+    }
+  }
+};
+
+TEST(CellWalk, LeapsOverEmptyBlocksAndVisitsWhatIsNotEmptyAsItWouldWithout) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  long plainSteps = 0, leapingSteps = 0, visited = 0;
+  struct Visit {
+    std::size_t cell;
+    float enter, exit;
+    glm::vec3 middle;
+    bool operator==(const Visit&) const = default;
+  };
+  for (const glm::ivec3 dims : {glm::ivec3(63, 50, 41), glm::ivec3(97, 2, 33), glm::ivec3(30, 31, 29)})
+    for (const int size : {1, 2, 3})
+      for (const int filled : {0, 5, 60}) {
+        MajorantView grid = gridFor(dims, size);
+        const Emptiness totals(grid, random, filled);
+        for (int trial = 0; trial < 2000; ++trial) {
+          Ray ray;
+          for (int axis = 0; axis < 3; ++axis) {
+            const float where = (uniform(random) * 0.5f + 0.5f) * float(dims[axis]) - 0.5f;
+            ray.origin[axis] = random() % 3 == 0 ? std::floor(where) : where;  // often on a face of cells
+            const auto kind = random() % 8;
+            ray.direction[axis] = kind == 0 ? 0.0f : kind == 1 ? 1.0f : kind == 2 ? 1e-39f : uniform(random);
+          }
+          if (ray.direction == glm::vec3(0)) continue;
+          ray.origin -= ray.direction * float(random() % 3) * 64.0f;
+          const Interval inside = clipToBox(ray, dims);
+          if (!(inside.enter < inside.exit)) continue;
+          const auto follow = [&](const std::vector<TotalCode>& codes, long* steps) {
+            grid.totals = codes.data();
+            CellWalk walk(ray, inside, grid);
+            std::vector<Visit> visits;
+            float last = inside.enter;
+            do {
+              ++*steps;
+              EXPECT_EQ(walk.enter(), last);
+              last = walk.exit();
+              EXPECT_LE(walk.enter(), last);
+              if (grid.total(walk.index()) > 0)
+                visits.push_back({walk.index(), walk.enter(), last, walk.pointAt((walk.enter() + last) / 2)});
+            } while (walk.advance());
+            EXPECT_EQ(last, inside.exit);
+            return visits;
+          };
+          const auto expected = follow(totals.plain, &plainSteps);
+          const auto found = follow(totals.leaping, &leapingSteps);
+          ASSERT_TRUE(expected == found) << "size " << size << " trial " << trial;
+          visited += long(found.size());
+        }
+      }
+  EXPECT_GT(visited, 1000);
+  EXPECT_LT(leapingSteps, plainSteps / 2);
+}
+
+TEST(CellWalk, OfRaysWithoutSenseThroughEmptyBlocksIsBounded) {
+  const float values[] = {0.0f,  -0.0f,     0.3f, -1.0f,     4.0f,      kDenormal,
+                          1e30f, -kLargest, kNaN, kInfinity, -kInfinity};
+  std::mt19937 random(4);
+  const glm::ivec3 dims(23, 14, 61);
+  MajorantView grid = gridFor(dims, 1);
+  const Emptiness totals(grid, random, 2);
+  grid.totals = totals.leaping.data();
+  for (int trial = 0; trial < 100'000; ++trial) {
+    Ray ray;
+    for (int i = 0; i < 6; ++i)
+      (i < 3 ? ray.origin[i] : ray.direction[i - 3]) = values[random() % std::size(values)];
+    for (const Interval interval :
+         {clipToBox(ray, dims), Interval{0, 10}, Interval{-kInfinity, kInfinity}, Interval{kNaN, kNaN}}) {
+      CellWalk walk(ray, interval, grid);
+      int steps = 0;
+      do {
+        ASSERT_LE(steps++, longestWalk(grid)) << trial;
+        ASSERT_LT(walk.index(), cellCount(grid)) << trial;
+      } while (walk.advance());
+    }
+  }
+}
+
 }  // namespace
 }  // namespace scolopax::kernel

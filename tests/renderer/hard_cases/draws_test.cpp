@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <vector>
 
@@ -33,6 +34,12 @@ using namespace test;
 constexpr std::uint32_t kLow = 0, kHigh = 0xffffffffu;
 const Ray kAlongZ{{0, 0, -3}, {0, 0, 1}};
 
+/// The next density below that the total of a macrocell holds exactly: the bound is then the extinction
+/// itself, and the law of a single draw is known to the last bits.
+double heldExactly(double density) {
+  return double(std::bit_cast<float>(std::bit_cast<std::uint32_t>(float(density)) & 0xffff0000u));
+}
+
 struct Outcome {
   std::optional<Collision> hit;
   SampleCost cost;
@@ -58,7 +65,8 @@ TYPED_TEST(Draws, AtTheirEndsOnlyHitChannelsThatHaveExtinction) {
   const auto one = [](int, int, int) { return 1; };
   const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, zero), channelOf<float>(dims, one),
                                channelOf<float>(dims, one), channelOf<float>(dims, zero));
-  for (const double density : {1e-6, 0.3, 30.0, 1e6}) {
+  for (const double wanted : {1e-6, 0.3, 30.0, 1e6}) {
+    const double density = heldExactly(wanted);
     Scene scene = frontScene(*volume, 1, 1);
     for (auto& channel : scene.channels) channel.density = density;  // a ramp: 0 in the outer two
     RenderPlan plan(volume);
@@ -88,6 +96,7 @@ TYPED_TEST(Draws, ThatNeverAcceptNorAdvanceEndAtTheBound) {
       volumeOf(gridOf(dims), channelOf<float>(dims, [](int, int, int z) { return float(z); }));
   Scene scene = frontScene(*volume, 1, 1);
   scene.channels[0].rangeHi = 5;
+  scene.channels[0].opacity = {{0, 0}, {0.5, 1}};  // 0 at the box's face, 1 is the bound of every cell
   RenderPlan plan(volume);
   plan.update(scene);
   const Outcome found = track<TypeParam>(plan, {kLow, kHigh, kHigh, 0});
@@ -103,10 +112,11 @@ TYPED_TEST(Draws, EndTheFlightWhereTheOpticalDepthSaysFromOneMillionthToOneMilli
   // one.
   for (const int macrocell : {1, 7, 64}) {
     if ((std::is_same_v<TypeParam, SyncDda> || std::is_same_v<TypeParam, NDda>)&&macrocell < 64) continue;
-    for (const double thickness : {1e-6, 1e-5, 1e-3, 0.1, 1.0, 5.0, 15.0, 100.0, 1e3, 1e6}) {
+    for (const double wanted : {1e-6, 1e-5, 1e-3, 0.1, 1.0, 5.0, 15.0, 100.0, 1e3, 1e6}) {
+      const double density = heldExactly(wanted / 40), thickness = density * 40;
       Scene scene = frontScene(*volume, 1, 1);
       scene.macrocell = macrocell;
-      scene.channels[0] = solid(thickness / 40);
+      scene.channels[0] = solid(density);
       RenderPlan plan(volume);
       plan.update(scene);
       // First k whose flight leaves the box: its place among all 2^32 is the probability of a collision.
