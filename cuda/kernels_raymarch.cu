@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cuda/pixel_kernels.h"
+#include "renderer/kernel/raymarch.h"
 
 namespace scolopax::cuda {
 

@@ -6,8 +6,8 @@
 namespace scolopax::cuda {
 
 Passes::Passes(const Scene& scene, const kernel::SceneView& view, bool counting)
-    : launch_(
-          visitIntegrator(scene, [&](auto integrator) { return chooseLaunch<decltype(integrator)>(scene); })),
+    : launch_(visitIntegrator(scene,
+                              [&](auto type) { return chooseLaunch<typename decltype(type)::type>(scene); })),
       scene_(view),
       pixels_(std::size_t(view.width) * std::size_t(view.height)),
       cost_(counting ? pixels_.count() : 0) {

@@ -6,7 +6,9 @@
 
 #include "cuda/launch.h"
 #include "renderer/data/instances.h"
+#include "renderer/kernel/blend_modes.h"
 #include "renderer/kernel/render_pixel.h"
+#include "renderer/kernel/shade.h"
 
 namespace scolopax::cuda {
 
@@ -34,7 +36,7 @@ cudaError_t launch(const DevicePass& pass) {
 template <class Integrator>
 LaunchFunction chooseLaunch(const Scene& scene) {
   return visitBlendAndLight(scene, [](auto blend, auto features) -> LaunchFunction {
-    return launch<Integrator, decltype(blend), decltype(features)>;
+    return launch<Integrator, typename decltype(blend)::type, typename decltype(features)::type>;
   });
 }
 

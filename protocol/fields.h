@@ -151,12 +151,12 @@ struct Table<Camera> {
 template <>
 struct Table<Integrator> {
   static constexpr std::string_view title = "Integrator";
-  static constexpr std::string_view doc = "How the picture is computed; the expected picture is the same.";
+  static constexpr std::string_view doc = "How the picture is computed; all methods draw the same, but for noise and bias.";
   static constexpr auto fields = std::tuple{
-      field("method", &Integrator::method, "Tracking method.", {.names = &Lists::methods}),
+      field("method", &Integrator::method, "What follows the rays.", {.names = &Lists::methods}),
       field("macrocell", &Integrator::macrocell, "Edge of the cells that bound the extinction.",
             {.unit = "voxels", .atLeast = 1, .atMost = 64}),
-      field("step", &Integrator::step, "Step of the ray marcher; trackers have none.",
+      field("step", &Integrator::step, "Step of raymarch and hybrid; auto finds its own.",
             {.unit = "smallest voxel spacing", .atLeast = 0.01, .atMost = 100}),
       field("sampling", &Integrator::sampling, "How the numbers of a pixel's samples are drawn.",
             {.names = &Lists::samplings}),

@@ -33,6 +33,13 @@ struct RenderStats {
   std::uint64_t truncatedRays = 0;  ///< ended by the bound on null collisions: thicker than can be tracked
 };
 
+/// How a scene is rendered: as it says, or for Method::automatic as the backend has chosen from scene and
+/// data.
+struct Choice {
+  Method method;
+  double step;  ///< of quadrature, in smallest spacings; 0 for trackers, which have none
+};
+
 class Renderer {
  public:
   virtual ~Renderer() = default;
@@ -44,9 +51,11 @@ class Renderer {
   /// stopped, unless a new scene came in between.
   virtual bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget = kNoBudget) = 0;
   static constexpr std::chrono::nanoseconds kNoBudget = std::chrono::hours(24 * 365);
+  virtual Choice choice() const = 0;
   /// Samples per pixel in the film.
   virtual std::uint32_t samples() const = 0;
-  /// Estimated RMSE over linear premultiplied RGB of the picture as it stands; NaN below two samples.
+  /// Estimated RMSE over linear premultiplied RGB of the picture as it stands, of noise and, for quadrature,
+  /// bias; NaN below two samples.
   virtual double estimatedError() const = 0;
   /// From now on, count what samples cost; costs a little time and 16 bytes a pixel. Call before setScene.
   virtual void countCosts() = 0;

@@ -21,8 +21,6 @@ namespace {
 using nlohmann::json;
 using protocol::ProtocolError;
 
-constexpr std::string_view kAutoMethod = "auto";
-
 std::vector<protocol::EnumEntry> entries(std::span<const NamedValue> values) {
   std::vector<protocol::EnumEntry> list;
   for (const NamedValue& value : values) list.push_back({std::string(value.name), std::string(value.doc)});
@@ -125,8 +123,9 @@ void resolveLights(const protocol::Scene& scene, Scene& render) {
 }
 
 /// What of the resolved scene decides the picture at a sample count.
-json pictureOf(json resolved) {
+json pictureOf(json resolved, const Scene& render) {
   resolved.erase("stop");
+  resolved["targetError"] = render.targetError;
   for (json& channel : resolved["channels"]) channel.erase("name");
   return resolved;
 }
@@ -137,7 +136,6 @@ protocol::Lists rendererLists() {
   protocol::Lists lists;
   lists.blendModes = entries(kBlendModes);
   lists.methods = entries(kMethods);
-  lists.methods.insert(lists.methods.begin(), {std::string(kAutoMethod), "chosen by the server"});
   lists.filters = entries(kPixelFilters);
   lists.samplings = entries(kSamplings);
   lists.colormaps = entries(colormaps());
@@ -189,8 +187,9 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
   resolveCamera(scene, render, volume.grid());
   resolveLights(scene, render);
   render.blend = valueOf<BlendMode>(kBlendModes, scene.blend.mode);
-  render.method = scene.integrator.method == kAutoMethod ? Method::superposed
-                                                         : valueOf<Method>(kMethods, scene.integrator.method);
+  render.method = valueOf<Method>(kMethods, scene.integrator.method);
+  if (render.method == Method::automatic && scene.stop.error.value_or(0) > 0)
+    render.targetError = *scene.stop.error;
   render.macrocell = int(scene.integrator.macrocell);
   render.step = scene.integrator.step;
   render.sampling = valueOf<Sampling>(kSamplings, scene.integrator.sampling);
@@ -204,7 +203,7 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
   result->stop = {scene.stop.samples.value_or(0), scene.stop.seconds.value_or(0),
                   scene.stop.error.value_or(0)};
   result->resolved = protocol::toJson(scene);
-  result->picture = pictureOf(result->resolved);
+  result->picture = pictureOf(result->resolved, render);
   result->sparse = std::move(sparse);
   return result;
 }

@@ -4,13 +4,18 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <new>
+#include <optional>
 #include <string>
 
 #include "renderer/core/error.h"
-#include "renderer/cpu/tile_kernels.h"
+#include "renderer/cpu/pass.h"
+#include "renderer/cpu/sample_batch.h"
+#include "renderer/cpu/thumbnails.h"
 #include "renderer/data/film.h"
+#include "renderer/data/instances.h"
 #include "renderer/data/render_plan.h"
 #include "renderer/data/sampling.h"
 #include "renderer/renderer.h"
@@ -18,9 +23,11 @@
 namespace scolopax {
 namespace {
 
-TileFunction chooseKernel(const Scene& scene) {
+/// Without light there is nothing that a shadow could take away.
+TileFunction chooseKernel(Scene scene, const kernel::SceneView& view) {
+  scene.shadows = scene.shadows && view.lightCount > 0;
   return visitIntegrator(scene,
-                         [&](auto integrator) { return chooseTileFunction<decltype(integrator)>(scene); });
+                         [&](auto type) { return chooseTileFunction<typename decltype(type)::type>(scene); });
 }
 
 class CpuRenderer final : public Renderer {
@@ -37,17 +44,25 @@ class CpuRenderer final : public Renderer {
     checkImageSize(scene);
     if (newSize) resized.reset(scene.width, scene.height);
     RebuildStats stats;
-    arena_.execute([&] { stats = plan_.update(scene); });
+    arena_.execute([&] { stats = take(scene); });
     if (newSize)
       film_ = std::move(resized);
     else if (stats.filmReset)
       film_.reset(scene.width, scene.height);
-    if (stats.filmReset) resetRecords();
+    if (stats.filmReset) {
+      resetRecords();
+      bias_.reset();
+    }
     return stats;
+  }
+  Choice choice() const override {
+    const Scene& scene = plan_.scene();
+    return {scene.method, hasStep(scene.method) ? scene.step : 0};
   }
 
   bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
-    const kernel::SceneView& scene = plan_.view();
+    kernel::SceneView scene = plan_.view();
+    scene.sampleBatch = sampleBatchFor(fastestInstructionSet());
     const Pass pass{scene,
                     sampleNumber(plan_.scene().sampling, film_.samples()),
                     film_.pass(),
@@ -56,7 +71,7 @@ class CpuRenderer final : public Renderer {
                     done_.data(),
                     &cancel,
                     std::chrono::steady_clock::now() + budget};
-    const TileFunction renderTileAt = chooseKernel(plan_.scene());
+    const TileFunction renderTileAt = chooseKernel(plan_.scene(), scene);
     const int tilesX = (scene.width + kTile - 1) / kTile, tilesY = (scene.height + kTile - 1) / kTile;
     bool complete = false;
     arena_.execute([&] {
@@ -72,7 +87,12 @@ class CpuRenderer final : public Renderer {
   }
 
   std::uint32_t samples() const override { return film_.samples(); }
-  double estimatedError() const override { return film_.estimatedError(); }
+  double estimatedError() const override {
+    const double noise = film_.estimatedError();
+    if (std::isnan(noise) || !hasStep(plan_.scene().method)) return noise;
+    if (!bias_) arena_.execute([&] { bias_ = estimateBias(plan_); });
+    return std::hypot(noise, *bias_);
+  }
   Image image() const override { return film_.image(); }
 
   void countCosts() override {
@@ -113,6 +133,29 @@ class CpuRenderer final : public Renderer {
   }
 
  private:
+  /// Updates the plan; what is left to us of the scene is chosen.
+  RebuildStats take(const Scene& scene) {
+    Scene chosen = scene;
+    chosen.targetError = 0;  // makes no picture of its own
+    if (scene.method != Method::automatic) return plan_.update(chosen);
+    // The choice before, if there was one: when nothing else is new either, the film goes on.
+    chosen.method = automatic_.method;
+    chosen.step = automatic_.step;
+    RebuildStats stats = plan_.update(chosen);
+    if (!stats.filmReset && scene.targetError == target_) return stats;
+    // Half of the error is left to noise, and light, with which this is not tried, may add to the bias.
+    const auto step = largestStep(plan_, scene.targetError / (scene.shading || scene.shadows ? 4 : 2));
+    automatic_ = step ? Choice{Method::raymarch, *step} : Choice{Method::superposed, Scene().step};
+    target_ = scene.targetError;
+    if (automatic_.method == chosen.method && automatic_.step == chosen.step) return stats;
+    chosen.method = automatic_.method;
+    chosen.step = automatic_.step;
+    const RebuildStats again = plan_.update(chosen);
+    stats.filmReset = stats.filmReset || again.filmReset;
+    stats.rebuildMs += again.rebuildMs;
+    return stats;
+  }
+
   void resetRecords() {
     const std::size_t pixels = film_.pixelCount();
     stats_ = {};
@@ -150,7 +193,10 @@ class CpuRenderer final : public Renderer {
   RenderStats stats_;
   std::vector<std::uint64_t> fetches_;  // one per pixel while recording
   FirstCollisions first_;
-  tbb::task_arena arena_;
+  Choice automatic_{Method::raymarch, 1};
+  double target_ = 0;                   // for which it was made
+  mutable std::optional<double> bias_;  // of the film, once somebody has asked for its error
+  mutable tbb::task_arena arena_;
 };
 
 }  // namespace

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/cpu/tile_kernels.h"
+#include "renderer/kernel/analog.h"
+#include "renderer/kernel/trackers/process_per_channel.h"
 
 namespace scolopax {
 

@@ -1,41 +1,61 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which instance of the kernels a scene asks for: the one place where launchers turn values into types.
 #pragma once
+#include <type_traits>
+
 #include "renderer/data/scene.h"
-#include "renderer/kernel/analog.h"
-#include "renderer/kernel/raymarch.h"
-#include "renderer/kernel/trackers/one_process.h"
-#include "renderer/kernel/trackers/process_per_channel.h"
+
+namespace scolopax::kernel {
+// Only named: who compiles an integrator includes it, and no other.
+template <class Tracker>
+struct Analog;
+struct Superposed;
+struct Cumulative;
+struct SyncDda;
+struct NDda;
+struct RayMarch;
+struct BlendDensity;
+struct BlendMax;
+struct BlendMix;
+struct BlendComposite;
+template <bool kShadingOn, bool kShadowsOn>
+struct LightFeatures;
+}  // namespace scolopax::kernel
 
 namespace scolopax {
 
-/// Returns f(Integrator{}).
+/// Returns f(std::type_identity<Integrator>{}). The method is not `automatic`: a backend chooses first.
 template <class F>
 auto visitIntegrator(const Scene& scene, F&& f) {
   switch (scene.method) {
+    case Method::automatic:
     case Method::superposed:
-      return f(kernel::Analog<kernel::Superposed>{});
+      return f(std::type_identity<kernel::Analog<kernel::Superposed>>{});
     case Method::cumulative:
-      return f(kernel::Analog<kernel::Cumulative>{});
+      return f(std::type_identity<kernel::Analog<kernel::Cumulative>>{});
     case Method::syncDda:
-      return f(kernel::Analog<kernel::SyncDda>{});
+      return f(std::type_identity<kernel::Analog<kernel::SyncDda>>{});
     case Method::nDda:
-      return f(kernel::Analog<kernel::NDda>{});
+      return f(std::type_identity<kernel::Analog<kernel::NDda>>{});
     case Method::raymarch:
+    case Method::hybrid:
       break;
   }
-  return f(kernel::RayMarch{});
+  return f(std::type_identity<kernel::RayMarch>{});
 }
 
-/// Returns f(LightFeatures<...>{}).
+/// Returns f(std::type_identity<LightFeatures<...>>{}).
 template <class F>
 auto visitLight(const Scene& scene, F&& f) {
-  using kernel::LightFeatures;
-  if (scene.shading) return scene.shadows ? f(LightFeatures<true, true>{}) : f(LightFeatures<true, false>{});
-  return scene.shadows ? f(LightFeatures<false, true>{}) : f(LightFeatures<false, false>{});
+  const auto with = [&]<bool kShading, bool kShadows>() {
+    return f(std::type_identity<kernel::LightFeatures<kShading, kShadows>>{});
+  };
+  if (scene.shading)
+    return scene.shadows ? with.template operator()<true, true>() : with.template operator()<true, false>();
+  return scene.shadows ? with.template operator()<false, true>() : with.template operator()<false, false>();
 }
 
-/// Returns f(Blend{}, LightFeatures<...>{}).
+/// Returns f(std::type_identity<Blend>{}, std::type_identity<LightFeatures<...>>{}).
 template <class F>
 auto visitBlendAndLight(const Scene& scene, F&& f) {
   const auto with = [&](auto blend) {
@@ -43,15 +63,15 @@ auto visitBlendAndLight(const Scene& scene, F&& f) {
   };
   switch (scene.blend) {
     case BlendMode::density:
-      return with(kernel::BlendDensity{});
+      return with(std::type_identity<kernel::BlendDensity>{});
     case BlendMode::max:
-      return with(kernel::BlendMax{});
+      return with(std::type_identity<kernel::BlendMax>{});
     case BlendMode::mix:
-      return with(kernel::BlendMix{});
+      return with(std::type_identity<kernel::BlendMix>{});
     case BlendMode::composite:
       break;
   }
-  return with(kernel::BlendComposite{});
+  return with(std::type_identity<kernel::BlendComposite>{});
 }
 
 }  // namespace scolopax

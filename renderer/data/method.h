@@ -20,13 +20,17 @@ namespace scolopax {
     "every channel is drawn by itself and the pictures are added: what is in front is lost")
 
 #define SCOLOPAX_METHODS(X) /* Listings 3 (n-dda, mended) and 4 (sync-dda); section 5.1 (cumulative) */     \
+  X(automatic, "auto",                                                                                      \
+    "raymarch with the largest step whose bias stays below the error asked for, else superposed")           \
   X(superposed, "superposed",                                                                               \
     "follows all channels at once and looks up one of them a step; exact but for noise")                    \
   X(cumulative, "cumulative",                                                                               \
     "follows all channels at once and looks up all of them a step; exact but for noise")                    \
   X(syncDda, "sync-dda", "follows one channel after the other inside each small cell; exact but for noise") \
   X(nDda, "n-dda", "follows every channel by itself, the nearest hit wins; exact but for noise")            \
-  X(raymarch, "raymarch", "equal steps along the ray: little noise, but the picture depends on the step")
+  X(raymarch, "raymarch", "equal steps along the ray: little noise, and a bias that falls with the step")   \
+  X(hybrid, "hybrid",                                                                                       \
+    "as raymarch, with light worked out at eight places of a ray: faster and noisier where light is costly")
 
 #define SCOLOPAX_LIGHT_TYPES(X)                                                   \
   X(directional, "directional", "parallel rays that travel along `direction`")    \
@@ -67,9 +71,8 @@ SCOLOPAX_DECLARE_ENUM(PixelFilter, SCOLOPAX_PIXEL_FILTERS, kPixelFilters)
 SCOLOPAX_DECLARE_ENUM(Sampling, SCOLOPAX_SAMPLINGS, kSamplings)
 SCOLOPAX_DECLARE_ENUM(Aov, SCOLOPAX_AOVS, kAovs)
 
-/// Whether Scene::step is of account, and with it a bias that goes to 0 with the step; the others are
-/// unbiased.
-constexpr bool hasStep(Method method) { return method == Method::raymarch; }
+/// Whether a method has a step, and a bias that falls with it.
+constexpr bool hasStep(Method method) { return method == Method::raymarch || method == Method::hybrid; }
 
 #undef SCOLOPAX_ENUM_ENTRY
 #undef SCOLOPAX_NAMED_ENTRY

@@ -13,6 +13,8 @@
 namespace scolopax {
 namespace {
 
+static_assert(kMaxChannels <= kernel::kMaxVisibleChannels);
+
 /// Whether the same voxels have the same extinction: what bounds depend on.
 bool sameExtinction(const ChannelAppearance& a, const ChannelAppearance& b) {
   return a.rangeLo == b.rangeLo && a.rangeHi == b.rangeHi && a.gamma == b.gamma && a.density == b.density &&
@@ -164,6 +166,7 @@ RebuildStats RenderPlan::update(const Scene& scene) {
   view_.channelCount = int(channelViews_.size());
   view_.channels = channelViews_.data();
   view_.step = view_.smallestSpacing * float(scene.step);
+  view_.stratum = scene.method == Method::hybrid ? 1.0f / 8.0f : 1.0f / 64.0f;
   view_.majorants = majorants_.view();
   stats.rebuildMs =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();

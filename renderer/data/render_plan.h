@@ -21,6 +21,7 @@ class RenderPlan {
   /// Redoes what the new scene makes stale. The plan is unchanged when this throws Error(badInput).
   RebuildStats update(const Scene& scene);
   const Scene& scene() const { return *scene_; }
+  const Grid& grid() const { return volume_->grid(); }
   /// Valid until the next update.
   const kernel::SceneView& view() const { return view_; }
   /// Index in the volume of every channel of the view.

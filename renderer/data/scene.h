@@ -47,7 +47,9 @@ struct Scene {
   std::vector<Light> lights;  ///< at most kernel::kMaxLights; none means one headlight
   Method method = Method::superposed;
   int macrocell = 4;  ///< voxels per macrocell edge
-  double step = 0.5;  ///< of the marcher, in smallest spacings; > 0
+  double step = 0.5;  ///< of raymarch and hybrid, in smallest spacings; > 0
+  /// RMSE that `automatic` keeps bias below; others do without.
+  double targetError = 1e-3;
   Sampling sampling = Sampling::lowDiscrepancy;
   std::uint32_t seed = 0;
   int width = 512, height = 512;

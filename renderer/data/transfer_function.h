@@ -20,6 +20,16 @@ struct Curve {
   }
 };
 
+/// Owner of both curves on the knots of both.
+struct OpticalCurve {
+  std::vector<kernel::OpticalKnot> knots;
+  std::vector<std::uint16_t> buckets;
+  float first = 0, last = 1;  ///< no opacity at positions up to `first` and from `last` on
+  kernel::OpticalCurveView view() const {
+    return {knots.data(), buckets.data(), int(knots.size()), first, last};
+  }
+};
+
 class TransferFunction {
  public:
   /// Throws Error(badInput) naming what is wrong: no knots, positions that decrease, values out of range.
@@ -34,6 +44,7 @@ class TransferFunction {
  private:
   Curve<float> opacity_;
   Curve<glm::vec3> color_;
+  OpticalCurve optical_;
   float origin_, scale_, offset_;
   float gamma_, density_, weight_, inverseRange_;
   kernel::MaterialView material_;

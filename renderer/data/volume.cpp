@@ -99,7 +99,8 @@ bool sameGrid(const Grid& a, const Grid& b) {
 
 VoxelBuffer::VoxelBuffer(ScalarType type, std::size_t count) : type_(type), count_(count) {
   try {
-    bytes_ = std::make_unique_for_overwrite<std::byte[]>(count * scolopax::sizeBytes(type));
+    bytes_ = std::make_unique_for_overwrite<std::byte[]>(count * scolopax::sizeBytes(type) + kVoxelPadding);
+    std::fill_n(bytes_.get() + count * scolopax::sizeBytes(type), kVoxelPadding, std::byte(0));
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::tooLarge,
                 "no memory for " + std::to_string(count) + " voxels of type " + std::string(nameOf(type)));

@@ -30,6 +30,9 @@ struct Grid {
 /// Same dims, and affines that agree within 1e-4 voxel over the whole box.
 bool sameGrid(const Grid& a, const Grid& b);
 
+/// Readable bytes after the last voxel, so that a processor may read a few voxels at once.
+inline constexpr std::size_t kVoxelPadding = 4;
+
 /// Owner of raw voxel memory: uninitialised on creation, move-only.
 class VoxelBuffer {
  public:

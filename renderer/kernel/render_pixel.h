@@ -36,7 +36,7 @@ struct RenderPixel {
     pass[pixel] = result;
     if (first) first[pixel] = {scene.rays.depth(x, y, met.depth), met.channel};
     if (cost) {
-      spent.randomBlocks = sampler.blocks();
+      spent.randomBlocks += sampler.blocks();
       cost[pixel].fetches += spent.fetches;
       cost[pixel].cellSteps += spent.cellSteps;
       cost[pixel].randomBlocks += spent.randomBlocks;

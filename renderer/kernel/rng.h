@@ -87,6 +87,9 @@ class Sampler {
             owenScramble(point[2], scrambling.z), scrambling.w};
   }
   SCOLOPAX_HD std::uint32_t blocks() const { return block_; }
+  /// Numbers apart from these, for a purpose whose need for them must not change what the others are. Pixels
+  /// stay below 2^31.
+  SCOLOPAX_HD Sampler aside() const { return Sampler(pixel_ | 0x80000000u, number_, seed_); }
 
  private:
   const SampleNumber& number_;

@@ -23,6 +23,22 @@ struct CurveView {
   int count;
 };
 
+/// Opacity and colour at a knot of either curve.
+struct OpticalKnot {
+  float position;
+  float inverseWidth;  ///< 1 / way to the next knot, or 0
+  float opacity;
+  glm::vec3 color;  ///< linear RGB
+};
+
+/// Both curves of a channel on the knots of both; the first knot is at 0 and the last at 1.
+struct OpticalCurveView {
+  const OpticalKnot* knots;
+  const std::uint16_t* buckets;  ///< as in CurveView
+  int count;
+  float first, last;  ///< no opacity at positions up to `first` and from `last` on
+};
+
 /// Blinn-Phong coefficients of one channel.
 struct MaterialView {
   float ambient, diffuse, specular, shininess;
@@ -37,6 +53,7 @@ struct LightView {
   glm::vec3 intensity;  ///< linear colour times intensity
 };
 inline constexpr int kMaxLights = 8;
+inline constexpr int kMaxVisibleChannels = 32;
 
 /// One channel: where its voxels are and how a stored value becomes extinction and colour.
 struct ChannelView {
@@ -47,10 +64,20 @@ struct ChannelView {
   float density;                ///< extinction = opacity * density, per world unit
   CurveView<float> opacity;
   CurveView<glm::vec3> color;  ///< linear RGB
+  OpticalCurveView optical;    ///< both, for quadrature
   float weight;                ///< of the colour in blend mode mix
   MaterialView material;
   float inverseRange;  ///< 1 / |hi - lo| of the range in stored values
 };
+
+/// Points of a ray, in voxel coordinates, that are sampled together.
+inline constexpr int kBatchPoints = 8;
+struct PointBatch {
+  float x[kBatchPoints], y[kBatchPoints], z[kBatchPoints];
+};
+/// Puts the stored values of one channel at all points of the batch into `values`, as sampleStored gives
+/// them.
+using SampleBatch = void (*)(const ChannelView&, glm::ivec3 dims, const PointBatch&, float* values);
 
 struct SceneView {
   CameraRays rays;
@@ -61,12 +88,14 @@ struct SceneView {
   int channelCount;
   const ChannelView* channels;
   MajorantView majorants;
-  float step;      ///< of the marcher, world units
+  float step;      ///< of quadrature, world units
+  float stratum;   ///< share of a ray's light for which quadrature works out lighting once
   int lightCount;  ///< 0 unless shading or shadows are on
   LightView lights[kMaxLights];
   glm::mat3 worldFromVoxel;  ///< linear part, in units of the smallest spacing: lengths near 1 at any scale
   glm::mat3 gradientFromVoxel;  ///< its inverse transpose
   float smallestSpacing;        ///< world units
+  SampleBatch sampleBatch;      ///< the launcher's own, for its processor; null: the kernels'
 };
 
 /// What a sample cost, for tests, benchmarks and the cost heat map.

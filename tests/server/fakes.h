@@ -75,6 +75,7 @@ class FakeRenderer : public Renderer {
     control_->sizes.emplace_back(scene_.width, scene_.height);
     return true;
   }
+  Choice choice() const override { return {scene_.method, scene_.step}; }
   std::uint32_t samples() const override { return samples_; }
   double estimatedError() const override { return control_->error(samples_); }
   void countCosts() override {}

@@ -91,7 +91,7 @@ TEST(SceneResolver, HandsTheRendererWhatTheSceneSays) {
 
 TEST(SceneResolver, TakesTheNamesOfTheRenderersLists) {
   const auto lists = rendererLists();
-  ASSERT_EQ(lists.methods.size(), std::size(kMethods) + 1);
+  ASSERT_EQ(lists.methods.size(), std::size(kMethods));
   EXPECT_EQ(lists.methods[0].name, "auto");
   EXPECT_EQ(lists.blendModes.size(), std::size(kBlendModes));
   for (const auto& colormap : lists.colormaps)

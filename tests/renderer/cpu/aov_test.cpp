@@ -16,8 +16,8 @@ namespace {
 using namespace test;
 
 const std::atomic<bool> kNever = false;
-constexpr Method kAllMethods[] = {Method::superposed, Method::cumulative, Method::syncDda, Method::nDda,
-                                  Method::raymarch};
+constexpr Method kAllMethods[] = {Method::superposed, Method::cumulative, Method::syncDda,
+                                  Method::nDda,       Method::raymarch,   Method::hybrid};
 constexpr BlendMode kBlends[] = {BlendMode::density, BlendMode::max, BlendMode::mix, BlendMode::composite};
 
 std::unique_ptr<Renderer> rendered(const std::shared_ptr<const Volume>& volume, const Scene& scene,

@@ -14,8 +14,8 @@ namespace {
 
 using namespace test;
 
-constexpr Method kMethods[] = {Method::superposed, Method::cumulative, Method::syncDda, Method::nDda,
-                               Method::raymarch};
+constexpr Method kMethods[] = {Method::superposed, Method::cumulative, Method::syncDda,
+                               Method::nDda,       Method::raymarch,   Method::hybrid};
 const glm::dvec3 kColor(0.8, 0.4, 0.2);
 
 /// Value a . voxel over the range [0, range], seen along +z by parallel rays.

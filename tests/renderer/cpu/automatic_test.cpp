@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the CPU backend chooses when a scene leaves the method to it.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <random>
+
+#include "renderer/generate/orbitals.h"
+#include "renderer/renderer.h"
+#include "tests/support/volumes.h"
+
+namespace scolopax {
+namespace {
+
+using namespace test;
+
+const std::atomic<bool> kNever = false;
+
+std::shared_ptr<const Volume> orbitals() {
+  GeneratedVolume generated = generateOrbitals(24, 3);
+  return std::make_shared<const Volume>(generated.grid, std::move(generated.channels));
+}
+
+Scene automaticScene(const Volume& volume) {
+  Scene scene;
+  scene.width = scene.height = 40;
+  scene.method = Method::automatic;
+  scene.camera = framingCamera(volume.grid(), 35, 1);
+  scene.channels.resize(volume.channels().size());
+  for (std::size_t i = 0; i < scene.channels.size(); ++i) {
+    scene.channels[i].rangeHi = volume.channels()[i].histogram.maximum;
+    scene.channels[i].density = 0.5;
+  }
+  return scene;
+}
+
+Choice chosen(const std::shared_ptr<const Volume>& volume, const Scene& scene) {
+  const auto renderer = makeCpuRenderer(volume, 2);
+  renderer->setScene(scene);
+  return renderer->choice();
+}
+
+TEST(Automatic, TakesASmallerStepForASmallerError) {
+  const auto volume = orbitals();
+  Scene scene = automaticScene(*volume);
+  double last = 100;
+  for (const double target : {3e-2, 1e-3, 1e-4}) {
+    scene.targetError = target;
+    const Choice choice = chosen(volume, scene);
+    EXPECT_EQ(choice.method, Method::raymarch);
+    EXPECT_LT(choice.step, last);
+    last = choice.step;
+  }
+}
+
+TEST(Automatic, LeavesToTheTrackerWhatNoStepCanDo) {
+  const auto volume = orbitals();
+  Scene scene = automaticScene(*volume);
+  scene.targetError = 1e-9;
+  EXPECT_EQ(chosen(volume, scene).method, Method::superposed);
+}
+
+TEST(Automatic, DependsOnSceneAndDataAlone) {
+  const auto volume = orbitals();
+  const Scene scene = automaticScene(*volume);
+  Scene large = scene;
+  large.width = large.height = 160;
+  Scene fine = scene;
+  fine.targetError = 1e-4;
+  // However the renderer came to the scene.
+  const auto renderer = makeCpuRenderer(volume, 1);
+  for (const Scene& before : {large, fine}) {
+    renderer->setScene(before);
+    renderer->setScene(scene);
+    EXPECT_EQ(renderer->choice().step, chosen(volume, scene).step);
+  }
+  EXPECT_EQ(chosen(volume, large).step, chosen(volume, scene).step);
+  EXPECT_LT(chosen(volume, fine).step, chosen(volume, scene).step);
+}
+
+TEST(Automatic, DrawsWhatItsChoiceDraws) {
+  const auto volume = orbitals();
+  const Scene scene = automaticScene(*volume);
+  Scene same = scene;
+  const Choice choice = chosen(volume, scene);
+  same.method = choice.method;
+  same.step = choice.step;
+  const auto a = makeCpuRenderer(volume, 2), b = makeCpuRenderer(volume, 1);
+  a->setScene(scene);
+  b->setScene(same);
+  for (int i = 0; i < 3; ++i) {
+    a->renderSample(kNever);
+    b->renderSample(kNever);
+  }
+  const Image found = a->image(), expected = b->image();
+  EXPECT_EQ(std::memcmp(found.pixels.data(), expected.pixels.data(), found.pixels.size() * sizeof(glm::vec4)),
+            0);
+}
+
+TEST(Automatic, KeepsTheFilmUnlessItsChoiceChanges) {
+  const auto volume = orbitals();
+  Scene scene = automaticScene(*volume);
+  const auto renderer = makeCpuRenderer(volume, 2);
+  EXPECT_TRUE(renderer->setScene(scene).filmReset);
+  renderer->renderSample(kNever);
+  EXPECT_FALSE(renderer->setScene(scene).filmReset);
+  scene.background = {1, 0, 0};
+  EXPECT_FALSE(renderer->setScene(scene).filmReset);
+  scene.targetError = 1.01e-3;
+  EXPECT_FALSE(renderer->setScene(scene).filmReset);
+  EXPECT_EQ(renderer->samples(), 1u);
+  scene.targetError = 1e-5;
+  EXPECT_TRUE(renderer->setScene(scene).filmReset);
+  EXPECT_EQ(renderer->samples(), 0u);
+}
+
+TEST(Automatic, WithoutAnythingToSeeDrawsNothing) {
+  const auto volume = orbitals();
+  Scene scene = automaticScene(*volume);
+  for (ChannelAppearance& channel : scene.channels) channel.visible = false;
+  scene.shading = scene.shadows = true;
+  const auto renderer = makeCpuRenderer(volume, 2);
+  renderer->setScene(scene);
+  for (int i = 0; i < 2; ++i) renderer->renderSample(kNever);
+  EXPECT_EQ(renderer->estimatedError(), 0);
+  for (const glm::vec4& pixel : renderer->image().pixels) EXPECT_EQ(pixel, glm::vec4(0));
+}
+
+}  // namespace
+}  // namespace scolopax

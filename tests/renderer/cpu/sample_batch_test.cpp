@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sampling many points at once gives the bits of sampling them one by one, in every instruction set.
+#include "renderer/cpu/sample_batch.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <random>
+
+#include "renderer/data/volume.h"
+#include "renderer/kernel/sample_volume.h"
+
+namespace scolopax {
+namespace {
+
+class SampleBatch : public testing::TestWithParam<InstructionSet> {
+ protected:
+  void SetUp() override {
+    if (!available(GetParam())) GTEST_SKIP() << "this processor does not have the instruction set";
+  }
+};
+
+/// Random bits: all values that a type has, with floats' infinities and NaNs among them.
+VoxelBuffer randomVoxels(ScalarType type, glm::ivec3 dims, std::mt19937& random) {
+  VoxelBuffer voxels(type, std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z));
+  for (std::size_t i = 0; i < voxels.sizeBytes(); ++i) voxels.data()[i] = std::byte(random());
+  if (type != ScalarType::f32) return voxels;
+  for (float& v : voxels.as<float>())
+    if (random() % 8 != 0) v = std::ldexp(float(int(random() % 2001) - 1000), int(random() % 60) - 30);
+  return voxels;
+}
+
+TEST_P(SampleBatch, HasTheBitsOfSamplingOnePointAfterTheOther) {
+  std::mt19937 random(20);
+  std::uniform_real_distribution<float> within(-1.5f, 1.5f);
+  const kernel::SampleBatch sample = sampleBatchFor(GetParam());
+  int compared = 0, finite = 0;
+  for (const glm::ivec3 dims :
+       {glm::ivec3(1, 1, 1), glm::ivec3(2, 2, 2), glm::ivec3(1, 9, 5), glm::ivec3(7, 1, 5),
+        glm::ivec3(7, 9, 1), glm::ivec3(3, 2, 5), glm::ivec3(17, 13, 11)})
+    for (const ScalarType type : {ScalarType::u8, ScalarType::u16, ScalarType::i16, ScalarType::f32}) {
+      const VoxelBuffer voxels = randomVoxels(type, dims, random);
+      kernel::ChannelView channel{};
+      channel.voxels = voxels.data();
+      channel.type = type;
+      for (int round = 0; round < 200; ++round) {
+        // Along a ray, of which parts lie outside, on faces and on voxels; or anywhere, which costs nothing.
+        kernel::PointBatch points;
+        const glm::vec3 size(dims), origin = glm::vec3(within(random), within(random), within(random)) * size;
+        const glm::vec3 step = glm::vec3(within(random), within(random), within(random)) * 0.6f;
+        for (int i = 0; i < kernel::kBatchPoints; ++i) {
+          glm::vec3 p = origin + float(i) * step;
+          if (round % 4 == 1) p = glm::round(p * 2.0f) * 0.5f;
+          if (round % 4 == 2) p = glm::vec3(within(random), within(random), within(random)) * size;
+          if (round % 4 == 3) p[round / 4 % 3] = i % 2 ? -0.0f : float(dims[round / 4 % 3] - 1);
+          points.x[i] = p.x, points.y[i] = p.y, points.z[i] = p.z;
+        }
+        float values[kernel::kBatchPoints];
+        sample(channel, dims, points, values);
+        for (int i = 0; i < kernel::kBatchPoints; ++i) {
+          const float expected =
+              kernel::sampleStored(channel, dims, glm::vec3(points.x[i], points.y[i], points.z[i]));
+          ++compared;
+          if (!std::isfinite(expected)) {  // a NaN is as good as another
+            ASSERT_FALSE(std::isfinite(values[i]));
+            continue;
+          }
+          ++finite;
+          ASSERT_EQ(std::memcmp(&values[i], &expected, sizeof expected), 0)
+              << values[i] << " for " << expected << " at " << points.x[i] << ' ' << points.y[i] << ' '
+              << points.z[i] << " of " << dims.x << 'x' << dims.y << 'x' << dims.z;
+        }
+      }
+    }
+  EXPECT_GT(finite, compared * 3 / 4);
+}
+
+TEST_P(SampleBatch, ReachesVoxelsBeyondIndicesOf32Bits) {
+  // 2^32 voxels, of which the memory that is touched is all that is taken.
+  const glm::ivec3 dims(1 << 12, 1 << 12, (1 << 8) + 2);
+  const VoxelBuffer voxels(ScalarType::u8, std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z));
+  kernel::ChannelView channel{};
+  channel.voxels = voxels.data();
+  channel.type = ScalarType::u8;
+  const auto mutableVoxels = const_cast<std::byte*>(voxels.data());
+  const std::size_t slice = std::size_t(dims.x) * std::size_t(dims.y);
+  for (const std::size_t z : {std::size_t(0), std::size_t(dims.z - 1), std::size_t(dims.z - 2)})
+    for (const std::size_t row :
+         {std::size_t(0), std::size_t(1), std::size_t(dims.y - 2), std::size_t(dims.y - 1)})
+      for (int x = 0; x < 8; ++x) {
+        mutableVoxels[z * slice + row * std::size_t(dims.x) + std::size_t(x)] =
+            std::byte(7 * x + int(z % 200));
+        mutableVoxels[z * slice + (row + 1) * std::size_t(dims.x) - 1 - std::size_t(x)] =
+            std::byte(5 * x + 3);
+      }
+  const kernel::SampleBatch sample = sampleBatchFor(GetParam());
+  for (const bool across : {false, true}) {
+    kernel::PointBatch points;
+    for (int i = 0; i < kernel::kBatchPoints; ++i) {
+      points.x[i] = float(i) * 0.5f;
+      points.y[i] = float(dims.y - 1) - 0.25f;
+      points.z[i] = across && i < 4 ? 0.0f : float(dims.z - 2) + 0.5f;
+    }
+    float values[kernel::kBatchPoints];
+    sample(channel, dims, points, values);
+    for (int i = 0; i < kernel::kBatchPoints; ++i)
+      EXPECT_EQ(values[i],
+                kernel::sampleStored(channel, dims, glm::vec3(points.x[i], points.y[i], points.z[i])));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, SampleBatch, testing::Values(InstructionSet::baseline, InstructionSet::avx2),
+                         [](const auto& set) {
+                           return std::string(set.param == InstructionSet::avx2 ? "Avx2" : "Baseline");
+                         });
+
+}  // namespace
+}  // namespace scolopax
