@@ -21,9 +21,18 @@ DeviceScene::DeviceScene(const kernel::SceneView& host) : view_(host) {
   const std::size_t voxels = std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z);
   std::vector<kernel::ChannelView> channels(host.channels, host.channels + host.channelCount);
   for (kernel::ChannelView& channel : channels) {
-    auto bytes = static_cast<const std::byte*>(channel.voxels);
-    moveToDevice(&bytes, voxels * sizeBytes(channel.type));
-    channel.voxels = bytes;
+    // By itself: neighbouring threads read neighbouring voxels of one channel.
+    visitScalarType(channel.type, [&](auto zero) {
+      using T = decltype(zero);
+      const T* mixed = static_cast<const T*>(channel.voxels) + channel.lane;
+      std::vector<T> plane(voxels);
+      for (std::size_t i = 0; i < voxels; ++i) plane[i] = mixed[i * std::size_t(channel.stride)];
+      const T* moved = plane.data();
+      moveToDevice(&moved, voxels);
+      channel.voxels = moved;
+    });
+    channel.lane = 0;
+    channel.stride = 1;
     moveToDevice(&channel.opacity);
     moveToDevice(&channel.color);
     moveToDevice(&channel.optical.knots, std::size_t(channel.optical.count));

@@ -31,7 +31,7 @@ ValueInterval widen(ValueInterval v) {
 
 /// Calls visit(cell, interval) for every macrocell, from many threads. lo > hi where no voxel is finite.
 template <class T, class Visit>
-void measure(const T* voxels, glm::ivec3 dims, const MacrocellGrid& grid, Visit&& visit) {
+void measure(const StridedVoxels<T>& voxels, glm::ivec3 dims, const MacrocellGrid& grid, Visit&& visit) {
   constexpr bool kFloat = std::is_same_v<T, float>;
   constexpr T kMost = kFloat ? std::numeric_limits<T>::infinity() : std::numeric_limits<T>::max();
   constexpr T kLeast = kFloat ? -std::numeric_limits<T>::infinity() : std::numeric_limits<T>::lowest();
@@ -44,10 +44,11 @@ void measure(const T* voxels, glm::ivec3 dims, const MacrocellGrid& grid, Visit&
       std::fill(most.begin(), most.end(), kLeast);
       for (int k = z * grid.size; k <= std::min((z + 1) * grid.size, dims.z - 1); ++k)
         for (int j = y * grid.size; j <= std::min((y + 1) * grid.size, dims.y - 1); ++j) {
-          const T* row = voxels + (std::size_t(k) * std::size_t(dims.y) + std::size_t(j)) * rowLength;
+          const T* row = &voxels[(std::size_t(k) * std::size_t(dims.y) + std::size_t(j)) * rowLength];
           for (std::size_t i = 0; i < rowLength; ++i) {
-            const bool counts = !kFloat || row[i] - row[i] == 0;
-            const T low = counts ? row[i] : kMost, high = counts ? row[i] : kLeast;
+            const T value = row[i * voxels.stride];
+            const bool counts = !kFloat || value - value == 0;
+            const T low = counts ? value : kMost, high = counts ? value : kLeast;
             least[i] = low < least[i] ? low : least[i];
             most[i] = high > most[i] ? high : most[i];
           }
@@ -75,10 +76,10 @@ MacrocellGrid buildMacrocells(const Volume& volume, int size) {
   const std::size_t channels = volume.channels().size();
   grid.intervals.resize(grid.cellCount() * channels);
   for (std::size_t n = 0; n < channels; ++n) {
-    const VoxelBuffer& buffer = volume.channels()[n].voxels;
-    visitScalarType(buffer.type(), [&](auto zero) {
+    const VoxelView& view = volume.channels()[n].voxels;
+    visitScalarType(view.type(), [&](auto zero) {
       using T = decltype(zero);
-      const T* voxels = buffer.as<T>().data();
+      const StridedVoxels<T> voxels = view.as<T>();
       ValueLevels levels;
       if constexpr (std::is_same_v<T, std::uint8_t>) {
         for (int i = 0; i < kernel::kMaxLevels; ++i) levels.values.push_back(float(i));

@@ -154,7 +154,9 @@ TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearan
 
 kernel::ChannelView TransferFunction::view(const Channel& channel) const {
   kernel::ChannelView view{};
-  view.voxels = channel.voxels.data();
+  view.voxels = channel.voxels.base();
+  view.lane = int(channel.voxels.lane());
+  view.stride = int(channel.voxels.stride());
   view.type = channel.voxels.type();
   view.origin = origin_;
   view.scale = scale_;

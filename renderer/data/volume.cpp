@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/data/volume.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
 #include <new>
+#include <span>
 
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
@@ -40,10 +44,10 @@ void checkGrid(const Grid& grid) {
 /// exactly: a power of two, so that differences of huge values stay finite and spreads of tiny ones above the
 /// denormals (only denormals beside huge values are rounded); and the least value of a spread that is narrow
 /// for its distance from zero, so that what lies between two voxels has the resolution of the spread.
-void normalise(Channel& channel) {
-  if (channel.voxels.type() != ScalarType::f32) return;
+void normalise(VoxelBuffer& buffer, Channel& channel) {
+  if (buffer.type() != ScalarType::f32) return;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  const auto voxels = channel.voxels.as<float>();
+  const auto voxels = buffer.as<float>();
   float least = kInfinity, most = -kInfinity;
   for (const float v : voxels) {
     if (!std::isfinite(v)) continue;
@@ -67,6 +71,25 @@ void normalise(Channel& channel) {
     for (float& v : voxels) v -= least;
     channel.intercept += channel.slope * double(least);
   }
+}
+
+/// The buffers' channels side by side; each is freed as soon as it is copied.
+VoxelBuffer interleave(std::span<VoxelBuffer* const> planes) {
+  if (planes.size() == 1) return std::move(*planes[0]);
+  const std::size_t stride = planes.size(), count = planes[0]->count();
+  VoxelBuffer mixed(planes[0]->type(), count * stride);
+  visitScalarType(mixed.type(), [&](auto zero) {
+    using T = decltype(zero);
+    for (std::size_t lane = 0; lane < stride; ++lane) {
+      const auto from = planes[lane]->as<T>();
+      const auto to = mixed.as<T>();
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1 << 16), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) to[i * stride + lane] = from[i];
+      });
+      *planes[lane] = VoxelBuffer();
+    }
+  });
+  return mixed;
 }
 
 }  // namespace
@@ -117,25 +140,37 @@ Volume::Volume(Grid grid, std::vector<ChannelSource> sources) : grid_(grid) {
     Channel channel;
     channel.name = source.name.empty() ? "channel " + std::to_string(i) : std::move(source.name);
     channel.unit = std::move(source.unit);
-    channel.voxels = std::move(source.voxels);
     channel.slope = source.slope;
     channel.intercept = source.intercept;
-    if (channel.voxels.count() != grid_.voxelCount())
+    if (source.voxels.count() != grid_.voxelCount())
       throw Error(ErrorCode::badInput, "volume: channel '" + channel.name + "' has " +
-                                           std::to_string(channel.voxels.count()) + " voxels, the grid has " +
+                                           std::to_string(source.voxels.count()) + " voxels, the grid has " +
                                            std::to_string(grid_.voxelCount()));
     if (!std::isfinite(channel.slope) || channel.slope == 0 || !std::isfinite(channel.intercept))
       throw Error(ErrorCode::badInput, "volume: channel '" + channel.name +
                                            "' needs a finite slope that is not 0 and a finite intercept");
     // So that sums and differences of data values are finite too.
-    const double largestStored = channel.voxels.type() == ScalarType::f32 ? 0x1p128 : 0x1p16;
+    const double largestStored = source.voxels.type() == ScalarType::f32 ? 0x1p128 : 0x1p16;
     if (!(std::abs(channel.slope) * largestStored + std::abs(channel.intercept) < 0x1p1000))
       throw Error(ErrorCode::badInput,
                   "volume: channel '" + channel.name + "' needs values below 1e301, found slope " +
                       shortText(channel.slope) + " and intercept " + shortText(channel.intercept));
-    normalise(channel);
-    channel.histogram = measureHistogram(channel.voxels, channel.slope, channel.intercept);
+    normalise(source.voxels, channel);
+    channel.histogram = measureHistogram(source.voxels, channel.slope, channel.intercept);
     channels_.push_back(std::move(channel));
+  }
+  for (const ScalarType type : {ScalarType::u8, ScalarType::u16, ScalarType::i16, ScalarType::f32}) {
+    std::vector<VoxelBuffer*> planes;
+    std::vector<std::size_t> members;
+    for (std::size_t i = 0; i < sources.size(); ++i)
+      if (sources[i].voxels.count() > 0 && sources[i].voxels.type() == type) {
+        planes.push_back(&sources[i].voxels);
+        members.push_back(i);
+      }
+    if (planes.empty()) continue;
+    buffers_.push_back(interleave(planes));
+    for (std::size_t lane = 0; lane < members.size(); ++lane)
+      channels_[members[lane]].voxels = VoxelView(buffers_.back(), lane, members.size());
   }
 }
 

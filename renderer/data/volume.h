@@ -31,7 +31,7 @@ struct Grid {
 bool sameGrid(const Grid& a, const Grid& b);
 
 /// Readable bytes after the last voxel, so that a processor may read a few voxels at once.
-inline constexpr std::size_t kVoxelPadding = 4;
+inline constexpr std::size_t kVoxelPadding = 16;
 
 /// Owner of raw voxel memory: uninitialised on creation, move-only.
 class VoxelBuffer {
@@ -60,6 +60,45 @@ class VoxelBuffer {
   std::unique_ptr<std::byte[]> bytes_;
 };
 
+/// Some type's voxels of one channel; voxel i lies i * stride after the first.
+template <class T>
+struct StridedVoxels {
+  const T* first;
+  std::size_t stride, count;
+  const T& operator[](std::size_t i) const { return first[i * stride]; }
+  std::size_t size() const { return count; }
+};
+
+/// One channel's voxels in a volume, where channels of one type lie interleaved: a fetch of several channels,
+/// or of one that a tracker draws, finds them side by side (tests/bench/layout.cpp has the numbers). Borrows.
+class VoxelView {
+ public:
+  VoxelView() = default;
+  /// `lane`: which of the `stride` channels of `buffer`.
+  VoxelView(const VoxelBuffer& buffer, std::size_t lane, std::size_t stride)
+      : base_(buffer.data()),
+        type_(buffer.type()),
+        lane_(lane),
+        stride_(stride),
+        count_(buffer.count() / stride) {}
+  ScalarType type() const { return type_; }
+  std::size_t count() const { return count_; }
+  std::size_t lane() const { return lane_; }
+  std::size_t stride() const { return stride_; }
+  /// Voxel 0 of lane 0.
+  const std::byte* base() const { return base_; }
+  /// T must be the type of the voxels.
+  template <class T>
+  StridedVoxels<T> as() const {
+    return {reinterpret_cast<const T*>(base_) + lane_, stride_, count_};
+  }
+
+ private:
+  const std::byte* base_ = nullptr;
+  ScalarType type_ = ScalarType::u8;
+  std::size_t lane_ = 0, stride_ = 1, count_ = 0;
+};
+
 /// What a loader hands over for one channel. Data value = slope * stored + intercept.
 struct ChannelSource {
   std::string name;  ///< "" lets the volume name it "channel i"
@@ -73,7 +112,7 @@ struct ChannelSource {
 struct Channel {
   std::string name;
   std::string unit;
-  VoxelBuffer voxels;
+  VoxelView voxels;
   double slope = 1.0;  ///< data value = slope * stored + intercept; slope != 0
   double intercept = 0.0;
   Histogram histogram;  ///< over data values, finite voxels only
@@ -89,6 +128,7 @@ class Volume {
 
  private:
   Grid grid_;
+  std::vector<VoxelBuffer> buffers_;  // one for each type of voxels
   std::vector<Channel> channels_;
 };
 

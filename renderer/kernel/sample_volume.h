@@ -42,11 +42,12 @@ SCOLOPAX_HD float trilinear(const T* v, const AxisWeight& x, const AxisWeight& y
 /// Stored value of one channel at a point in voxel coordinates; not finite exactly when one of the eight
 /// corners is not (differences cannot overflow: Volume keeps float voxels below 2^124).
 SCOLOPAX_HD inline float sampleStored(const ChannelView& channel, glm::ivec3 dims, glm::vec3 point) {
-  const AxisWeight x = axisWeight(point.x, dims.x, 1);
-  const AxisWeight y = axisWeight(point.y, dims.y, std::size_t(dims.x));
-  const AxisWeight z = axisWeight(point.z, dims.z, std::size_t(dims.x) * std::size_t(dims.y));
+  const auto stride = std::size_t(channel.stride);
+  const AxisWeight x = axisWeight(point.x, dims.x, stride);
+  const AxisWeight y = axisWeight(point.y, dims.y, stride * std::size_t(dims.x));
+  const AxisWeight z = axisWeight(point.z, dims.z, stride * std::size_t(dims.x) * std::size_t(dims.y));
   return visitScalarType(channel.type, [&](auto zero) {
-    return trilinear(static_cast<const decltype(zero)*>(channel.voxels), x, y, z);
+    return trilinear(static_cast<const decltype(zero)*>(channel.voxels) + channel.lane, x, y, z);
   });
 }
 

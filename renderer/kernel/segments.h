@@ -144,13 +144,13 @@ class SegmentWalk {
       const glm::vec3 p = pointAt(first + i < run_.count ? first + i : run_.count);
       points.x[i] = p.x, points.y[i] = p.y, points.z[i] = p.z;
     }
+    float stored[kMaxVisibleChannels][kBatchPoints];
+    scene_.sampleBatch(scene_, run_.sampled, points, stored);
     for (int n = 0; n < scene_.channelCount; ++n) {
       if (!(run_.sampled >> n & 1)) continue;
       if (first == 1 && !(known_ >> n & 1)) samplePoint(n, 0);
-      float stored[kBatchPoints];
-      scene_.sampleBatch(scene_.channels[n], scene_.dims, points, stored);
       for (int k = first; k <= run_.count; ++k)
-        run_.position[n][k] = stretchPosition(scene_.channels[n], stored[k - first]);
+        run_.position[n][k] = stretchPosition(scene_.channels[n], stored[n][k - first]);
       cost_->fetches += std::uint32_t(run_.count + 1 - first);
     }
   }

@@ -57,8 +57,9 @@ inline constexpr int kMaxVisibleChannels = 32;
 
 /// One channel: where its voxels are and how a stored value becomes extinction and colour.
 struct ChannelView {
-  const void* voxels;
+  const void* voxels;  ///< of this channel and others of its type, interleaved
   ScalarType type;
+  int lane, stride;             ///< which of how many
   float origin, scale, offset;  ///< position = clamp((stored - origin) * scale + offset, 0, 1)
   float gamma;                  ///< position^gamma goes into both curves
   float density;                ///< extinction = opacity * density, per world unit
@@ -75,9 +76,11 @@ inline constexpr int kBatchPoints = 8;
 struct PointBatch {
   float x[kBatchPoints], y[kBatchPoints], z[kBatchPoints];
 };
-/// Puts the stored values of one channel at all points of the batch into `values`, as sampleStored gives
+struct SceneView;
+/// Puts the stored values of channels (bit n: channel n) at all points into values[n], as sampleStored gives
 /// them.
-using SampleBatch = void (*)(const ChannelView&, glm::ivec3 dims, const PointBatch&, float* values);
+using SampleBatch = void (*)(const SceneView&, std::uint32_t channels, const PointBatch&,
+                             float (*values)[kBatchPoints]);
 
 struct SceneView {
   CameraRays rays;

@@ -157,7 +157,7 @@ std::size_t heapBytes() {
 /// Bytes of the data and of what is made from them, as the heap grows by each.
 ordered_json memoryOf(const std::shared_ptr<const Volume>& volume, Scene scene, int macrocell) {
   std::size_t data = 0;
-  for (const Channel& channel : volume->channels()) data += channel.voxels.sizeBytes();
+  for (const Channel& channel : volume->channels()) data += channel.voxels.count() * sizeBytes(channel.voxels.type());
   const auto grown = [](std::size_t from, std::size_t to) { return to > from ? to - from : 0; };
   const auto renderer = makeCpuRenderer(volume, 0);
   const glm::ivec2 size(scene.width, scene.height);

@@ -125,6 +125,7 @@ void measure(const char* type, ScalarType scalar, int channels, bool json) {
     kernel::ChannelView view{};
     view.voxels = plane.data();
     view.type = scalar;
+    view.stride = 1;
     views.push_back(view);
   }
   for (int z = 0; z < kSide; ++z)
@@ -141,6 +142,10 @@ void measure(const char* type, ScalarType scalar, int channels, bool json) {
       return sum;
     };
   };
+  kernel::SceneView scene{};
+  scene.dims = dims;
+  scene.channels = views.data();
+  scene.channelCount = channels;
   const kernel::SampleBatch batch = sampleBatchFor(fastestInstructionSet());
   for (const auto& [name, direction] :
        {std::pair{"x", glm::vec3(1, 0.02f, 0.01f)}, std::pair{"z", glm::vec3(0.01f, 0.02f, 1)},
@@ -154,15 +159,14 @@ void measure(const char* type, ScalarType scalar, int channels, bool json) {
                                      }));
     const double together = nsPerPoint(lines, [&](const Line& line, int k) {
       kernel::PointBatch points;
-      float values[kPoints], sum = 0;
+      float values[kernel::kMaxVisibleChannels][kPoints], sum = 0;
       for (int i = 0; i < kPoints; ++i) {
         const glm::vec3 p = at(line, k + i);
         points.x[i] = p.x, points.y[i] = p.y, points.z[i] = p.z;
       }
-      for (const auto& view : views) {
-        batch(view, dims, points, values);
-        for (const float v : values) sum += v;
-      }
+      batch(scene, (1u << channels) - 1, points, values);
+      for (int n = 0; n < channels; ++n)
+        for (const float v : values[n]) sum += v;
       return sum;
     });
     const double interleave = channels % 4 ? 0 : nsPerPoint(lines, perPoint([&](glm::vec3 p) {

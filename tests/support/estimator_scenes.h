@@ -87,18 +87,19 @@ inline std::shared_ptr<const Volume> cropped(const Volume& volume, glm::ivec3 lo
   grid.worldFromVoxel[3] = grid.worldFromVoxel * glm::dvec4(glm::dvec3(lo), 1);
   std::vector<ChannelSource> sources;
   for (const Channel& channel : volume.channels()) {
-    const std::size_t size = sizeBytes(channel.voxels.type());
     ChannelSource source{channel.name, channel.unit, VoxelBuffer(channel.voxels.type(), grid.voxelCount()),
                          channel.slope, channel.intercept};
-    std::byte* to = source.voxels.data();
-    for (int z = 0; z < dims.z; ++z)
-      for (int y = 0; y < dims.y; ++y) {
-        const auto row =
-            (std::size_t(lo.z + z) * std::size_t(whole.y) + std::size_t(lo.y + y)) * std::size_t(whole.x) +
-            std::size_t(lo.x);
-        const std::size_t bytes = size * std::size_t(dims.x);
-        to = std::copy_n(channel.voxels.data() + row * size, bytes, to);
-      }
+    visitScalarType(channel.voxels.type(), [&](auto zero) {
+      using T = decltype(zero);
+      const auto from = channel.voxels.as<T>();
+      auto to = source.voxels.as<T>().begin();
+      for (int z = 0; z < dims.z; ++z)
+        for (int y = 0; y < dims.y; ++y)
+          for (int x = 0; x < dims.x; ++x)
+            *to++ = from[(std::size_t(lo.z + z) * std::size_t(whole.y) + std::size_t(lo.y + y)) *
+                             std::size_t(whole.x) +
+                         std::size_t(lo.x + x)];
+    });
     sources.push_back(std::move(source));
   }
   return std::make_shared<const Volume>(grid, std::move(sources));

@@ -10,9 +10,12 @@
 
 #include "renderer/data/volume.h"
 #include "renderer/kernel/sample_volume.h"
+#include "tests/support/volumes.h"
 
 namespace scolopax {
 namespace {
+
+using namespace test;
 
 class SampleBatch : public testing::TestWithParam<InstructionSet> {
  protected:
@@ -31,7 +34,37 @@ VoxelBuffer randomVoxels(ScalarType type, glm::ivec3 dims, std::mt19937& random)
   return voxels;
 }
 
-TEST_P(SampleBatch, HasTheBitsOfSamplingOnePointAfterTheOther) {
+/// A view of channels over one volume, every one of which can be seen.
+struct Channels {
+  Volume volume;
+  std::vector<kernel::ChannelView> views;
+  kernel::SceneView scene{};
+
+  Channels(glm::ivec3 dims, const std::vector<ScalarType>& types, std::mt19937& random)
+      : volume(gridOf(dims), sources(dims, types, random)) {
+    for (const Channel& channel : volume.channels()) {
+      kernel::ChannelView view{};
+      view.voxels = channel.voxels.base();
+      view.type = channel.voxels.type();
+      view.lane = int(channel.voxels.lane());
+      view.stride = int(channel.voxels.stride());
+      views.push_back(view);
+    }
+    scene.dims = dims;
+    scene.channels = views.data();
+    scene.channelCount = int(views.size());
+  }
+  static std::vector<ChannelSource> sources(glm::ivec3 dims, const std::vector<ScalarType>& types,
+                                            std::mt19937& random) {
+    std::vector<ChannelSource> sources(types.size());
+    for (std::size_t i = 0; i < types.size(); ++i) sources[i].voxels = randomVoxels(types[i], dims, random);
+    return sources;
+  }
+};
+
+TEST_P(SampleBatch, HasTheBitsOfSamplingOneChannelAtOnePointAfterTheOther) {
+  constexpr ScalarType u8 = ScalarType::u8, u16 = ScalarType::u16, i16 = ScalarType::i16,
+                       f32 = ScalarType::f32;
   std::mt19937 random(20);
   std::uniform_real_distribution<float> within(-1.5f, 1.5f);
   const kernel::SampleBatch sample = sampleBatchFor(GetParam());
@@ -39,12 +72,13 @@ TEST_P(SampleBatch, HasTheBitsOfSamplingOnePointAfterTheOther) {
   for (const glm::ivec3 dims :
        {glm::ivec3(1, 1, 1), glm::ivec3(2, 2, 2), glm::ivec3(1, 9, 5), glm::ivec3(7, 1, 5),
         glm::ivec3(7, 9, 1), glm::ivec3(3, 2, 5), glm::ivec3(17, 13, 11)})
-    for (const ScalarType type : {ScalarType::u8, ScalarType::u16, ScalarType::i16, ScalarType::f32}) {
-      const VoxelBuffer voxels = randomVoxels(type, dims, random);
-      kernel::ChannelView channel{};
-      channel.voxels = voxels.data();
-      channel.type = type;
-      for (int round = 0; round < 200; ++round) {
+    for (const std::vector<ScalarType>& types :
+         {std::vector{u8}, std::vector{u16}, std::vector{i16}, std::vector{f32}, std::vector{u8, u8, u8, u8},
+          std::vector{i16, i16, i16}, std::vector{f32, u16, f32, u8, u16, f32, f32, f32, i16, f32},
+          std::vector<ScalarType>(9, u16)}) {
+      const Channels made(dims, types, random);
+      const std::uint32_t all = (1u << types.size()) - 1;
+      for (int round = 0; round < 100; ++round) {
         // Along a ray, of which parts lie outside, on faces and on voxels; or anywhere, which costs nothing.
         kernel::PointBatch points;
         const glm::vec3 size(dims), origin = glm::vec3(within(random), within(random), within(random)) * size;
@@ -56,21 +90,29 @@ TEST_P(SampleBatch, HasTheBitsOfSamplingOnePointAfterTheOther) {
           if (round % 4 == 3) p[round / 4 % 3] = i % 2 ? -0.0f : float(dims[round / 4 % 3] - 1);
           points.x[i] = p.x, points.y[i] = p.y, points.z[i] = p.z;
         }
-        float values[kernel::kBatchPoints];
-        sample(channel, dims, points, values);
-        for (int i = 0; i < kernel::kBatchPoints; ++i) {
-          const float expected =
-              kernel::sampleStored(channel, dims, glm::vec3(points.x[i], points.y[i], points.z[i]));
-          ++compared;
-          if (!std::isfinite(expected)) {  // a NaN is as good as another
-            ASSERT_FALSE(std::isfinite(values[i]));
-            continue;
+        const std::uint32_t channels = round % 3 ? all & std::uint32_t(random()) : all;
+        float values[kernel::kMaxVisibleChannels][kernel::kBatchPoints];
+        for (auto& row : values) std::fill(std::begin(row), std::end(row), -12345.0f);
+        sample(made.scene, channels, points, values);
+        for (int n = 0; n < int(types.size()); ++n)
+          for (int i = 0; i < kernel::kBatchPoints; ++i) {
+            const float found = values[n][i];
+            if (!(channels >> n & 1)) {
+              ASSERT_EQ(found, -12345.0f) << "nobody has asked";
+              continue;
+            }
+            const float expected = kernel::sampleStored(made.views[std::size_t(n)], dims,
+                                                        glm::vec3(points.x[i], points.y[i], points.z[i]));
+            ++compared;
+            if (!std::isfinite(expected)) {  // a NaN is as good as another
+              ASSERT_FALSE(std::isfinite(found));
+              continue;
+            }
+            ++finite;
+            ASSERT_EQ(std::memcmp(&found, &expected, sizeof expected), 0)
+                << found << " for " << expected << " of channel " << n << " at " << points.x[i] << ' '
+                << points.y[i] << ' ' << points.z[i] << " of " << dims.x << 'x' << dims.y << 'x' << dims.z;
           }
-          ++finite;
-          ASSERT_EQ(std::memcmp(&values[i], &expected, sizeof expected), 0)
-              << values[i] << " for " << expected << " at " << points.x[i] << ' ' << points.y[i] << ' '
-              << points.z[i] << " of " << dims.x << 'x' << dims.y << 'x' << dims.z;
-        }
       }
     }
   EXPECT_GT(finite, compared * 3 / 4);
@@ -79,21 +121,21 @@ TEST_P(SampleBatch, HasTheBitsOfSamplingOnePointAfterTheOther) {
 TEST_P(SampleBatch, ReachesVoxelsBeyondIndicesOf32Bits) {
   // 2^32 voxels, of which the memory that is touched is all that is taken.
   const glm::ivec3 dims(1 << 12, 1 << 12, (1 << 8) + 2);
-  const VoxelBuffer voxels(ScalarType::u8, std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z));
+  const std::size_t slice = std::size_t(dims.x) * std::size_t(dims.y);
+  VoxelBuffer voxels(ScalarType::u8, slice * std::size_t(dims.z));
+  for (const int z : {0, dims.z - 2, dims.z - 1})
+    for (const int row : {0, 1, dims.y - 2, dims.y - 1})
+      for (int x = 0; x < 8; ++x)
+        voxels.data()[std::size_t(z) * slice + std::size_t(row) * std::size_t(dims.x) + std::size_t(x)] =
+            std::byte(7 * x + z % 200);
   kernel::ChannelView channel{};
   channel.voxels = voxels.data();
   channel.type = ScalarType::u8;
-  const auto mutableVoxels = const_cast<std::byte*>(voxels.data());
-  const std::size_t slice = std::size_t(dims.x) * std::size_t(dims.y);
-  for (const std::size_t z : {std::size_t(0), std::size_t(dims.z - 1), std::size_t(dims.z - 2)})
-    for (const std::size_t row :
-         {std::size_t(0), std::size_t(1), std::size_t(dims.y - 2), std::size_t(dims.y - 1)})
-      for (int x = 0; x < 8; ++x) {
-        mutableVoxels[z * slice + row * std::size_t(dims.x) + std::size_t(x)] =
-            std::byte(7 * x + int(z % 200));
-        mutableVoxels[z * slice + (row + 1) * std::size_t(dims.x) - 1 - std::size_t(x)] =
-            std::byte(5 * x + 3);
-      }
+  channel.stride = 1;
+  kernel::SceneView scene{};
+  scene.dims = dims;
+  scene.channels = &channel;
+  scene.channelCount = 1;
   const kernel::SampleBatch sample = sampleBatchFor(GetParam());
   for (const bool across : {false, true}) {
     kernel::PointBatch points;
@@ -102,10 +144,10 @@ TEST_P(SampleBatch, ReachesVoxelsBeyondIndicesOf32Bits) {
       points.y[i] = float(dims.y - 1) - 0.25f;
       points.z[i] = across && i < 4 ? 0.0f : float(dims.z - 2) + 0.5f;
     }
-    float values[kernel::kBatchPoints];
-    sample(channel, dims, points, values);
+    float values[1][kernel::kBatchPoints];
+    sample(scene, 1, points, values);
     for (int i = 0; i < kernel::kBatchPoints; ++i)
-      EXPECT_EQ(values[i],
+      EXPECT_EQ(values[0][i],
                 kernel::sampleStored(channel, dims, glm::vec3(points.x[i], points.y[i], points.z[i])));
   }
 }
