@@ -17,6 +17,7 @@ void visitLayout(Header& h, F&& f) {
   f(9, h.flags);
   f(10, h.width);
   f(12, h.height);
+  f(14, h.method);
   f(16, h.frame);
   f(20, h.revision);
   f(24, h.patch);

@@ -21,6 +21,7 @@ struct FrameHeader {
   Codec codec = Codec::jpeg;
   std::uint8_t flags = 0;
   std::uint16_t width = 0, height = 0;  ///< of the encoded image, pixels
+  std::uint8_t method = 0;              ///< 1 + its place in the capabilities' `methods`; 0: not told
   std::uint32_t frame = 0;              ///< counts up per connection, from 1; what ack names
   std::uint32_t revision = 0;           ///< of the scene that the whole image shows
   std::uint32_t patch = 0;              ///< id of this client's last patch that is in it; 0: none

@@ -232,6 +232,7 @@ void ProgressiveRender::show(const RenderRequest& request) {
   FrameInfo info;
   info.revision = revision_;
   info.samples = renderer_->samples();
+  info.method = renderer_->choice().method;
   info.error = float(renderer_->estimatedError());
   info.rebuildUs = rebuildUs_;
   info.renderUs = renderUs_;

@@ -61,6 +61,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
                                 (frame.info.final ? protocol::kFlagFinal : 0));
     header.width = std::uint16_t(frame.width);
     header.height = std::uint16_t(frame.height);
+    header.method = std::uint8_t(1 + int(frame.info.method));
     header.frame = ++frameNumber_;
     header.revision = frame.info.revision;
     header.patch = patch;

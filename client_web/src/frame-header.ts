@@ -15,6 +15,8 @@ export interface FrameHeader {
   final: boolean;
   width: number;
   height: number;
+  /** What was used: 1 + its place in the capabilities' methods; 0 when it is not told. */
+  method: number;
   frame: number;
   revision: number;
   /** Newest patch of this client that the picture contains; 0 for none. */
@@ -51,6 +53,7 @@ export function decodeFrameHeader(message: ArrayBuffer): FrameHeader {
     final: (flags & 2) !== 0,
     width: u16(10),
     height: u16(12),
+    method: view.getUint8(14),
     frame: u32(16),
     revision: u32(20),
     patch: u32(24),

@@ -2,6 +2,7 @@
 // State of the connection and of the picture, along the lower edge.
 import { useEffect, useState } from 'preact/hooks';
 import type { ConnectionState } from './connection';
+import { choicesOf } from './schema';
 import type { Store } from './store';
 
 /** What a screen reader is told when it changes: without the countdown. */
@@ -48,6 +49,7 @@ export function StatusBar({ store }: { store: Store }) {
   }, [meter]);
 
   const frame = store.frame.value;
+  const used = frame && choicesOf(['integrator', 'method'], store.capabilities.value)[frame.method - 1]?.name;
   const wanted = store.scene.value?.stop?.samples;
   const latency = meter.latencyMs.value;
   const rate = meter.framesPerSecond.value;
@@ -89,7 +91,7 @@ export function StatusBar({ store }: { store: Store }) {
             hint="From sending an edit to the first picture that contains it"
           />
           <Figure name="frames/s" value={rate.toFixed(1)} hint="Pictures drawn per second" />
-          <Figure name="method" value={store.scene.value?.integrator?.method ?? ''} hint="Method; auto: the server chooses" />
+          <Figure name="method" value={used ?? ''} hint="The method that this picture was made with" />
           <Figure name="pixels" value={`${frame.width} × ${frame.height}`} hint="Size of the picture received" />
         </>
       )}

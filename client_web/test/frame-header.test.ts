@@ -7,7 +7,7 @@ import { decodeFrameHeader } from '../src/frame-header';
 function headerBytes(): Uint8Array {
   return Uint8Array.from([
     0x53, 0x43, 0x4c, 0x58, 1, 0, 48, 0, // "SCLX", version, header bytes
-    2, 3, 0x80, 0x07, 0x38, 0x04, 0, 0, // PNG, interactive + final, 1920 x 1080, padding
+    2, 3, 0x80, 0x07, 0x38, 0x04, 6, 0, // PNG, interactive + final, 1920 x 1080, sixth method
     7, 0, 0, 0, 9, 0, 0, 0, // frame, revision
     0xff, 0xff, 0xff, 0xff, 0, 1, 0, 0, // patch 2^32 - 1, samples 256
     0, 0, 0x80, 0x3e, 1, 0, 0, 0, // error 0.25, rebuild
@@ -53,6 +53,7 @@ describe('the frame header', () => {
       final: true,
       width: 1920,
       height: 1080,
+      method: 6,
       frame: 7,
       revision: 9,
       patch: 4294967295,

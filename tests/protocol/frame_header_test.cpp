@@ -31,6 +31,7 @@ FrameHeader headerOf(const json& fields) {
   header.flags = fields["flags"];
   header.width = fields["width"];
   header.height = fields["height"];
+  header.method = fields["method"];
   header.frame = fields["frame"];
   header.revision = fields["revision"];
   header.patch = fields["patch"];

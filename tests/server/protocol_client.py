@@ -16,7 +16,7 @@ INTERACTIVE, FINAL = 1, 2
 
 # "Frame header": offset, type.
 HEADER = {"magic": (0, "4s"), "version": (4, "H"), "headerBytes": (6, "H"), "codec": (8, "B"), "flags": (9, "B"),
-          "width": (10, "H"), "height": (12, "H"), "zero": (14, "H"), "frame": (16, "I"), "revision": (20, "I"),
+          "width": (10, "H"), "height": (12, "H"), "method": (14, "B"), "zero": (15, "B"), "frame": (16, "I"), "revision": (20, "I"),
           "patch": (24, "I"), "samples": (28, "I"), "error": (32, "f"), "rebuildUs": (36, "I"), "renderUs": (40, "I"),
           "encodeUs": (44, "I")}
 
@@ -35,7 +35,7 @@ class Frame:
         size = jpeg_size(self.image) if self.codec == 1 else png_size(self.image)
         found = {
             "magic": self.magic == b"SCLX", "version": self.version == 1, "headerBytes": self.headerBytes >= 48,
-            "codec": self.codec in (1, 2), "flags": self.flags < 4, "offset 14": self.zero == 0,
+            "codec": self.codec in (1, 2), "flags": self.flags < 4, "method": self.method >= 2, "offset 15": self.zero == 0,
             "size": size == (self.width, self.height), "samples": self.samples >= 1,
             "error": math.isnan(self.error) == (self.samples < 2),
             "frame": self.frame > (before.frame if before else 0),
