@@ -64,9 +64,10 @@ std::vector<Setting> settingsOf(const Options& options) {
   std::vector<Setting> settings;
   for (std::size_t i = 0; i < std::size(kMethods); ++i) {
     const auto method = Method(i);
-    if (!options.methods.empty() &&
-        std::find(options.methods.begin(), options.methods.end(), nameOf(method)) == options.methods.end())
-      continue;
+    const bool named =
+        std::find(options.methods.begin(), options.methods.end(), nameOf(method)) != options.methods.end();
+    // `auto` is one of the others, and not measured twice unless asked for.
+    if (options.methods.empty() ? method == Method::automatic : !named) continue;
     for (const int macrocell : ordered(options.macrocells))
       for (const int threads : ordered(options.threads))
         for (const double step : hasStep(method) ? ordered(options.steps) : std::vector<double>{0})
@@ -157,7 +158,8 @@ std::size_t heapBytes() {
 /// Bytes of the data and of what is made from them, as the heap grows by each.
 ordered_json memoryOf(const std::shared_ptr<const Volume>& volume, Scene scene, int macrocell) {
   std::size_t data = 0;
-  for (const Channel& channel : volume->channels()) data += channel.voxels.count() * sizeBytes(channel.voxels.type());
+  for (const Channel& channel : volume->channels())
+    data += channel.voxels.count() * sizeBytes(channel.voxels.type());
   const auto grown = [](std::size_t from, std::size_t to) { return to > from ? to - from : 0; };
   const auto renderer = makeCpuRenderer(volume, 0);
   const glm::ivec2 size(scene.width, scene.height);

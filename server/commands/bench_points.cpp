@@ -17,6 +17,9 @@ using nlohmann::ordered_json;
 
 constexpr double kTargets[] = {1e-2, 1e-3};  // RMSE
 
+/// Whether more samples leave an error; `auto` may choose what has one.
+bool isBiased(Method method) { return hasStep(method) || method == Method::automatic; }
+
 struct Reached {
   double seconds, samples, step;
 };
@@ -28,7 +31,7 @@ std::optional<Reached> reach(double target, const std::vector<const Point*>& poi
   const double wanted = target * target;
   for (const Point* point : points) {
     double samples = point->samples;
-    if (!hasStep(point->method)) {
+    if (!isBiased(point->method)) {
       samples = std::max(1.0, samples * point->mse() / wanted);
       best.reset();  // the last has the most samples
     } else {
@@ -102,7 +105,7 @@ ordered_json report(const std::vector<Point>& points, const std::optional<Image>
     rows.push_back(rowOf(point, truth, pixels));
     if (!truth) continue;
     const auto sync = yardstick.find(conditions(point));
-    if (!hasStep(point.method) && sync != yardstick.end())
+    if (!isBiased(point.method) && sync != yardstick.end())
       rows.back()["efficiencyToSyncDda"] = point.efficiency() / sync->second->efficiency();
     groups[{point.method, point.macrocell, point.threads}].push_back(&point);
   }
