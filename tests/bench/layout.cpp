@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which layout of the voxels is the fastest to sample? Prints ns per point, all channels, along rays: planar
-// one point at a time, planar eight points at once (what the renderer does), channels interleaved with one
-// vector over channels, planar in bricks of 8^3; and of one channel out of many, as a tracker that draws a
+// one point at a time, planar eight points at once, channels interleaved with one vector over channels, planar in
+// bricks of 8^3; and of one channel out of many, as a tracker that draws a channel fetches.
 // channel fetches. Built with the tests, run by hand: tests_layout [--json]
 #include <immintrin.h>
 
@@ -192,11 +192,18 @@ void measure(const char* type, ScalarType scalar, int channels, bool json) {
                                               axisWeight(p.y, kSide, stride * kSide),
                                               axisWeight(p.z, kSide, stride * kSide * kSide));
                    }));
-    const char* format =
-        json ? "{\"type\": \"%s\", \"channels\": %d, \"rays\": \"%s\", \"planar\": %.2f, \"planar8\": %.2f, "
-               "\"interleaved\": %.2f, \"bricked\": %.2f, \"onePlanar\": %.2f, \"oneInterleaved\": %.2f}\n"
-             : "%-4s %9d %8s %9.2f %9.2f %12.2f %8.2f %11.2f %16.2f\n";
-    std::printf(format, type, channels, name, planar, together, interleave, brick, one, oneInterleaved);
+    if (json) {
+      static bool further = false;
+      std::printf(
+          "%s{\"type\": \"%s\", \"channels\": %d, \"rays\": \"%s\", \"planar\": %.2f, \"planar8\": %.2f, "
+          "\"interleaved\": %.2f, \"bricked\": %.2f, \"onePlanar\": %.2f, \"oneInterleaved\": %.2f}",
+          further ? ",\n" : "[", type, channels, name, planar, together, interleave, brick, one,
+          oneInterleaved);
+      further = true;
+    } else {
+      std::printf("%-4s %9d %8s %9.2f %9.2f %12.2f %8.2f %11.2f %16.2f\n", type, channels, name, planar,
+                  together, interleave, brick, one, oneInterleaved);
+    }
     std::fflush(stdout);
   }
 }
@@ -213,4 +220,5 @@ int main(int argc, char** argv) {
     measure<std::uint16_t>("u16", ScalarType::u16, channels, json);
     measure<float>("f32", ScalarType::f32, channels, json);
   }
+  if (json) std::printf("]\n");
 }

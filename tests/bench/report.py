@@ -23,15 +23,17 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("measured", metavar="MEASURED.json", nargs="+", help="of run.py; later files take the place of earlier")
     parser.add_argument("--rebuild", metavar="REBUILD.json", help="what bench_rebuild --json printed")
+    parser.add_argument("--layout", metavar="LAYOUT.json", help="what bench_layout --json printed")
     parser.add_argument("--out", metavar="FOLDER", default=os.path.join(HERE, "report"))
     options = parser.parse_args()
     measured = {}
     for path in options.measured:
         with open(path, encoding="utf-8") as file:
             measured.update(json.load(file))
-    if options.rebuild:
-        with open(options.rebuild, encoding="utf-8") as file:
-            measured["rebuild"] = {"found": json.load(file)}
+    for name, path in (("rebuild", options.rebuild), ("layout", options.layout)):
+        if path:
+            with open(path, encoding="utf-8") as file:
+                measured[name] = {"found": json.load(file)}
     os.makedirs(options.out, exist_ok=True)
     written = remarks()
 

@@ -160,6 +160,15 @@ def rebuild(entry, plot):
     return table(list(rows[0]), [[number(v) if isinstance(v, float) else v for v in row.values()] for row in rows])
 
 
+def layout(entry, plot):
+    rows = [[row["type"], str(row["channels"]), row["rays"],
+             *("-" if row[kind] == 0 else number(row[kind])
+               for kind in ("planar", "planar8", "interleaved", "bricked", "onePlanar", "oneInterleaved"))] for row in entry["found"]]
+    return ("ns per point for all channels, and, last two columns, for one channel that changes from point to point:\n\n" +
+            table(["type", "channels", "rays along", "planar", "planar, 8 points at once", "interleaved, 4 channels at once",
+                   "planar bricks of 8^3", "one of planar", "one of interleaved"], rows))
+
+
 def sizes(entry, plot):
     found = entry["found"]
     panels = [("orbitals, 4 channels", [(m, [int(e) for e in found], [row["points"][m]["nsPerRay"] for row in found.values()])
@@ -206,5 +215,6 @@ REPORT = {
     "quality": ("Quality and performance (section 5.3)", [quality]),
     "blending": ("Blend functions (section 5.4)", [blends]),
     "memory": ("Memory and rebuild times (Table 1)", [memory, rebuild]),
+    "layout": ("Layout of the voxels", [layout]),
     "scaling": ("Scaling", [sizes, threads, loading]),
 }
