@@ -2,7 +2,7 @@
 // Which layout of the voxels is the fastest to sample? Prints ns per point, all channels, along rays: planar
 // one point at a time, planar eight points at once, channels interleaved with one vector over channels, planar in
 // bricks of 8^3; and of one channel out of many, as a tracker that draws a channel fetches.
-// channel fetches. Built with the tests, run by hand: tests_layout [--json]
+// bench_layout [--json]
 #include <immintrin.h>
 
 #include <algorithm>

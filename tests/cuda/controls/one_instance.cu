@@ -3,6 +3,8 @@
 #include "tests/cuda/controls/one_instance.h"
 
 #include "cuda/pixel_kernels.h"
+#include "renderer/kernel/analog.h"
+#include "renderer/kernel/trackers/process_per_channel.h"
 
 namespace scolopax::test {
 
