@@ -151,7 +151,8 @@ struct Table<Camera> {
 template <>
 struct Table<Integrator> {
   static constexpr std::string_view title = "Integrator";
-  static constexpr std::string_view doc = "How the picture is computed; all methods draw the same, but for noise and bias.";
+  static constexpr std::string_view doc =
+      "How the picture is computed; all methods draw the same, but for noise and bias.";
   static constexpr auto fields = std::tuple{
       field("method", &Integrator::method, "What follows the rays.", {.names = &Lists::methods}),
       field("macrocell", &Integrator::macrocell, "Edge of the cells that bound the extinction.",

@@ -19,11 +19,11 @@ using Now = std::function<TimePoint()>;
 
 /// What is known of a frame; the wire's header says the same.
 struct FrameInfo {
-  std::uint32_t number = 0;    ///< counts a session's encoded frames from 1; 0 until it is encoded
-  std::uint32_t revision = 0;  ///< of the scene it shows: one, never a mixture
-  std::uint32_t samples = 0;   ///< per pixel
+  std::uint32_t number = 0;           ///< counts a session's encoded frames from 1; 0 until it is encoded
+  std::uint32_t revision = 0;         ///< of the scene it shows: one, never a mixture
+  std::uint32_t samples = 0;          ///< per pixel
   Method method = Method::automatic;  ///< that was used
-  float error = 0;             ///< estimated RMSE over linear premultiplied RGB; NaN below two samples
+  float error = 0;                    ///< estimated RMSE over linear premultiplied RGB; NaN below two samples
   std::uint32_t rebuildUs = 0, renderUs = 0,
                 encodeUs = 0;  ///< the last rebuild, the last pass, this encoding
   bool interactive = false;    ///< made while edits arrive, or soon after: maybe smaller

@@ -14,6 +14,8 @@ namespace scolopax::server {
 namespace {
 
 constexpr double kDivisors[] = {1, 1.5, 2, 3, 4, 6, 8, 12, 16};
+/// Of quadrature, in voxels, while edits arrive.
+constexpr double kInteractiveStep = 2;
 constexpr double kProbeDivisor = 4;
 constexpr double kMostDivisor = 16;
 constexpr double kFiner = 0.7, kKept = 1.2;  ///< shares of the target at which the divisor changes
@@ -46,6 +48,19 @@ Scene atDivisor(Scene scene, double divisor) {
   scene.filter = PixelFilter::point;
   return scene;
 }
+
+namespace {
+/// What is drawn while edits arrive, or soon after. The method is ours to choose only where the scene leaves
+/// it to the server: then the quickest that looks like the picture at rest.
+Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive) {
+  Scene scene = atDivisor(resolved.render, divisor);
+  if (interactive && scene.method == Method::automatic) {
+    scene.method = Method::hybrid;
+    scene.step = kInteractiveStep;
+  }
+  return scene;
+}
+}  // namespace
 
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
   const std::uint32_t samples = renderer.samples();
@@ -128,23 +143,25 @@ std::optional<TimePoint> ProgressiveRender::dueAt() const {
 }
 
 double ProgressiveRender::wantedDivisor(const RenderRequest& request, int editedOthers) const {
-  if (!request.interactive && (!request.pollSamples.empty() || !secondsPerPixel_)) return 1;
-  // What a pass costs is not known before the first: a small one tells.
-  if (!secondsPerPixel_) return kProbeDivisor;
+  // What a pass costs is not known before the first: a small one tells. That of the other kind is a first
+  // guess.
+  const auto& known = secondsPerPixel_[request.interactive] ? secondsPerPixel_[request.interactive]
+                                                            : secondsPerPixel_[!request.interactive];
+  if (!request.interactive && (!request.pollSamples.empty() || !known)) return 1;
+  if (!known) return kProbeDivisor;
   const auto pixels =
       std::uint64_t(request.scene->render.width) * std::uint64_t(request.scene->render.height);
   if (!request.interactive) {
     const bool reducedShown = shown_.revision == request.revision && shown_.reduced;
     double seconds = std::chrono::duration<double>(options_.frameTarget).count(), divisor = 1;
-    do divisor = divisorForTarget(pixels, *secondsPerPixel_, seconds *= options_.restFactor);
+    do divisor = divisorForTarget(pixels, *known, seconds *= options_.restFactor);
     while (divisor > 1 && reducedShown && divisor >= divisor_);
     return divisor;
   }
   // All that are edited together have two targets a round, so that the picture stays sharp when they are few.
   const auto target =
       std::max(2 * options_.frameTarget / std::max(2, 1 + editedOthers), options_.leastTarget);
-  return divisorForTarget(pixels, *secondsPerPixel_, std::chrono::duration<double>(target).count(),
-                          interactiveDivisor_);
+  return divisorForTarget(pixels, *known, std::chrono::duration<double>(target).count(), interactiveDivisor_);
 }
 
 std::uint64_t ProgressiveRender::filmSize() const {
@@ -156,7 +173,8 @@ std::uint64_t ProgressiveRender::filmSize() const {
 /// half.
 void ProgressiveRender::learnFromUnfinished() {
   if (!unfinished_ || !scene_) return;
-  secondsPerPixel_ = std::max(secondsPerPixel_.value_or(0), 2 * passSeconds_ / double(filmSize()));
+  auto& known = secondsPerPixel_[small_];
+  known = std::max(known.value_or(0), 2 * passSeconds_ / double(filmSize()));
 }
 
 void ProgressiveRender::takeScene(const RenderRequest& request, const Others& others, PassResult& result) {
@@ -167,11 +185,12 @@ void ProgressiveRender::takeScene(const RenderRequest& request, const Others& ot
     volume_ = request.scene->dataset->volume;
     renderer_ = makeRenderer_(volume_);
     recording_ = false;
-    secondsPerPixel_.reset();
+    secondsPerPixel_[false].reset();
+    secondsPerPixel_[true].reset();
     interactiveDivisor_ = 0;
   }
   const double divisor = wantedDivisor(request, others.edited);
-  const Scene scene = atDivisor(request.scene->render, divisor);
+  const Scene scene = drawnScene(*request.scene, divisor, request.interactive);
   // What is recorded of AOVs takes up to twice as much again, with all channels there may be.
   const auto pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height) * (request.aovs ? 3 : 1);
   if (pixels > filmPixels_ && others.filmPixels + pixels > options_.filmPixels)
@@ -194,7 +213,7 @@ void ProgressiveRender::takeScene(const RenderRequest& request, const Others& ot
   divisor_ = divisor;
   small_ = request.interactive;
   restShown_ = false;
-  if (small_ && secondsPerPixel_) interactiveDivisor_ = divisor;
+  if (small_ && (secondsPerPixel_[false] || secondsPerPixel_[true])) interactiveDivisor_ = divisor;
   result.rebuildSeconds = secondsBetween(begin, now_());
   rebuildUs_ = microseconds(result.rebuildSeconds);
 }
@@ -216,7 +235,8 @@ void ProgressiveRender::addSample(bool urgent, bool othersUrgent, PassResult& re
   filmSeconds_ += result.renderSeconds;
   renderUs_ = microseconds(result.renderSeconds);
   const double perPixel = result.renderSeconds / double(result.pixels);
-  secondsPerPixel_ = secondsPerPixel_ ? 0.5 * (*secondsPerPixel_ + perPixel) : perPixel;
+  auto& known = secondsPerPixel_[small_];
+  known = known ? 0.5 * (*known + perPixel) : perPixel;
 }
 
 /// Mixes the reduced picture that is on screen into the one that takes its place; whether there was one.

@@ -100,11 +100,12 @@ class ProgressiveRender {
   bool small_ = false;       ///< the film was begun while edits arrived
   bool restShown_ = false;   ///< the film has been shown since they stopped
   TimePoint passBegan_;
-  double passSeconds_ = 0;                 ///< spent on the pass so far
-  double divisor_ = 1;                     ///< of width and height
-  double interactiveDivisor_ = 0;          ///< the last one while edits arrived; 0 before
-  double filmSeconds_ = 0;                 ///< spent on the film's samples
-  std::optional<double> secondsPerPixel_;  ///< of one sample, from earlier passes
+  double passSeconds_ = 0;         ///< spent on the pass so far
+  double divisor_ = 1;             ///< of width and height
+  double interactiveDivisor_ = 0;  ///< the last one while edits arrived; 0 before
+  double filmSeconds_ = 0;         ///< spent on the film's samples
+  /// Of one sample, from earlier passes: at rest, and while edits arrive.
+  std::optional<double> secondsPerPixel_[2];
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
 
   std::uint64_t filmPixels_ = 0;

@@ -52,6 +52,7 @@ class CpuRenderer final : public Renderer {
     if (stats.filmReset) {
       resetRecords();
       bias_.reset();
+      if (scene.method == Method::automatic) bias_ = automaticBias_;
     }
     return stats;
   }
@@ -89,7 +90,9 @@ class CpuRenderer final : public Renderer {
   std::uint32_t samples() const override { return film_.samples(); }
   double estimatedError() const override {
     const double noise = film_.estimatedError();
-    if (std::isnan(noise) || !hasStep(plan_.scene().method)) return noise;
+    if (!hasStep(plan_.scene().method)) return noise;
+    // A film of few samples may be one of many that edits make, and is not worth the thumbnails.
+    if (!bias_ && film_.samples() < kSamplesWorthBias) return noise;
     if (!bias_) arena_.execute([&] { bias_ = estimateBias(plan_); });
     return std::hypot(noise, *bias_);
   }
@@ -143,9 +146,13 @@ class CpuRenderer final : public Renderer {
     chosen.step = automatic_.step;
     RebuildStats stats = plan_.update(chosen);
     if (!stats.filmReset && scene.targetError == target_) return stats;
-    // Half of the error is left to noise, and light, with which this is not tried, may add to the bias.
-    const auto step = largestStep(plan_, scene.targetError / (scene.shading || scene.shadows ? 4 : 2));
-    automatic_ = step ? Choice{Method::raymarch, *step} : Choice{Method::superposed, Scene().step};
+    // Half of the error is left to noise; light, with which this is not tried, may add to the bias.
+    const double margin = scene.shading || scene.shadows ? 1.5 : 1;
+    const auto found = largestStep(plan_, scene.targetError / 2 / margin);
+    // Shadow rays are what costs most where there are any.
+    const Method quadrature = scene.shadows ? Method::hybrid : Method::raymarch;
+    automatic_ = found ? Choice{quadrature, found->step} : Choice{Method::superposed, Scene().step};
+    automaticBias_ = found ? found->bias * margin : 0;
     target_ = scene.targetError;
     if (automatic_.method == chosen.method && automatic_.step == chosen.step) return stats;
     chosen.method = automatic_.method;
@@ -193,7 +200,9 @@ class CpuRenderer final : public Renderer {
   RenderStats stats_;
   std::vector<std::uint64_t> fetches_;  // one per pixel while recording
   FirstCollisions first_;
+  static constexpr std::uint32_t kSamplesWorthBias = 16;
   Choice automatic_{Method::raymarch, 1};
+  double automaticBias_ = 0;
   double target_ = 0;                   // for which it was made
   mutable std::optional<double> bias_;  // of the film, once somebody has asked for its error
   mutable tbb::task_arena arena_;

@@ -99,7 +99,7 @@ double estimateBias(const RenderPlan& plan) {
                  false);
 }
 
-std::optional<double> largestStep(const RenderPlan& plan, double target) {
+std::optional<BiasedStep> largestStep(const RenderPlan& plan, double target) {
   Scene unlit = plan.scene();
   unlit.shading = unlit.shadows = false;
   Thumbnails thumbnails(plan, unlit, kThumbnailSide);
@@ -107,7 +107,8 @@ std::optional<double> largestStep(const RenderPlan& plan, double target) {
   for (const double step : kSteps) {
     Pictures fine = thumbnails.render(step / 2, 1, kSamples);
     // Where bias is far below noise, its estimate may be 0 by chance.
-    if (errorOf(coarse, fine, true) <= target) return step;
+    const double bias = errorOf(coarse, fine, true);
+    if (bias <= target) return BiasedStep{step, bias};
     coarse = std::move(fine);
   }
   return std::nullopt;

@@ -17,8 +17,14 @@ inline constexpr int kThumbnailSide = 24, kLitThumbnailSide = 12;
 /// the caller's arena.
 double estimateBias(const RenderPlan& plan);
 
-/// The largest of 4, 2, 1, ... 1/8 at which the bias without light stays below `target`; none when it does at
+/// A step, and the bias that was found for it.
+struct BiasedStep {
+  double step;  ///< smallest spacings
+  double bias;
+};
+
+/// The largest of 4, 2, 1, ... 1/8 at which the bias without light is at most `target`; none when it is at
 /// none. The same for the same scene and volume, whatever the picture's size.
-std::optional<double> largestStep(const RenderPlan& plan, double target);
+std::optional<BiasedStep> largestStep(const RenderPlan& plan, double target);
 
 }  // namespace scolopax

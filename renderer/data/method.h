@@ -21,7 +21,7 @@ namespace scolopax {
 
 #define SCOLOPAX_METHODS(X) /* Listings 3 (n-dda, mended) and 4 (sync-dda); section 5.1 (cumulative) */     \
   X(automatic, "auto",                                                                                      \
-    "raymarch with the largest step whose bias stays below the error asked for, else superposed")           \
+    "raymarch (hybrid for shadows) with the largest step that the error asked for allows, else superposed") \
   X(superposed, "superposed",                                                                               \
     "follows all channels at once and looks up one of them a step; exact but for noise")                    \
   X(cumulative, "cumulative",                                                                               \

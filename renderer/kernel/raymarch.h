@@ -138,9 +138,11 @@ SCOLOPAX_HD float marchTransmittance(const SceneView& scene, const Ray& ray, Int
                                      float offset, SampleCost* cost) {
   float depth = 0.0f;
   const auto visit = [&](const SegmentRun& run) {
-    for (int k = 0; k < run.count; ++k)
+    for (int k = 0; k < run.count; ++k) {
       depth += visitParts<Blend>(scene, run, k, [](int, const Part&) {}) * (run.t[k + 1] - run.t[k]);
-    return depth < kOpaqueDepth;
+      if (!(depth < kOpaqueDepth)) return false;  // here, not after the run: runs differ between launchers
+    }
+    return true;
   };
   SegmentWalk(scene, ray, inside, offset, kShadowSteps * scene.step, cost, visit).follow(only);
   return 1.0f - absorbed(depth);

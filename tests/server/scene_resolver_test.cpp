@@ -39,9 +39,19 @@ TEST(SceneResolver, FillsEveryValueOfAnEmptyScene) {
   EXPECT_NE(scene->resolved["channels"][0]["color"], scene->resolved["channels"][1]["color"]);
   EXPECT_EQ(scene->resolved["camera"]["eye"].size(), 3u);
   EXPECT_EQ(scene->resolved["integrator"]["method"], "auto");
-  EXPECT_EQ(scene->render.method, Method::superposed);
+  EXPECT_EQ(scene->render.method, Method::automatic);
   EXPECT_EQ(scene->resolved["stop"], (json{{"samples", 64}}));
   EXPECT_EQ(scene->stop.samples, 64u);
+}
+
+TEST(SceneResolver, TellsAutoTheErrorThatIsAskedForWhichThenDecidesThePicture) {
+  const auto plain = resolver().replace(json::object());
+  const auto fine = resolver().replace({{"stop", {{"error", 1e-4}}}});
+  EXPECT_EQ(fine->render.targetError, 1e-4);
+  EXPECT_NE(fine->picture, plain->picture);
+  const json tracker = {{"method", "superposed"}};
+  EXPECT_EQ(resolver().replace({{"stop", {{"error", 1e-4}}}, {"integrator", tracker}})->picture,
+            resolver().replace({{"integrator", tracker}})->picture);
 }
 
 TEST(SceneResolver, ResolvesAResolvedSceneToItself) {

@@ -30,14 +30,14 @@ class Bench(unittest.TestCase):
         with open(self.path("b.json"), encoding="utf-8") as file:
             told = json.load(file)
         points = {(p["method"], p["samples"], p["step"]): p for p in told["points"]}
-        self.assertEqual(len(points), 4 * 2 + 2 * 2)
+        self.assertEqual(len(points), 4 * 2 + 2 * 2 * 2)
         for (method, samples, step), p in points.items():
             self.assertGreater(p["rmse"], 0)
             self.assertAlmostEqual(p["nsPerRay"], p["seconds"] * 1e9 / (24 * 20 * samples), delta=1e-6 * p["nsPerRay"])
             self.assertGreater(p["cellStepsPerRay"], 0)
             if method == "sync-dda":
                 self.assertEqual(p["efficiencyToSyncDda"], 1)
-            self.assertEqual(step is None, method != "raymarch")
+            self.assertEqual(step is None, method not in ("raymarch", "hybrid"))
         for method in ("superposed", "cumulative", "sync-dda", "n-dda"):
             # 16 times the samples: about a quarter of the error, or less.
             self.assertLess(points[method, 64, None]["rmse"], 0.4 * points[method, 4, None]["rmse"])
@@ -47,7 +47,7 @@ class Bench(unittest.TestCase):
         self.assertLess(points["raymarch", 64, 0.25]["rmse"], points["raymarch", 64, 2]["rmse"])
         self.assertGreater(points["raymarch", 4, 0.25]["fetchesPerRay"], 4 * points["raymarch", 4, 2]["fetchesPerRay"])
         self.assertEqual([t["method"] for t in told["timeToError"]],
-                         ["superposed", "cumulative", "sync-dda", "n-dda", "raymarch"])
+                         ["superposed", "cumulative", "sync-dda", "n-dda", "raymarch", "hybrid"])
         for t in told["timeToError"][:4]:
             # A tenth of the error of a tracker takes a hundred times the samples.
             self.assertAlmostEqual(t["secondsToRmse0.001"], 100 * t["secondsToRmse0.01"], delta=t["secondsToRmse0.01"])
