@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which layout of the voxels is the fastest to sample? Prints ns per point, all channels, along rays: planar
-// one point at a time, planar eight points at once, channels interleaved with one vector over channels, planar in
-// bricks of 8^3; and of one channel out of many, as a tracker that draws a channel fetches.
+// one point at a time, planar eight points at once, channels interleaved with one vector over channels,
+// planar in bricks of 8^3; and of one channel out of many, as a tracker that draws a channel fetches.
 // bench_layout [--json]
 #include <immintrin.h>
 
@@ -111,6 +111,8 @@ double nsPerPoint(const std::vector<Line>& lines, const std::function<float(cons
   return times[times.size() / 2] / (double(lines.size()) * kSteps);
 }
 
+bool furtherRow = false;  // of the JSON
+
 template <class T>
 void measure(const char* type, ScalarType scalar, int channels, bool json) {
   std::vector<VoxelBuffer> planes;
@@ -193,13 +195,12 @@ void measure(const char* type, ScalarType scalar, int channels, bool json) {
                                               axisWeight(p.z, kSide, stride * kSide * kSide));
                    }));
     if (json) {
-      static bool further = false;
       std::printf(
           "%s{\"type\": \"%s\", \"channels\": %d, \"rays\": \"%s\", \"planar\": %.2f, \"planar8\": %.2f, "
           "\"interleaved\": %.2f, \"bricked\": %.2f, \"onePlanar\": %.2f, \"oneInterleaved\": %.2f}",
-          further ? ",\n" : "[", type, channels, name, planar, together, interleave, brick, one,
+          furtherRow ? ",\n" : "[", type, channels, name, planar, together, interleave, brick, one,
           oneInterleaved);
-      further = true;
+      furtherRow = true;
     } else {
       std::printf("%-4s %9d %8s %9.2f %9.2f %12.2f %8.2f %11.2f %16.2f\n", type, channels, name, planar,
                   together, interleave, brick, one, oneInterleaved);

@@ -4,7 +4,7 @@
 import json
 import sys
 
-from report import table
+from sections import table
 
 BAR = 5  # times less than VTK's: what is aimed at
 
