@@ -123,7 +123,8 @@ void measure(const char* type, int edge, bool json, bool* first) {
       wideCells = majorants.update(cells, boundsOf(a), true);
       flip = !flip;
     });
-    const double data = double(channel.voxels.count() * sizeBytes(channel.voxels.type())), count = double(cells->cellCount());
+    const double data = double(channel.voxels.count() * sizeBytes(channel.voxels.type())),
+                 count = double(cells->cellCount());
     if (json)
       std::printf(
           "%s  {\"type\": \"%s\", \"edge\": %d, \"macrocell\": %d, \"cells\": %zu, \"bytesPerCell\": %.3f, "
