@@ -140,7 +140,10 @@ class CpuRenderer final : public Renderer {
   RebuildStats take(const Scene& scene) {
     Scene chosen = scene;
     chosen.targetError = 0;  // makes no picture of its own
-    if (scene.method != Method::automatic) return plan_.update(chosen);
+    if (scene.method != Method::automatic) {
+      target_ = 0;  // what was chosen is not of this scene, even if it says the same
+      return plan_.update(chosen);
+    }
     // The choice before, if there was one: when nothing else is new either, the film goes on.
     chosen.method = automatic_.method;
     chosen.step = automatic_.step;

@@ -161,8 +161,7 @@ SCOLOPAX_HD inline Collision collisionAt(const SceneView& scene, const Ray& ray,
 template <class Blend, class Features>
 class Strata {
  public:
-  SCOLOPAX_HD Strata(const SceneView& scene, const Ray& ray, int only, const Sampler& sampler,
-                     SampleCost* cost)
+  SCOLOPAX_HD Strata(const SceneView& scene, const Ray& ray, int only, Sampler& sampler, SampleCost* cost)
       : scene_(scene), ray_(ray), only_(only), sampler_(sampler), cost_(cost) {}
 
   /// `weight`, above 0: of channel n's light, with `emission` that times its mean colour; absorbed about t.
@@ -223,7 +222,7 @@ class Strata {
   const SceneView& scene_;
   const Ray& ray_;
   int only_;
-  Sampler sampler_;
+  Sampler& sampler_;
   SampleCost* cost_;
   RandomBlock random_{};
   Place all_;
@@ -251,14 +250,14 @@ SCOLOPAX_HD int channelOf(const SceneView& scene, const SegmentRun& run, int k, 
 /// Premultiplied RGBA of a ray; `only` >= 0 marches that channel alone.
 template <class Blend, class Features>
 SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval inside, int only,
-                               Sampler& sampler, SampleCost* cost, FirstCollision* first) {
+                               Sampler& sampler, Sampler& ofStrata, SampleCost* cost, FirstCollision* first) {
   glm::vec3 color(0.0f);
   float transmittance = 1.0f, opacity = 0.0f;  // both: 1 - transmittance would lose what is thin
   const RandomBlock random = sampler.next();
   // A tracker's ray would end where the opacity passes this number.
   const float end = first ? uniformOf(random.y) : kInfinity;
   bool ended = false;
-  [[maybe_unused]] Strata<Blend, Features> strata(scene, ray, only, sampler.aside(), cost);
+  [[maybe_unused]] Strata<Blend, Features> strata(scene, ray, only, ofStrata, cost);
   const auto visit = [&](const SegmentRun& run) {
     for (int k = 0; k < run.count; ++k) {
       const float length = run.t[k + 1] - run.t[k];
@@ -300,17 +299,19 @@ struct RayMarch {
   template <class Blend, class Features>
   SCOLOPAX_HD static glm::vec4 sample(const SceneView& scene, const Ray& ray, Interval inside,
                                       Sampler& sampler, SampleCost* cost, FirstCollision* first) {
+    Sampler ofStrata = sampler.aside();  // one for all channels: their draws are independent
     if constexpr (Blend::kSeparate) {
       glm::vec3 color(0.0f);
       float opacity = 0.0f;
       for (int n = 0; n < scene.channelCount; ++n) {
-        const glm::vec4 alone = marchRay<Blend, Features>(scene, ray, inside, n, sampler, cost, first);
+        const glm::vec4 alone =
+            marchRay<Blend, Features>(scene, ray, inside, n, sampler, ofStrata, cost, first);
         color += glm::vec3(alone);
         opacity += (1.0f - opacity) * alone.w;
       }
       return glm::vec4(color, opacity);
     } else {
-      return marchRay<Blend, Features>(scene, ray, inside, -1, sampler, cost, first);
+      return marchRay<Blend, Features>(scene, ray, inside, -1, sampler, ofStrata, cost, first);
     }
   }
 };

@@ -87,6 +87,24 @@ TEST(Automatic, DependsOnSceneAndDataAlone) {
   EXPECT_LT(chosen(volume, fine).step, chosen(volume, scene).step);
 }
 
+TEST(Automatic, ChoosesAnewAfterASceneThatSaidWhatWasChosenForAnother) {
+  const auto volume = orbitals();
+  const Scene sharp = automaticScene(*volume);
+  Scene smooth = sharp;
+  for (ChannelAppearance& channel : smooth.channels) channel.density = 0.005;
+  const Choice ofSmooth = chosen(volume, smooth), ofSharp = chosen(volume, sharp);
+  ASSERT_NE(ofSmooth.step, ofSharp.step);
+  const auto renderer = makeCpuRenderer(volume, 2);
+  renderer->setScene(smooth);
+  Scene said = sharp;
+  said.method = ofSmooth.method;
+  said.step = ofSmooth.step;
+  renderer->setScene(said);
+  renderer->setScene(sharp);
+  EXPECT_EQ(renderer->choice().method, ofSharp.method);
+  EXPECT_EQ(renderer->choice().step, ofSharp.step);
+}
+
 TEST(Automatic, DrawsWhatItsChoiceDraws) {
   const auto volume = orbitals();
   const Scene scene = automaticScene(*volume);
