@@ -12,6 +12,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/cpu/pass.h"
+#include "renderer/cpu/ray_packets.h"
 #include "renderer/cpu/sample_batch.h"
 #include "renderer/cpu/thumbnails.h"
 #include "renderer/data/film.h"
@@ -24,8 +25,9 @@ namespace scolopax {
 namespace {
 
 /// Without light there is nothing that a shadow could take away.
-TileFunction chooseKernel(Scene scene, const kernel::SceneView& view) {
+TileFunction chooseKernel(Scene scene, const kernel::SceneView& view, bool recording) {
   scene.shadows = scene.shadows && view.lightCount > 0;
+  if (const TileFunction packets = recording ? nullptr : packetTileFunction(scene, view)) return packets;
   return visitIntegrator(scene,
                          [&](auto type) { return chooseTileFunction<typename decltype(type)::type>(scene); });
 }
@@ -72,7 +74,7 @@ class CpuRenderer final : public Renderer {
                     done_.data(),
                     &cancel,
                     std::chrono::steady_clock::now() + budget};
-    const TileFunction renderTileAt = chooseKernel(plan_.scene(), scene);
+    const TileFunction renderTileAt = chooseKernel(plan_.scene(), scene, recording_);
     const int tilesX = (scene.width + kTile - 1) / kTile, tilesY = (scene.height + kTile - 1) / kTile;
     bool complete = false;
     arena_.execute([&] {

@@ -3,10 +3,8 @@
 
 #include <cstring>
 
+#include "renderer/cpu/lanes.h"
 #include "renderer/kernel/sample_volume.h"
-#if defined(__x86_64__)
-#include <immintrin.h>
-#endif
 
 namespace scolopax {
 namespace {
@@ -27,10 +25,6 @@ void sampleBaseline(const SceneView& scene, std::uint32_t channels, const PointB
 }
 
 #if defined(__x86_64__)
-// Functions, not files, have the instruction set: an inline function of a header that a file of its own
-// compiled for AVX2 might be the one that the linker keeps for everybody.
-#define SCOLOPAX_AVX2 __attribute__((target("avx2"), always_inline)) inline
-
 /// kernel::axisWeight of eight points: neighbours' indices, and the weight of the second.
 struct Axis {
   __m256i low, high;
@@ -52,6 +46,12 @@ SCOLOPAX_AVX2 __m256 lerp8(__m256 a, __m256 b, __m256 t) {
 }
 SCOLOPAX_AVX2 __m128 lerp4(__m128 a, __m128 b, float t) {
   return _mm_add_ps(a, _mm_mul_ps(_mm_set1_ps(t), _mm_sub_ps(b, a)));
+}
+
+SCOLOPAX_AVX2 int largestOf(__m256i x) {
+  const __m128i four = _mm_max_epi32(_mm256_castsi256_si128(x), _mm256_extracti128_si256(x, 1));
+  const __m128i two = _mm_max_epi32(four, _mm_shuffle_epi32(four, 0x4e));
+  return _mm_cvtsi128_si32(_mm_max_epi32(two, _mm_shuffle_epi32(two, 0xb1)));
 }
 
 /// Voxels at eight indices.
@@ -117,7 +117,7 @@ struct Places {
 
 /// One channel at eight points.
 template <class T>
-__attribute__((target("avx2"))) void sampleOne(const Places& at, const ChannelView& channel, float* values) {
+SCOLOPAX_AVX2_ONLY void sampleOne(const Places& at, const ChannelView& channel, float* values) {
   const int stride = channel.stride;
   const T* base = static_cast<const T*>(channel.voxels) + channel.lane +
                   at.first * std::size_t(at.dims.x) * std::size_t(at.dims.y) * std::size_t(stride);
@@ -140,8 +140,8 @@ __attribute__((target("avx2"))) void sampleOne(const Places& at, const ChannelVi
 /// Four neighbouring channels at eight points; members[lane - first lane] is where a channel's values go, or
 /// null.
 template <class T>
-__attribute__((target("avx2"))) void sampleFour(const Places& at, const ChannelView& channel, int lane,
-                                                float* const* members) {
+SCOLOPAX_AVX2_ONLY void sampleFour(const Places& at, const ChannelView& channel, int lane,
+                                   float* const* members) {
   const auto stride = std::size_t(channel.stride), row = stride * std::size_t(at.dims.x),
              slice = row * std::size_t(at.dims.y);
   const T* base = static_cast<const T*>(channel.voxels) + lane;
@@ -169,15 +169,16 @@ __attribute__((target("avx2"))) void sampleFour(const Places& at, const ChannelV
   }
 }
 
-__attribute__((target("avx2"))) void sampleAvx2(const SceneView& scene, std::uint32_t channels,
-                                                const PointBatch& points, float (*values)[kBatchPoints]) {
+SCOLOPAX_AVX2_ONLY void sampleAvx2(const SceneView& scene, std::uint32_t channels, const PointBatch& points,
+                                   float (*values)[kBatchPoints]) {
   const glm::ivec3 dims = scene.dims;
   if (dims.x < 2 || dims.y < 2 || dims.z < 2) return sampleBaseline(scene, channels, points, values);
   Places at{axisOf(points.x, dims.x), axisOf(points.y, dims.y), axisOf(points.z, dims.z), 0, dims};
   // A gather's indices are of 32 bits and count from the slice of the first point.
+  const __m256i slices =
+      _mm256_sub_epi32(at.z.low, _mm256_permutevar8x32_epi32(at.z.low, _mm256_setzero_si256()));
   at.first = std::size_t(_mm256_cvtsi256_si32(at.z.low));
-  const float reach = points.z[kBatchPoints - 1] - points.z[0];
-  const float near = ((reach < 0 ? -reach : reach) + 3.0f) * float(dims.x) * float(dims.y);
+  const float near = float(largestOf(_mm256_abs_epi32(slices)) + 3) * float(dims.x) * float(dims.y);
   for (int n = 0; n < scene.channelCount; ++n) {
     if (!(channels >> n & 1)) continue;
     const ChannelView& channel = scene.channels[n];

@@ -105,7 +105,7 @@ std::size_t MajorantGrid::update(std::shared_ptr<const MacrocellGrid> macrocells
   std::vector<std::uint8_t> radii(blocks.count()), scratch(blocks.count()), stale(blocks.count());
   if (newCells) {
     std::vector<std::uint8_t> noRadii(blocks.count());
-    totals_ = std::vector<TotalCode>(macrocells->cellCount());
+    totals_ = std::vector<TotalCode>(macrocells->cellCount() + 1);  // processors gather pairs of them
     radii_ = std::move(noRadii);
   }
   macrocells_ = std::move(macrocells);
@@ -153,7 +153,22 @@ std::size_t MajorantGrid::update(std::shared_ptr<const MacrocellGrid> macrocells
     });
   });
   radii_ = std::move(radii);
+  measureFilled(blocks.size);
   return touched;
+}
+
+void MajorantGrid::measureFilled(glm::ivec3 blocks) {
+  glm::ivec3 low = blocks, high(0);
+  std::size_t i = 0;
+  for (int z = 0; z < blocks.z; ++z)
+    for (int y = 0; y < blocks.y; ++y)
+      for (int x = 0; x < blocks.x; ++x)
+        if (radii_[i++] == 0) {
+          low = glm::min(low, glm::ivec3(x, y, z));
+          high = glm::max(high, glm::ivec3(x, y, z) + 1);
+        }
+  filledLow_ = low * kernel::kBlockEdge;
+  filledHigh_ = glm::min(high * kernel::kBlockEdge, macrocells_->cells);
 }
 
 float MajorantGrid::totalOf(const LevelInterval* intervals) const {
@@ -171,7 +186,9 @@ kernel::MajorantView MajorantGrid::view() const {
           totals_.data(),
           macrocells_->intervals.data(),
           int(macrocells_->levels.size()),
-          tables_.data()};
+          tables_.data(),
+          filledLow_,
+          filledHigh_};
 }
 
 }  // namespace scolopax

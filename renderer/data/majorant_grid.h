@@ -26,11 +26,13 @@ class MajorantGrid {
 
  private:
   float totalOf(const kernel::LevelInterval* intervals) const;
+  void measureFilled(glm::ivec3 blocks);
   std::shared_ptr<const MacrocellGrid> macrocells_;
   std::vector<kernel::BoundTable> tables_;
   bool sums_ = true;
   std::vector<kernel::TotalCode> totals_;
   std::vector<std::uint8_t> radii_;  // per block
+  glm::ivec3 filledLow_{0}, filledHigh_{0};
 };
 
 }  // namespace scolopax

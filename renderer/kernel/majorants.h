@@ -56,6 +56,8 @@ struct MajorantView {
   const LevelInterval* intervals;  ///< per cell: those of `columns` channels of the volume
   int columns;
   const BoundTable* tables;  ///< per visible channel
+  /// All cells outside these are empty: from filledLow up to below filledHigh. Whole blocks.
+  glm::ivec3 filledLow, filledHigh;
 
   /// Bound of all visible channels together: of the sum of their extinctions, or, for blend modes that show
   /// one channel at a point, of the largest. Not below the sum (or maximum) of their bounds.
