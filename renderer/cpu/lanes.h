@@ -66,6 +66,12 @@ SCOLOPAX_AVX2 Int onesOf(Mask m) { return {_mm256_srli_epi32(_mm256_castps_si256
 SCOLOPAX_AVX2 void store(Int a, std::int32_t* to) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), a.v);
 }
+/// Lane index[i] of a in lane i.
+SCOLOPAX_AVX2 Int permuted(Int a, Int index) { return {_mm256_permutevar8x32_epi32(a.v, index.v)}; }
+/// 0 to 7.
+SCOLOPAX_AVX2 Int laneNumbers() { return {_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)}; }
+/// One lane.
+SCOLOPAX_AVX2 std::int32_t at(Int a, int lane) { return _mm256_cvtsi256_si32(permuted(a, ints(lane)).v); }
 SCOLOPAX_AVX2 int firstOf(Int a) { return _mm256_cvtsi256_si32(a.v); }
 
 struct Float {
@@ -74,6 +80,8 @@ struct Float {
 SCOLOPAX_AVX2 Float floats(float x) { return {_mm256_set1_ps(x)}; }
 SCOLOPAX_AVX2 Float load(const float* from) { return {_mm256_loadu_ps(from)}; }
 SCOLOPAX_AVX2 void store(Float a, float* to) { _mm256_storeu_ps(to, a.v); }
+SCOLOPAX_AVX2 Float permuted(Float a, Int index) { return {_mm256_permutevar8x32_ps(a.v, index.v)}; }
+SCOLOPAX_AVX2 float at(Float a, int lane) { return _mm256_cvtss_f32(permuted(a, ints(lane)).v); }
 SCOLOPAX_AVX2 Float operator+(Float a, Float b) { return {_mm256_add_ps(a.v, b.v)}; }
 SCOLOPAX_AVX2 Float operator-(Float a, Float b) { return {_mm256_sub_ps(a.v, b.v)}; }
 SCOLOPAX_AVX2 Float operator*(Float a, Float b) { return {_mm256_mul_ps(a.v, b.v)}; }
@@ -85,12 +93,16 @@ SCOLOPAX_AVX2 Mask operator>(Float a, Float b) { return b < a; }
 SCOLOPAX_AVX2 Mask operator>=(Float a, Float b) { return b <= a; }
 SCOLOPAX_AVX2 Mask operator==(Float a, Float b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_EQ_OQ)}; }
 SCOLOPAX_AVX2 Float select(Mask m, Float a, Float b) { return {_mm256_blendv_ps(b.v, a.v, m.v)}; }
+SCOLOPAX_AVX2 void put(float x, int lane, Float* to) {
+  *to = select(laneNumbers() == ints(lane), floats(x), *to);
+}
 /// a where the mask is set, else 0.
 SCOLOPAX_AVX2 Float where(Mask m, Float a) { return {_mm256_and_ps(m.v, a.v)}; }
 SCOLOPAX_AVX2 Float minimum(Float a, Float b) { return {_mm256_min_ps(a.v, b.v)}; }
 SCOLOPAX_AVX2 Float maximum(Float a, Float b) { return {_mm256_max_ps(a.v, b.v)}; }
 /// NaN becomes lo; lo <= hi.
 SCOLOPAX_AVX2 Float clamp(Float x, Float lo, Float hi) { return minimum(maximum(x, lo), hi); }
+SCOLOPAX_AVX2 Float negative(Float x) { return {_mm256_xor_ps(x.v, _mm256_set1_ps(-0.0f))}; }
 SCOLOPAX_AVX2 Float squareRoot(Float x) { return {_mm256_sqrt_ps(x.v)}; }
 SCOLOPAX_AVX2 Int truncated(Float x) { return {_mm256_cvttps_epi32(x.v)}; }
 SCOLOPAX_AVX2 Float toFloat(Int x) { return {_mm256_cvtepi32_ps(x.v)}; }
@@ -113,19 +125,10 @@ SCOLOPAX_AVX2 Int gather(const std::uint16_t* base, Int index) {
   return {_mm256_and_si256(words, _mm256_set1_epi32(0xffff))};
 }
 
-/// kernel::absorbed.
-SCOLOPAX_AVX2 Float absorbed(Float depth) {
-  const Float series =
-      depth * (floats(1.0f) -
-               depth * (floats(0.5f) -
-                        depth * (floats(0.166666667f) - depth * (floats(0.0416666667f) -
-                                                                 depth * (floats(0.00833333333f) -
-                                                                          depth * floats(0.00138888889f))))));
-  const Mask thin = depth < floats(0.25f);
-  if (bitsOf(thin) == 0xff) return series;
-  // kernel::exp2Of of what is below 0.
-  const Float x = depth * floats(-1.44269504f);
-  const Int whole = truncated(x + floats(-0.5f));
+/// kernel::exp2Of of numbers below 128.
+SCOLOPAX_AVX2 Float exp2Of(Float x) {
+  const Float half = select(x < floats(0.0f), floats(-0.5f), floats(0.5f));
+  const Int whole = truncated(x + half);
   const Float r = (x - toFloat(whole)) * floats(0.693147181f);
   const Float p =
       floats(1.0f) +
@@ -134,12 +137,46 @@ SCOLOPAX_AVX2 Float absorbed(Float depth) {
                                     r * (floats(0.0416666667f) +
                                          r * (floats(0.00833333333f) +
                                               r * (floats(0.00138888889f) + r * floats(0.000198412698f)))))));
-  const Int half = rightSigned<1>(whole + right<31>(whole));  // rounds towards 0
-  const Int bias = ints(127);
-  const Float a{_mm256_castsi256_ps(left<23>(half + bias).v)};
-  const Float b{_mm256_castsi256_ps(left<23>(whole - half + bias).v)};
-  const Float power = where(x > floats(-126.0f), p * a * b);
-  return select(thin, series, floats(1.0f) - power);
+  const Int first = rightSigned<1>(whole + right<31>(whole)), bias = ints(127);  // rounds towards 0
+  const Float a{_mm256_castsi256_ps(left<23>(first + bias).v)};
+  const Float b{_mm256_castsi256_ps(left<23>(whole - first + bias).v)};
+  return where(x > floats(-126.0f), p * a * b);
+}
+
+/// kernel::log2Of of numbers above 0, normal.
+SCOLOPAX_AVX2 Float log2Of(Float x) {
+  const Int bits{_mm256_castps_si256(x.v)};
+  const Int exponent = rightSigned<23>(bits - ints(0x3f3504f3));
+  const Float f = Float{_mm256_castsi256_ps((bits - left<23>(exponent)).v)} - floats(1.0f);
+  const Float s = f / (floats(2.0f) + f), s2 = s * s;
+  const Float series =
+      s2 * (floats(0.333333333f) +
+            s2 * (floats(0.2f) +
+                  s2 * (floats(0.142857143f) + s2 * (floats(0.111111111f) + s2 * floats(0.0909090909f)))));
+  return toFloat(exponent) + (f - s * (f - floats(2.0f) * series)) * floats(1.44269504f);
+}
+
+/// kernel::power of x in [0, 1].
+SCOLOPAX_AVX2 Float power(Float x, Float exponent) {
+  const Float one = floats(1.0f);
+  const Mask some = x > floats(1.17549435e-38f), whole = x >= one;
+  const Float inner = select(without(some, whole), x, floats(0.5f));
+  const Float result = minimum(exp2Of(exponent * log2Of(inner)), one);
+  return where(some, select(whole, one, result));
+}
+
+/// kernel::absorbed.
+SCOLOPAX_AVX2 Float absorbed(Float depth) {
+  const Float one = floats(1.0f);
+  const Float series =
+      depth *
+      (one - depth * (floats(0.5f) -
+                      depth * (floats(0.166666667f) -
+                               depth * (floats(0.0416666667f) -
+                                        depth * (floats(0.00833333333f) - depth * floats(0.00138888889f))))));
+  const Mask thin = depth < floats(0.25f);
+  if (bitsOf(thin) == 0xff) return series;
+  return select(thin, series, one - exp2Of(depth * floats(-1.44269504f)));
 }
 
 }  // namespace scolopax::lanes

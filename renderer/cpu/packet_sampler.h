@@ -14,40 +14,51 @@ SCOLOPAX_AVX2 Float uniformOf(Int k) {
   return minimum((whole + floats(0.5f)) * floats(0x1p-32f), floats(0x1.fffffep-1f));
 }
 
-/// kernel::Sampler, for blocks of which two words are wanted.
+/// kernel::Sampler, for blocks of which the first three words are wanted; every pixel at a block of its own.
 class PacketSampler {
  public:
   struct Block {
-    Int x, y;
+    Int x, y, z;
   };
   SCOLOPAX_AVX2 PacketSampler(Int pixels, const kernel::SampleNumber& number, std::uint32_t seed)
-      : pixels_(pixels), number_(number), seed_(seed) {}
+      : pixels_(pixels), number_(number), seed_(seed), block_(ints(0)) {}
 
-  SCOLOPAX_AVX2 Block next() {
-    const std::uint32_t block = block_++;
-    if (!number_.lowDiscrepancy || block >= kernel::kLowDiscrepancyBlocks)
-      return pcg4d(number_.sample, block);
-    const std::uint32_t replicate = 0x80000000u | (number_.sample / kernel::kReplicateSamples);
+  /// The others stay where they are, and get anything.
+  SCOLOPAX_AVX2 Block next(Mask which) {
+    const Int block = block_;
+    block_ = block_ + onesOf(which);
+    const Mask low = ints(number_.lowDiscrepancy ? int(kernel::kLowDiscrepancyBlocks) : 0) > block;
+    const Block random = pcg4d(ints(int(number_.sample)), block);
+    if (!any(low & which)) return random;
+    const Int replicate = word(0x80000000u | (number_.sample / kernel::kReplicateSamples));
     const Block scrambling = pcg4d(replicate, block);
-    const std::uint32_t* point = number_.point[block];
-    return {owenScramble(point[0], scrambling.x), owenScramble(point[1], scrambling.y)};
+    const Int row = minimum(block, ints(int(kernel::kLowDiscrepancyBlocks) - 1)) * ints(3);
+    return {select(low, owenScramble(point(row, 0), scrambling.x), random.x),
+            select(low, owenScramble(point(row, 1), scrambling.y), random.y),
+            select(low, owenScramble(point(row, 2), scrambling.z), random.z)};
   }
-  SCOLOPAX_AVX2 std::uint32_t blocks() const { return block_; }
+  SCOLOPAX_AVX2 Int blocks() const { return block_; }
+  /// kernel::Sampler::aside.
+  SCOLOPAX_AVX2 PacketSampler aside() const {
+    return PacketSampler(pixels_ | word(0x80000000u), number_, seed_);
+  }
 
  private:
   SCOLOPAX_AVX2 static Int word(std::uint32_t k) { return ints(int(k)); }
+  SCOLOPAX_AVX2 Int point(Int row, int column) const {
+    return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(&number_.point[0][column]), row.v, 4)};
+  }
 
-  SCOLOPAX_AVX2 Block pcg4d(std::uint32_t sample, std::uint32_t block) const {
+  SCOLOPAX_AVX2 Block pcg4d(Int sample, Int block) const {
     const Int factor = word(1664525u), term = word(1013904223u);
-    Int x = pixels_ * factor + term;
-    Int y = word(sample * 1664525u + 1013904223u);
-    Int z = word(block * 1664525u + 1013904223u);
+    Int x = pixels_ * factor + term, y = sample * factor + term, z = block * factor + term;
     Int w = word(seed_ * 1664525u + 1013904223u);
     x = x + y * w, y = y + z * x, z = z + x * y, w = w + y * z;
     x = x ^ right<16>(x), y = y ^ right<16>(y), z = z ^ right<16>(z), w = w ^ right<16>(w);
     x = x + y * w;
     y = y + z * x;
-    return {x, y};
+    z = z + x * y;
+    return {x, y, z};
   }
 
   SCOLOPAX_AVX2 static Int reverseBits(Int x) {
@@ -61,8 +72,8 @@ class PacketSampler {
         _mm256_broadcastsi128_si256(_mm_setr_epi8(3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12));
     return {_mm256_shuffle_epi8((left<4>(lower) | upper).v, order)};
   }
-  SCOLOPAX_AVX2 static Int owenScramble(std::uint32_t reversed, Int seed) {
-    Int x = word(reversed) + (seed ^ right<16>(seed));
+  SCOLOPAX_AVX2 static Int owenScramble(Int reversed, Int seed) {
+    Int x = reversed + (seed ^ right<16>(seed));
     x = x ^ x * word(0x6c50b47cu);
     x = x ^ x * word(0xb82f1e52u);
     x = x ^ x * word(0xc7afe638u);
@@ -72,7 +83,8 @@ class PacketSampler {
 
   Int pixels_;
   const kernel::SampleNumber& number_;
-  std::uint32_t seed_, block_ = 0;
+  std::uint32_t seed_;
+  Int block_;
 };
 
 }  // namespace scolopax::lanes

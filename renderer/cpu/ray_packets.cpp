@@ -4,277 +4,237 @@
 #include <algorithm>
 #include <bit>
 
+#include "renderer/cpu/packet_light.h"
+#include "renderer/cpu/packet_march.h"
 #include "renderer/cpu/packet_sampler.h"
-#include "renderer/cpu/packet_walk.h"
 #include "renderer/cpu/sample_batch.h"
+#include "renderer/data/instances.h"
 #include "renderer/kernel/blend_modes.h"
-#include "renderer/kernel/raymarch.h"
 
 namespace scolopax {
 #if defined(__x86_64__)
 namespace {
 
 using namespace lanes;
-using kernel::ChannelView;
-using kernel::OpticalCurveView;
-using kernel::OpticalKnot;
 using kernel::SceneView;
 
 /// Pixels of a packet: neighbours, which share voxels and macrocells.
 constexpr int kPacketWidth = 4, kPacketHeight = kLanes / kPacketWidth;
 static_assert(kLanes == kernel::kBatchPoints && kTile % kPacketWidth == 0 && kTile % kPacketHeight == 0);
 
-/// Where rays are on a channel's curves, and on which piece.
-struct Place {
-  Float position;
-  Int piece;
-};
+/// What is left behind a part of the rays, and what that has absorbed: kernel::marchRay's sums.
+struct Absorption {
+  Float transmittance, opacity;
+  SCOLOPAX_AVX2 Absorption() : transmittance(floats(1.0f)), opacity(floats(0.0f)) {}
 
-struct Knots {
-  Float position, inverseWidth, opacity, color[3];
-};
-constexpr int kKnotFloats = sizeof(OpticalKnot) / sizeof(float);
-
-SCOLOPAX_AVX2 Knots knotsAt(const OpticalCurveView& curve, Int index) {
-  const Int at = index * ints(kKnotFloats);
-  const OpticalKnot& first = curve.knots[0];
-  return {gather(&first.position, at),
-          gather(&first.inverseWidth, at),
-          gather(&first.opacity, at),
-          {gather(&first.color.x, at), gather(&first.color.y, at), gather(&first.color.z, at)}};
-}
-SCOLOPAX_AVX2 Knots sameKnot(const OpticalKnot& knot) {
-  return {floats(knot.position),
-          floats(knot.inverseWidth),
-          floats(knot.opacity),
-          {floats(knot.color.x), floats(knot.color.y), floats(knot.color.z)}};
-}
-
-/// kernel::pieceAt.
-SCOLOPAX_AVX2 Int piecesAt(const OpticalCurveView& curve, Float position) {
-  const Mask above = position >= floats(0.0f), inside = above & (position < floats(1.0f));
-  Int k = gather(curve.buckets, truncated(where(inside, position) * floats(float(kernel::kCurveBuckets))));
-  for (;;) {
-    const Int following = minimum(k + ints(1), ints(curve.count - 1));
-    const Mask on = inside & (gather(&curve.knots[0].position, following * ints(kKnotFloats)) <= position);
-    if (!any(on)) break;
-    k = k + onesOf(on);
+  /// Goes over a segment; returns its share of the light for every unit of extinction, 0 where there is none.
+  SCOLOPAX_AVX2 Float pass(Float extinction, Float length) {
+    const Mask some = extinction > floats(0.0f);
+    const Float alpha = absorbed(extinction * length);
+    const Float absorbedHere = transmittance * alpha;
+    opacity = opacity + absorbedHere;
+    transmittance = transmittance * (floats(1.0f) - alpha);
+    return where(some, absorbedHere / extinction);
   }
-  return select(inside, k, select(above, ints(curve.count - 1), ints(-1)));
-}
-
-/// kernel::Optical.
-struct Opticals {
-  Float opacity, color[3];
+  SCOLOPAX_AVX2 Mask lets() const { return transmittance > floats(kernel::kOpaqueTransmittance); }
 };
-/// kernel::opticalIn.
-SCOLOPAX_AVX2 Opticals opticalsIn(const Knots& a, const Knots& b, Int piece, Float position) {
-  const Float along = minimum((position - a.position) * a.inverseWidth, floats(1.0f));
-  const Float t = where(piece > ints(-1), along);
-  Opticals optical{a.opacity + t * (b.opacity - a.opacity), {}};
-  for (int i = 0; i < 3; ++i) optical.color[i] = a.color[i] + t * (b.color[i] - a.color[i]);
-  return optical;
-}
 
-/// What channels do together on a segment of every ray, per world unit.
-struct Sums {
-  Float extinction, emission[3];
-};
-SCOLOPAX_AVX2 Sums nothing() {
-  const Float zero = floats(0.0f);
-  return {zero, {zero, zero, zero}};
-}
+/// Emission and absorption.
+class Glow {
+ public:
+  SCOLOPAX_AVX2 Glow(const SceneView& scene, std::uint32_t channels)
+      : color(vectors(glm::vec3(0.0f))), scene_(scene), channels_(channels) {}
 
-/// Adds kernel::partAlone of a channel for some rays.
-SCOLOPAX_AVX2 void addParts(const ChannelView& channel, const Place& from, const Place& to, Mask wanted,
-                            Sums* sums) {
-  const OpticalCurveView& curve = channel.optical;
-  const Float p = from.position, q = to.position;
-  const Float first = floats(curve.first), last = floats(curve.last);
-  const Mask outside = ((p <= first) & (q <= first)) | ((p >= last) & (q >= last));
-  const Mask seen = without(wanted, outside);
-  if (!any(seen)) return;
-  const Mask linear = seen & (from.piece == to.piece) & (p == p) & (q == q);
-  Float opacity = floats(0.0f), emission[3] = {opacity, opacity, opacity};
-  if (any(linear)) {
-    const Float density = floats(channel.density);
-    const Int lane = ints(std::countr_zero(bitsOf(linear)));
-    const Int same{_mm256_permutevar8x32_epi32(from.piece.v, lane.v)};
-    Knots a, b;
-    if (!any(without(linear, from.piece == same))) {
-      const int k = firstOf(same);
-      a = sameKnot(curve.knots[k < 0 ? 0 : k]);
-      b = sameKnot(curve.knots[k < 0 ? 0 : std::min(k + 1, curve.count - 1)]);
-    } else {
-      a = knotsAt(curve, maximum(from.piece, ints(0)));
-      b = knotsAt(curve, minimum(from.piece + ints(1), ints(curve.count - 1)));
+  SCOLOPAX_AVX2 Mask take(const PacketSegment& segment) {
+    Float extinction = floats(0.0f);
+    Vec emission = vectors(glm::vec3(0.0f));
+    for (int n = 0; n < scene_.channelCount; ++n) {
+      if (!(channels_ >> n & 1)) continue;
+      const Parts parts =
+          partsOf<Detail::emission>(scene_.channels[n], segment.from[n], segment.to[n], segment.live);
+      extinction = extinction + parts.opacity;
+      for (int c = 0; c < 3; ++c) emission[c] = emission[c] + parts.emission[c];
     }
-    const Opticals u = opticalsIn(a, b, from.piece, p), v = opticalsIn(a, b, from.piece, q);
-    opacity = where(linear, floats(0.5f) * (u.opacity + v.opacity) * density);
-    const Float two = floats(2.0f), left = two * u.opacity + v.opacity, right = u.opacity + two * v.opacity;
-    for (int i = 0; i < 3; ++i)
-      emission[i] = where(linear, floats(0.166666667f) * (left * u.color[i] + right * v.color[i]) * density);
+    if (any(extinction > floats(0.0f)))
+      color = color + emission * absorption.pass(extinction, segment.end - segment.start);
+    return absorption.lets();
   }
-  if (const unsigned others = bitsOf(without(seen, linear))) {
-    // Stretches over knots or beside voxels that are not finite.
-    float ends[2][kLanes], parts[4][kLanes];
-    store(p, ends[0]), store(q, ends[1]);
-    store(opacity, parts[0]);
-    for (int i = 0; i < 3; ++i) store(emission[i], parts[1 + i]);
-    for (unsigned left = others; left != 0; left &= left - 1) {
-      const int i = std::countr_zero(left);
-      const float positions[] = {ends[0][i], ends[1][i]};
-      const kernel::Part part = kernel::partAlone(channel, positions);
-      parts[0][i] = part.opacity;
-      for (int c = 0; c < 3; ++c) parts[1 + c][i] = part.emission[c];
+  SCOLOPAX_AVX2 void finish() {}
+
+  Vec color;
+  Absorption absorption;
+
+ private:
+  const SceneView& scene_;
+  std::uint32_t channels_;
+};
+
+/// kernel::Strata.
+class PacketStrata {
+ public:
+  SCOLOPAX_AVX2 PacketStrata(PacketSampler& sampler, PacketCost* cost) : sampler_(sampler), cost_(cost) {
+    all_.weight = floats(0.0f);
+    all_.t = all_.draw = all_.weight;
+    present_ = y_ = z_ = ints(0);
+  }
+
+  SCOLOPAX_AVX2 void add(int n, Mask which, Float weight, const Vec& emission, Float t) {
+    const Mask fresh = which & (all_.weight == floats(0.0f));
+    if (any(fresh)) {
+      const PacketSampler::Block random = sampler_.next(fresh);
+      cost_->randomBlocks = cost_->randomBlocks + onesOf(fresh);
+      all_.draw = select(fresh, uniformOf(random.x), all_.draw);
+      y_ = select(fresh, random.y, y_);
+      z_ = select(fresh, random.z, z_);
+      present_ = select(fresh, ints(0), present_);
     }
-    opacity = load(parts[0]);
-    for (int i = 0; i < 3; ++i) emission[i] = load(parts[1 + i]);
+    Channel& channel = channels_[n];
+    const Int bit = ints(int(1u << n));
+    const Mask begins = without(which, (present_ & bit) == bit);
+    if (any(begins)) {
+      present_ = select(begins, present_ | bit, present_);
+      const Float zero = floats(0.0f), draw = uniformOf(y_ + ints(int(std::uint32_t(n) * 0x9e3779b9u)));
+      channel.place = {select(begins, zero, channel.place.weight), select(begins, draw, channel.place.draw),
+                       select(begins, zero, channel.place.t)};
+      channel.emission = select(begins, vectors(glm::vec3(0.0f)), channel.emission);
+    }
+    channel.emission = select(which, channel.emission + emission, channel.emission);
+    choose(channel.place, which, weight, t);
+    choose(all_, which, weight, t);
   }
-  const Mask some = opacity > floats(0.0f);
-  sums->extinction = sums->extinction + where(some, opacity);
-  for (int i = 0; i < 3; ++i) sums->emission[i] = sums->emission[i] + where(some, emission[i]);
-}
+
+  /// Those that have so much weight wait for light, and begin anew.
+  template <class Light>
+  SCOLOPAX_AVX2 void hand(Mask which, LightQueue& queue, Light& light, float (*colors)[kLanes]) {
+    for (unsigned left = bitsOf(which); left != 0; left &= left - 1) {
+      if (queue.count == kLanes) light.shine(queue, colors);
+      const int i = std::countr_zero(left), slot = queue.count++;
+      queue.lane[slot] = i;
+      queue.t[slot] = at(all_.t, i);
+      queue.offset[slot] = kernel::uniformOf(std::uint32_t(at(z_, i)));
+      const auto present = std::uint32_t(at(present_, i));
+      queue.channels[slot] = std::int32_t(present);
+      for (std::uint32_t bits = present; bits != 0; bits &= bits - 1) {
+        const int n = std::countr_zero(bits);
+        const Channel& from = channels_[n];
+        LightQueue::Channel& to = queue.channel[n];
+        to.weight[slot] = at(from.place.weight, i);
+        to.t[slot] = at(from.place.t, i);
+        for (int c = 0; c < 3; ++c) to.emission[c][slot] = at(from.emission[c], i);
+      }
+    }
+    all_.weight = select(which, floats(0.0f), all_.weight);
+  }
+  SCOLOPAX_AVX2 Float weight() const { return all_.weight; }
+
+ private:
+  struct Place {
+    Float weight, draw, t;
+  };
+  struct Channel {
+    Place place;
+    Vec emission;
+  };
+  SCOLOPAX_AVX2 static void choose(Place& place, Mask which, Float weight, Float t) {
+    const Float one = floats(1.0f), sum = place.weight + weight, chance = weight / sum;
+    const Mask here = place.draw < chance;
+    const Float rest = select(here, place.draw / chance, (place.draw - chance) / (one - chance));
+    place.weight = select(which, sum, place.weight);
+    place.t = select(which & here, t, place.t);
+    place.draw = select(which, rest, place.draw);
+  }
+
+  PacketSampler& sampler_;
+  PacketCost* cost_;
+  Place all_;
+  Int present_, y_, z_;
+  Channel channels_[kernel::kMaxVisibleChannels];
+};
+
+/// Light that channels throw back.
+template <class Features>
+class Reflection {
+ public:
+  SCOLOPAX_AVX2 Reflection(const SceneView& scene, const Rays& rays, std::uint32_t channels,
+                           PacketSampler& ofStrata, PacketCost* cost)
+      : scene_(scene), channels_(channels), strata_(ofStrata, cost), light_(scene, rays, channels, cost) {
+    for (float(&row)[kLanes] : colors_) std::fill(std::begin(row), std::end(row), 0.0f);
+  }
+
+  SCOLOPAX_AVX2 Mask take(const PacketSegment& segment) {
+    Float extinction = floats(0.0f);
+    for (int n = 0; n < scene_.channelCount; ++n) {
+      if (!(channels_ >> n & 1)) continue;
+      parts_[n] = partsOf<Detail::moment>(scene_.channels[n], segment.from[n], segment.to[n], segment.live);
+      extinction = extinction + parts_[n].opacity;
+    }
+    if (!any(extinction > floats(0.0f))) return absorption.lets();
+    const Float length = segment.end - segment.start, scale = absorption.pass(extinction, length);
+    for (int n = 0; n < scene_.channelCount; ++n) {
+      if (!(channels_ >> n & 1)) continue;
+      const Parts& parts = parts_[n];
+      const Mask seen = parts.opacity > floats(0.0f);
+      if (!any(seen)) continue;
+      const Float t = segment.start + minimum(parts.moment / parts.opacity, floats(1.0f)) * length;
+      const Vec emission{{parts.emission[0], parts.emission[1], parts.emission[2]}};
+      strata_.add(n, seen, parts.opacity * scale, emission * scale, t);
+    }
+    const Mask full = strata_.weight() >= floats(scene_.stratum);
+    if (any(full)) strata_.hand(full, queue_, light_, colors_);
+    return absorption.lets();
+  }
+  SCOLOPAX_AVX2 void finish() {
+    strata_.hand(strata_.weight() > floats(0.0f), queue_, light_, colors_);
+    if (queue_.count > 0) light_.shine(queue_, colors_);
+    color = {{load(colors_[0]), load(colors_[1]), load(colors_[2])}};
+  }
+
+  Vec color;
+  Absorption absorption;
+
+ private:
+  const SceneView& scene_;
+  std::uint32_t channels_;
+  PacketStrata strata_;
+  PacketLight<Features> light_;
+  LightQueue queue_;
+  float colors_[3][kLanes];
+  Parts parts_[kernel::kMaxVisibleChannels];
+};
 
 /// Rays of a packet, their light so far and what they have cost.
 struct Packet {
-  SCOLOPAX_AVX2 Packet() {
-    for (Float* const sum : {&color[0], &color[1], &color[2], &opacity}) *sum = floats(0.0f);
-    for (Int* const count : {&fetches, &cellSteps, &truncated}) *count = ints(0);
-  }
+  SCOLOPAX_AVX2 Packet() : color(vectors(glm::vec3(0.0f))), opacity(floats(0.0f)), cost(noCost()) {}
   Rays rays;
   Intervals inside;
-  Float color[3], opacity;
-  Int fetches, cellSteps, truncated;
+  Vec color;
+  Float opacity;
+  PacketCost cost;
 };
 
-/// kernel::marchRay for eight rays.
-class March {
- public:
-  SCOLOPAX_AVX2 March(const SceneView& scene, Packet& packet, int only, Float offset)
-      : scene_(scene),
-        packet_(packet),
-        channels_(only >= 0                  ? 1u << only
-                  : scene.channelCount == 32 ? ~0u
-                                             : (1u << scene.channelCount) - 1),
-        fetchesOfPoint_(std::popcount(channels_)),
-        offset_(offset),
-        live_(packet.inside.meets) {}
-
-  SCOLOPAX_AVX2 void follow() {
-    const Intervals& inside = packet_.inside;
-    PacketWalk walk(packet_.rays, inside, scene_.majorants);
-    Float transmittance = floats(1.0f);
-    Float color[3] = {floats(0.0f), floats(0.0f), floats(0.0f)}, opacity = floats(0.0f);
-    live_ = live_ & walk.meets();
-    if (!any(live_)) return;
-    int sampled = -2;  // segment whose end was sampled last
-    int taken = 0;
-    for (int k = firstSegment(walk.enter()); any(live_);) {
-      const Float start = k > 0 ? endOf(k - 1) : inside.enter, end = endOf(k);
-      if (!meetsSomething(walk, start, end)) {
-        k = std::max(k + 1, firstSegment(select(walk.full(), walk.enter(), walk.exit())));
-        continue;
-      }
-      if (++taken > kernel::kMaxSegments) {
-        packet_.truncated = packet_.truncated + onesOf(live_);
-        break;
-      }
-      if (sampled != k - 1) sample(start, current_);
-      sampled = k;
-      sample(end, next_);
-      Sums sums = nothing();
-      for (int n = 0; n < scene_.channelCount; ++n) {
-        if (!(channels_ >> n & 1)) continue;
-        addParts(scene_.channels[n], current_[n], next_[n], live_, &sums);
-        current_[n] = next_[n];
-      }
-      const Mask some = sums.extinction > floats(0.0f);
-      if (any(some)) {
-        const Float alpha = absorbed(sums.extinction * (end - start));
-        const Float absorbedHere = transmittance * alpha;
-        const Float scale = where(some, absorbedHere / sums.extinction);
-        for (int i = 0; i < 3; ++i) color[i] = color[i] + sums.emission[i] * scale;
-        opacity = opacity + absorbedHere;
-        transmittance = transmittance * (floats(1.0f) - alpha);
-      }
-      live_ = live_ & (transmittance > floats(kernel::kOpaqueTransmittance)) & (end < inside.exit);
-      ++k;
-    }
-    const Float own = minimum(opacity, floats(1.0f));
-    for (int i = 0; i < 3; ++i) packet_.color[i] = packet_.color[i] + color[i];
-    packet_.opacity = packet_.opacity + (floats(1.0f) - packet_.opacity) * own;
+/// kernel::marchRay of these channels, added to the packet's.
+template <class Features>
+SCOLOPAX_AVX2 void march(const SceneView& scene, std::uint32_t channels, Float offset,
+                         PacketSampler& ofStrata, Packet& packet) {
+  PacketMarch along(scene, packet.rays, packet.inside, channels, offset, scene.step, &packet.cost);
+  const auto add = [&](auto& sink) __attribute__((target("avx2"))) {
+    along.follow(sink);
+    sink.finish();
+    packet.color = packet.color + sink.color;
+    const Float one = floats(1.0f), opacity = minimum(sink.absorption.opacity, one);
+    packet.opacity = packet.opacity + (one - packet.opacity) * opacity;
+  };
+  if constexpr (Features::kAny) {
+    Reflection<Features> reflection(scene, packet.rays, channels, ofStrata, &packet.cost);
+    add(reflection);
+  } else {
+    Glow glow(scene, channels);
+    add(glow);
   }
-
- private:
-  SCOLOPAX_AVX2 Float endOf(int segment) const {
-    return minimum(packet_.inside.enter + (floats(float(segment)) + offset_) * floats(scene_.step),
-                   packet_.inside.exit);
-  }
-
-  /// Whether a ray is in a cell that is not empty between these places. If none is, the walk has gone on to
-  /// the next such cell of every ray or some way there, and rays that have none left have ended.
-  SCOLOPAX_AVX2 bool meetsSomething(PacketWalk& walk, Float start, Float end) {
-    walk.jump(start);
-    packet_.cellSteps = packet_.cellSteps + onesOf(live_);
-    for (;;) {
-      if (any(live_ & walk.full() & (walk.enter() < end))) return true;
-      walk.measure();
-      live_ = live_ & (walk.full() | (walk.exit() < packet_.inside.exit));
-      if (!any(live_ & (walk.exit() < end))) return false;
-      const Mask moving = without(live_, walk.full());
-      walk.advance(moving);
-      packet_.cellSteps = packet_.cellSteps + onesOf(moving);
-    }
-  }
-
-  /// First segment that has one of these points, of rays that have not ended.
-  SCOLOPAX_AVX2 int firstSegment(Float t) const {
-    const Float place = (t - packet_.inside.enter) / floats(scene_.step) - offset_ + floats(1.0f);
-    return int(kernel::clamp(smallestOf(select(live_, place, floats(kernel::kInfinity))), 0.0f, 1e9f));
-  }
-
-  SCOLOPAX_AVX2 void sample(Float t, Place* places) {
-    kernel::PointBatch points;
-    store(packet_.rays.origin[0] + t * packet_.rays.direction[0], points.x);
-    store(packet_.rays.origin[1] + t * packet_.rays.direction[1], points.y);
-    store(packet_.rays.origin[2] + t * packet_.rays.direction[2], points.z);
-    float stored[kernel::kMaxVisibleChannels][kLanes];
-    scene_.sampleBatch(scene_, channels_, points, stored);
-    for (int n = 0; n < scene_.channelCount; ++n) {
-      if (!(channels_ >> n & 1)) continue;
-      const ChannelView& channel = scene_.channels[n];
-      places[n].position = positionsOf(channel, stored[n]);
-      places[n].piece = piecesAt(channel.optical, places[n].position);
-    }
-    packet_.fetches = packet_.fetches + onesOf(live_) * ints(fetchesOfPoint_);
-  }
-
-  /// kernel::stretchPosition.
-  SCOLOPAX_AVX2 static Float positionsOf(const ChannelView& channel, const float* stored) {
-    if (channel.gamma != 1.0f) {
-      float positions[kLanes];
-      for (int i = 0; i < kLanes; ++i) positions[i] = kernel::stretchPosition(channel, stored[i]);
-      return load(positions);
-    }
-    const Float value = load(stored), far = floats(1e6f);
-    const Float position =
-        clamp((value - floats(channel.origin)) * floats(channel.scale) + floats(channel.offset),
-              floats(0.0f) - far, far);
-    return select(isFinite(value), position, floats(__builtin_nanf("")));
-  }
-
-  const SceneView& scene_;
-  Packet& packet_;
-  std::uint32_t channels_;
-  int fetchesOfPoint_;
-  Float offset_;
-  Mask live_;
-  Place current_[kernel::kMaxVisibleChannels], next_[kernel::kMaxVisibleChannels];
-};
+}
 
 /// kernel::RenderPixel for the pixels of a packet from (x, y) on, as far as they are below (endX, endY).
-template <class Blend>
+template <class Blend, class Features>
 SCOLOPAX_AVX2_ONLY void renderPacket(const Pass& pass, int x, int y, int endX, int endY) {
   const SceneView& scene = pass.scene;
   std::int32_t columns[kLanes], rows[kLanes], pixels[kLanes];
@@ -286,38 +246,40 @@ SCOLOPAX_AVX2_ONLY void renderPacket(const Pass& pass, int x, int y, int endX, i
     if (column < endX && row < endY && !pass.done[pixels[i]]) todo |= 1u << i;
   }
   if (todo == 0) return;
+  const Int bit{_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128)};
+  const Mask wanted = (ints(int(todo)) & bit) == bit;
   PacketSampler sampler(load(pixels), pass.number, scene.seed);
+  PacketSampler ofStrata = sampler.aside();
   Float across = floats(0.5f), down = across;
-  const PacketSampler::Block jitter = sampler.next();
+  const PacketSampler::Block jitter = sampler.next(wanted);
   if (scene.filterBox) across = uniformOf(jitter.x), down = uniformOf(jitter.y);
   Packet packet;
   packet.rays = raysThrough(scene.rays, toFloat(load(columns)) + across, toFloat(load(rows)) + down);
   packet.inside = clipToBox(packet.rays, scene.dims);
-  const Int bit{_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128)};
-  packet.inside.meets = packet.inside.meets & ((ints(int(todo)) & bit) == bit);
-  if (scene.channelCount > 0 && any(packet.inside.meets))
-    for (int n = 0; n < (Blend::kSeparate ? scene.channelCount : 1); ++n)
-      March(scene, packet, Blend::kSeparate ? n : -1, uniformOf(sampler.next().x)).follow();
+  packet.inside.meets = packet.inside.meets & wanted;
+  if (scene.channelCount > 0 && any(packet.inside.meets)) {
+    const std::uint32_t all = ~0u >> (32 - scene.channelCount);
+    for (int n = 0; n < (Blend::kSeparate ? scene.channelCount : 1); ++n) {
+      const Float offset = uniformOf(sampler.next(packet.inside.meets).x);
+      march<Features>(scene, Blend::kSeparate ? 1u << n : all, offset, ofStrata, packet);
+    }
+  }
 
-  float rgba[4][kLanes];
-  for (int i = 0; i < 3; ++i) store(packet.color[i], rgba[i]);
-  store(packet.opacity, rgba[3]);
-  std::int32_t fetches[kLanes], cellSteps[kLanes], truncated[kLanes];
-  store(packet.fetches, fetches), store(packet.cellSteps, cellSteps), store(packet.truncated, truncated);
   for (; todo != 0; todo &= todo - 1) {
     const int i = std::countr_zero(todo), pixel = pixels[i];
-    pass.pixels[pixel] = {rgba[0][i], rgba[1][i], rgba[2][i], rgba[3][i]};
+    pass.pixels[pixel] = {at(packet.color[0], i), at(packet.color[1], i), at(packet.color[2], i),
+                          at(packet.opacity, i)};
     if (pass.cost) {
-      pass.cost[pixel].fetches += std::uint32_t(fetches[i]);
-      pass.cost[pixel].cellSteps += std::uint32_t(cellSteps[i]);
-      pass.cost[pixel].randomBlocks += sampler.blocks();
-      pass.cost[pixel].truncated += std::uint32_t(truncated[i]);
+      pass.cost[pixel].fetches += std::uint32_t(at(packet.cost.fetches, i));
+      pass.cost[pixel].cellSteps += std::uint32_t(at(packet.cost.cellSteps, i));
+      pass.cost[pixel].randomBlocks += std::uint32_t(at(packet.cost.randomBlocks + sampler.blocks(), i));
+      pass.cost[pixel].truncated += std::uint32_t(at(packet.cost.truncated, i));
     }
     pass.done[pixel] = 1;
   }
 }
 
-template <class Blend>
+template <class Blend, class Features>
 void renderTilePackets(const Pass& pass, int tileX, int tileY) {
   const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
   const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
@@ -325,21 +287,24 @@ void renderTilePackets(const Pass& pass, int tileX, int tileY) {
     if (std::chrono::steady_clock::now() >= pass.deadline) return;
     for (int x = tileX * kTile; x < endX; x += kPacketWidth) {
       if (pass.cancel->load(std::memory_order_relaxed)) return;
-      renderPacket<Blend>(pass, x, y, endX, endY);
+      renderPacket<Blend, Features>(pass, x, y, endX, endY);
     }
   }
 }
 
 }  // namespace
 
-TileFunction packetTileFunction(const Scene& scene, const kernel::SceneView& view) {
+TileFunction packetTileFunction(const Scene& scene, const SceneView& view) {
   const auto cells = glm::dvec3(view.majorants.cells);
   if (!hasStep(scene.method) || !available(InstructionSet::avx2) || cells.x * cells.y * cells.z >= 0x1p30)
     return nullptr;
-  if (scene.shading || scene.shadows) return nullptr;
-  if (scene.blend == BlendMode::density) return renderTilePackets<kernel::BlendDensity>;
-  if (scene.blend == BlendMode::composite) return renderTilePackets<kernel::BlendComposite>;
-  return nullptr;
+  return visitBlendAndLight(scene, [](auto blend, auto features) -> TileFunction {
+    using Blend = typename decltype(blend)::type;
+    if constexpr (Blend::kSums)
+      return renderTilePackets<Blend, typename decltype(features)::type>;
+    else
+      return nullptr;  // channels that hide each other are compared along a segment, which packets do not
+  });
 }
 #else
 TileFunction packetTileFunction(const Scene&, const kernel::SceneView&) { return nullptr; }

@@ -82,8 +82,19 @@ ChannelAppearance anyAppearance(Draw& draw) {
   for (int i = 0, n = draw.of({1, 2, 9}); i < n; ++i)
     a.color.push_back({n > 1 ? double(i) / (n - 1) : 0.0,
                        glm::dvec3(draw.between(0, 1), draw.between(0, 1), draw.between(0, 1))});
+  a.material = {draw.of({0.0, 0.3, 1.0}), draw.of({0.0, 0.8}), draw.of({0.0, 0.4}), draw.of({1.0, 30.0})};
   a.visible = draw.upTo(5) > 0;
   return a;
+}
+
+Light anyLight(Draw& draw, const Grid& grid) {
+  const auto vector = [&] {
+    return glm::dvec3(draw.between(-1, 1), draw.between(-1, 1), draw.between(-1, 1));
+  };
+  Light light{draw.of({LightType::directional, LightType::point, LightType::headlight}), vector(),
+              glm::abs(vector()), draw.of({0.0, 0.5, 2.0})};
+  if (light.type == LightType::point) light.vector *= grid.diagonal();
+  return light;
 }
 
 TEST(RayPackets, HaveTheBitsOfOneRayAfterTheOther) {
@@ -112,6 +123,9 @@ TEST(RayPackets, HaveTheBitsOfOneRayAfterTheOther) {
     scene.step = draw.of({0.1, 0.5, 1.0, 3.0, 20.0});
     scene.macrocell = draw.of({1, 4, 4, 7, 64});
     scene.seed = seed;
+    scene.shading = draw.upTo(1) == 1;
+    scene.shadows = draw.upTo(2) == 0;
+    for (int n = draw.upTo(3); n > 0; --n) scene.lights.push_back(anyLight(draw, volume->grid()));
     RenderPlan plan(volume);
     plan.update(scene);
     kernel::SceneView view = plan.view();
@@ -133,12 +147,11 @@ TEST(RayPackets, HaveTheBitsOfOneRayAfterTheOther) {
         for (int x = 0; x * kTile < scene.width; ++x) tiles(pass, x, y);
       for (int pixel = 0; pixel < int(count); ++pixel) {
         if (doneBefore[std::size_t(pixel)]) continue;
-        if (scene.blend == BlendMode::density)
-          kernel::RenderPixel<kernel::RayMarch, kernel::BlendDensity, kernel::LightFeatures<false, false>>{
-              view, number, expected.data(), costExpected.data()}(pixel);
-        else
-          kernel::RenderPixel<kernel::RayMarch, kernel::BlendComposite, kernel::LightFeatures<false, false>>{
-              view, number, expected.data(), costExpected.data()}(pixel);
+        visitBlendAndLight(scene, [&](auto blend, auto features) {
+          kernel::RenderPixel<kernel::RayMarch, typename decltype(blend)::type,
+                              typename decltype(features)::type>{view, number, expected.data(),
+                                                                 costExpected.data()}(pixel);
+        });
       }
       for (std::size_t i = 0; i < count; ++i) {
         ASSERT_TRUE(done[i]);
@@ -179,8 +192,6 @@ TEST(RayPackets, LeaveWhatTheyCannotDoToSingleRays) {
   EXPECT_FALSE(packets([](Scene& s) { s.method = Method::superposed; }));
   EXPECT_FALSE(packets([](Scene& s) { s.blend = BlendMode::max; }));
   EXPECT_FALSE(packets([](Scene& s) { s.blend = BlendMode::mix; }));
-  EXPECT_FALSE(packets([](Scene& s) { s.shading = true; }));
-  EXPECT_FALSE(packets([](Scene& s) { s.shadows = true; }));
 }
 
 }  // namespace

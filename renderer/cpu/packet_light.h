@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+// Light on eight rays: kernel::Strata, of which those that are finished wait until there are eight, and
+// kernel/shade.h for these.
+#pragma once
+#include "renderer/cpu/packet_march.h"
+#include "renderer/cpu/packet_sampler.h"
+#include "renderer/kernel/shade.h"
+#if defined(__x86_64__)
+
+namespace scolopax::lanes {
+
+struct Vec {
+  Float x[3];
+  SCOLOPAX_AVX2 Float& operator[](int i) { return x[i]; }
+  SCOLOPAX_AVX2 const Float& operator[](int i) const { return x[i]; }
+};
+SCOLOPAX_AVX2 Vec vectors(glm::vec3 v) { return {{floats(v.x), floats(v.y), floats(v.z)}}; }
+SCOLOPAX_AVX2 Vec operator+(const Vec& a, const Vec& b) { return {{a[0] + b[0], a[1] + b[1], a[2] + b[2]}}; }
+SCOLOPAX_AVX2 Vec operator*(const Vec& a, const Vec& b) { return {{a[0] * b[0], a[1] * b[1], a[2] * b[2]}}; }
+SCOLOPAX_AVX2 Vec operator*(const Vec& a, Float b) { return {{a[0] * b, a[1] * b, a[2] * b}}; }
+SCOLOPAX_AVX2 Vec negative(const Vec& a) { return {{negative(a[0]), negative(a[1]), negative(a[2])}}; }
+SCOLOPAX_AVX2 Vec select(Mask m, const Vec& a, const Vec& b) {
+  return {{select(m, a[0], b[0]), select(m, a[1], b[1]), select(m, a[2], b[2])}};
+}
+SCOLOPAX_AVX2 Float dot(const Vec& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+SCOLOPAX_AVX2 Vec normalize(const Vec& v) {
+  const Float lengthSquared = dot(v, v);
+  return select(lengthSquared > floats(0.0f), v * (floats(1.0f) / squareRoot(lengthSquared)), v);
+}
+SCOLOPAX_AVX2 Vec product(const glm::mat3& m, const Vec& v) {
+  Vec result;
+  for (int i = 0; i < 3; ++i)
+    result[i] = floats(m[0][i]) * v[0] + floats(m[1][i]) * v[1] + floats(m[2][i]) * v[2];
+  return result;
+}
+
+/// Eight strata that are to be lit, and whose they are.
+struct LightQueue {
+  int count = 0;
+  std::int32_t lane[kLanes];
+  float t[kLanes], offset[kLanes];  ///< place for shadow rays, and their jitter
+  std::int32_t channels[kLanes];    ///< bit n: channel n is in the stratum
+  struct Channel {
+    float weight[kLanes], t[kLanes], emission[3][kLanes];
+  } channel[kernel::kMaxVisibleChannels];
+};
+
+/// kernel::lit of what waits. The colours are added to the rays' in the order in which they came.
+template <class Features>
+class PacketLight {
+ public:
+  /// Channels by their bits: those that shadow rays see too.
+  SCOLOPAX_AVX2 PacketLight(const kernel::SceneView& scene, const Rays& rays, std::uint32_t channels,
+                            PacketCost* cost)
+      : scene_(scene), rays_(rays), channels_(channels), cost_(cost) {}
+
+  SCOLOPAX_AVX2_ONLY __attribute__((noinline)) void shine(LightQueue& queue, float (*colors)[kLanes]) {
+    const Int lane = load(queue.lane);
+    waiting_ = ints(queue.count) > laneNumbers();
+    for (int axis = 0; axis < 3; ++axis) {
+      ray_.origin[axis] = permuted(rays_.origin[axis], lane);
+      ray_.direction[axis] = permuted(rays_.direction[axis], lane);
+    }
+    spent_ = noCost();
+    findVisibility(load(queue.t), load(queue.offset));
+    Vec sum = vectors(glm::vec3(0.0f));
+    const Int present = load(queue.channels);
+    for (int n = 0; n < scene_.channelCount; ++n) {
+      const Int bit = ints(int(1u << n));
+      const Mask lit = waiting_ & ((present & bit) == bit);
+      if (!any(lit)) continue;
+      const LightQueue::Channel& channel = queue.channel[n];
+      const Float weight = load(channel.weight), inverse = floats(1.0f) / weight;
+      Vec color;
+      for (int c = 0; c < 3; ++c) color[c] = load(channel.emission[c]) * inverse;
+      const Vec light = lightOf(scene_.channels[n], n, color, load(channel.t), lit) * weight;
+      for (int c = 0; c < 3; ++c) sum[c] = select(lit, sum[c] + light[c], sum[c]);
+    }
+    for (int i = 0; i < queue.count; ++i) {
+      const int to = queue.lane[i];
+      for (int c = 0; c < 3; ++c) colors[c][to] += at(sum[c], i);
+      addLane(spent_.fetches, i, to, &cost_->fetches);
+      addLane(spent_.cellSteps, i, to, &cost_->cellSteps);
+      addLane(spent_.truncated, i, to, &cost_->truncated);
+    }
+    queue.count = 0;
+  }
+
+ private:
+  SCOLOPAX_AVX2 static void addLane(Int from, int i, int to, Int* sum) {
+    *sum = *sum + select(laneNumbers() == ints(to), ints(at(from, i)), ints(0));
+  }
+
+  /// kernel::collisionAt.
+  SCOLOPAX_AVX2 Vec pointAt(Float t) const {
+    Vec point;
+    for (int axis = 0; axis < 3; ++axis)
+      point[axis] = clamp(ray_.origin[axis] + t * ray_.direction[axis], floats(-0.5f),
+                          floats(float(scene_.dims[axis]) - 0.5f));
+    return point;
+  }
+
+  /// kernel::toLight.
+  struct Way {
+    Vec direction;
+    Float distance;
+  };
+  SCOLOPAX_AVX2 Way wayTo(const kernel::LightView& light, const Vec& point, Float t) const {
+    if (light.kind == kernel::LightKind::directional)
+      return {vectors(light.vector), floats(kernel::kInfinity)};
+    if (light.kind == kernel::LightKind::headlight)
+      return {{{negative(ray_.direction[0]), negative(ray_.direction[1]), negative(ray_.direction[2])}}, t};
+    Vec way;
+    for (int axis = 0; axis < 3; ++axis) way[axis] = floats(light.vector[axis]) - point[axis];
+    const Vec world = product(scene_.worldFromVoxel, way);
+    const Float distance = squareRoot(dot(world, world)) * floats(scene_.smallestSpacing);
+    return {way * (floats(1.0f) / maximum(distance, floats(1.17549435e-38f))), distance};
+  }
+
+  /// Optical depth of shadow rays (kernel::marchTransmittance).
+  class Depth {
+   public:
+    SCOLOPAX_AVX2 explicit Depth(const kernel::SceneView& scene, std::uint32_t channels)
+        : scene_(scene), channels_(channels), depth_(floats(0.0f)) {}
+    SCOLOPAX_AVX2 Mask take(const PacketSegment& segment) {
+      Float extinction = floats(0.0f);
+      for (int n = 0; n < scene_.channelCount; ++n) {
+        if (!(channels_ >> n & 1)) continue;
+        extinction = extinction + partsOf<Detail::extinction>(scene_.channels[n], segment.from[n],
+                                                              segment.to[n], segment.live)
+                                      .opacity;
+      }
+      depth_ = depth_ + extinction * (segment.end - segment.start);
+      return depth_ < floats(kernel::kOpaqueDepth);
+    }
+    SCOLOPAX_AVX2 Float transmittance() const { return floats(1.0f) - absorbed(depth_); }
+
+   private:
+    const kernel::SceneView& scene_;
+    std::uint32_t channels_;
+    Float depth_;
+  };
+
+  /// kernel::visibilityAt.
+  SCOLOPAX_AVX2 void findVisibility(Float t, Float offset) {
+    const Float one = floats(1.0f);
+    share_ = vectors(glm::vec3(1.0f));
+    for (int i = 0; i < scene_.lightCount; ++i) seen_[i] = one;
+    if constexpr (Features::kShadows) {
+      const Vec point = pointAt(t);
+      glm::vec3 all(0.0f);
+      Vec sum = vectors(all);
+      for (int i = 0; i < scene_.lightCount; ++i) {
+        const Way way = wayTo(scene_.lights[i], point, t);
+        const Rays shadow{{point[0], point[1], point[2]},
+                          {way.direction[0], way.direction[1], way.direction[2]}};
+        Intervals inside = clipToBox(shadow, scene_.dims);
+        inside.exit = minimum(inside.exit, way.distance);
+        inside.meets = inside.meets & waiting_ & (inside.enter < inside.exit);
+        Depth depth(scene_, channels_);
+        if (any(inside.meets))
+          PacketMarch(scene_, shadow, inside, channels_, offset, kernel::kShadowSteps * scene_.step, &spent_)
+              .follow(depth);
+        seen_[i] = select(inside.meets, depth.transmittance(), one);
+        all += scene_.lights[i].intensity;
+        sum = sum + vectors(scene_.lights[i].intensity) * seen_[i];
+      }
+      for (int c = 0; c < 3; ++c)
+        if (all[c] > 0.0f) share_[c] = sum[c] / floats(all[c]);
+    }
+  }
+
+  SCOLOPAX_AVX2 static Float sizeOf(Float x) { return maximum(x, negative(x)); }
+
+  /// kernel::gradientAt of channel n.
+  SCOLOPAX_AVX2 Vec gradientAt(int n, const Vec& point, Mask which) {
+    Vec perVoxel = vectors(glm::vec3(0.0f));
+    for (int axis = 0; axis < 3; ++axis) {
+      const Float last = floats(float(scene_.dims[axis] - 1)), one = floats(1.0f), zero = floats(0.0f);
+      if (scene_.dims[axis] < 2) continue;
+      const Float at = clamp(point[axis], zero, last);
+      const Float low = maximum(at - one, zero), high = minimum(at + one, last);
+      const Float difference = sampleWith(n, point, axis, high) - sampleWith(n, point, axis, low);
+      perVoxel[axis] = difference / (high - low);
+      spent_.fetches = spent_.fetches + onesOf(which) + onesOf(which);
+    }
+    const Mask finite = isFinite(perVoxel[0]) & isFinite(perVoxel[1]) & isFinite(perVoxel[2]);
+    return select(finite, product(scene_.gradientFromVoxel, perVoxel), vectors(glm::vec3(0.0f)));
+  }
+  SCOLOPAX_AVX2 Float sampleWith(int n, const Vec& point, int axis, Float place) const {
+    kernel::PointBatch points;
+    store(axis == 0 ? place : point[0], points.x);
+    store(axis == 1 ? place : point[1], points.y);
+    store(axis == 2 ? place : point[2], points.z);
+    float stored[kernel::kMaxVisibleChannels][kLanes];
+    scene_.sampleBatch(scene_, 1u << n, points, stored);
+    return load(stored[n]);
+  }
+
+  /// kernel::lit.
+  SCOLOPAX_AVX2 Vec lightOf(const kernel::ChannelView& channel, int n, const Vec& color, Float t,
+                            Mask which) {
+    const kernel::MaterialView& material = channel.material;
+    const Float one = floats(1.0f), zero = floats(0.0f);
+    Vec ambient = vectors(glm::vec3(1.0f));
+    if constexpr (Features::kShadows)
+      for (int c = 0; c < 3; ++c)
+        ambient[c] = floats(material.ambient) + floats(1.0f - material.ambient) * share_[c];
+    const Vec unshaded = color * ambient;
+    if constexpr (!Features::kShading) return unshaded;
+
+    const Vec point = pointAt(t), gradient = gradientAt(n, point, which);
+    const Float largest = maximum(maximum(sizeOf(gradient[0]), sizeOf(gradient[1])), sizeOf(gradient[2]));
+    Mask shaded = which & (largest > zero);
+    if (!any(shaded)) return unshaded;
+    Vec normal;
+    for (int i = 0; i < 3; ++i) normal[i] = gradient[i] / largest;
+    const Float length = squareRoot(dot(normal, normal));
+    const Float g = minimum(one, largest * floats(channel.inverseRange) * length);
+    const Float s = one - (one - g) * (one - g);
+    shaded = shaded & (s > zero);
+    if (!any(shaded)) return unshaded;
+    const Vec direction{{ray_.direction[0], ray_.direction[1], ray_.direction[2]}};
+    const Vec toViewer = normalize(negative(product(scene_.worldFromVoxel, direction)));
+    normal = normal * (one / length);
+    normal = select(dot(normal, toViewer) < zero, negative(normal), normal);
+    Vec diffuse = vectors(glm::vec3(0.0f)), specular = diffuse;
+    for (int i = 0; i < scene_.lightCount; ++i) {
+      const kernel::LightView& light = scene_.lights[i];
+      const Mask reached = seen_[i] > zero;
+      if (!any(reached & shaded)) continue;
+      const Vec l = normalize(product(scene_.worldFromVoxel, wayTo(light, point, t).direction));
+      const Vec h = normalize(l + toViewer);
+      const Vec arriving = vectors(light.intensity) * seen_[i];
+      const Float lambert = maximum(dot(normal, l), zero);
+      const Float highlight = power(maximum(dot(normal, h), zero), floats(material.shininess));
+      diffuse = select(reached, diffuse + arriving * lambert, diffuse);
+      specular = select(reached, specular + arriving * highlight, specular);
+    }
+    Vec light;
+    for (int c = 0; c < 3; ++c)
+      light[c] = color[c] * ((one - s) * ambient[c] +
+                             s * (floats(material.ambient) + floats(material.diffuse) * diffuse[c])) +
+                 s * floats(material.specular) * specular[c];
+    return select(shaded, light, unshaded);
+  }
+
+  const kernel::SceneView& scene_;
+  const Rays& rays_;
+  std::uint32_t channels_;
+  PacketCost* cost_;
+  Rays ray_;  // of the strata
+  Mask waiting_;
+  PacketCost spent_;
+  Float seen_[kernel::kMaxLights];
+  Vec share_;
+};
+
+}  // namespace scolopax::lanes
+#endif

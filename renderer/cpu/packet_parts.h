@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// What channels do on a segment of eight rays: kernel/optical_curve.h and kernel::partAlone, bit by bit.
+#pragma once
+#include <algorithm>
+#include <bit>
+
+#include "renderer/cpu/lanes.h"
+#include "renderer/kernel/raymarch.h"
+#if defined(__x86_64__)
+
+namespace scolopax::lanes {
+
+/// Where rays are on a channel's curves, and on which piece.
+struct Place {
+  Float position;
+  Int piece;
+};
+
+struct Knots {
+  Float position, inverseWidth, opacity, color[3];
+};
+inline constexpr int kKnotFloats = sizeof(kernel::OpticalKnot) / sizeof(float);
+
+SCOLOPAX_AVX2 Knots knotsAt(const kernel::OpticalCurveView& curve, Int index) {
+  const Int at = index * ints(kKnotFloats);
+  const kernel::OpticalKnot& first = curve.knots[0];
+  return {gather(&first.position, at),
+          gather(&first.inverseWidth, at),
+          gather(&first.opacity, at),
+          {gather(&first.color.x, at), gather(&first.color.y, at), gather(&first.color.z, at)}};
+}
+SCOLOPAX_AVX2 Knots sameKnot(const kernel::OpticalKnot& knot) {
+  return {floats(knot.position),
+          floats(knot.inverseWidth),
+          floats(knot.opacity),
+          {floats(knot.color.x), floats(knot.color.y), floats(knot.color.z)}};
+}
+
+/// kernel::pieceAt.
+SCOLOPAX_AVX2 Int piecesAt(const kernel::OpticalCurveView& curve, Float position) {
+  const Mask above = position >= floats(0.0f), inside = above & (position < floats(1.0f));
+  Int k = gather(curve.buckets, truncated(where(inside, position) * floats(float(kernel::kCurveBuckets))));
+  for (;;) {
+    const Int following = minimum(k + ints(1), ints(curve.count - 1));
+    const Mask on = inside & (gather(&curve.knots[0].position, following * ints(kKnotFloats)) <= position);
+    if (!any(on)) break;
+    k = k + onesOf(on);
+  }
+  return select(inside, k, select(above, ints(curve.count - 1), ints(-1)));
+}
+
+/// How much of a part is wanted: up to its extinction, emission or moment.
+enum class Detail { extinction, emission, moment };
+
+/// kernel::Part of eight rays; 0 beyond the detail.
+struct Parts {
+  Float opacity, emission[3], moment;
+};
+SCOLOPAX_AVX2 Parts noParts() {
+  const Float zero = floats(0.0f);
+  return {zero, {zero, zero, zero}, zero};
+}
+
+/// Of stretches on one piece each.
+template <Detail kDetail>
+SCOLOPAX_AVX2 Parts linearParts(const Knots& a, const Knots& b, Int piece, Float p, Float q) {
+  // kernel::opticalIn of p and q, then kernel::detail::addLinear.
+  const Mask sloped = piece > ints(-1);
+  const Float one = floats(1.0f), two = floats(2.0f), sixth = floats(0.166666667f);
+  const Float s = where(sloped, minimum((p - a.position) * a.inverseWidth, one));
+  const Float t = where(sloped, minimum((q - a.position) * a.inverseWidth, one));
+  const Float u = a.opacity + s * (b.opacity - a.opacity), v = a.opacity + t * (b.opacity - a.opacity);
+  Parts parts = noParts();
+  parts.opacity = floats(0.5f) * (u + v);
+  const Float left = two * u + v, right = u + two * v;
+  if constexpr (kDetail >= Detail::emission)
+    for (int i = 0; i < 3; ++i) {
+      const Float rise = b.color[i] - a.color[i];
+      parts.emission[i] = sixth * (left * (a.color[i] + s * rise) + right * (a.color[i] + t * rise));
+    }
+  if constexpr (kDetail >= Detail::moment) parts.moment = sixth * right;
+  return parts;
+}
+
+/// kernel::partAlone of the channel for some rays; the others have none.
+template <Detail kDetail>
+SCOLOPAX_AVX2 Parts partsOf(const kernel::ChannelView& channel, const Place& from, const Place& to,
+                            Mask wanted) {
+  const kernel::OpticalCurveView& curve = channel.optical;
+  const Float p = from.position, q = to.position;
+  const Float first = floats(curve.first), last = floats(curve.last);
+  const Mask outside = ((p <= first) & (q <= first)) | ((p >= last) & (q >= last));
+  const Mask seen = without(wanted, outside);
+  Parts parts = noParts();
+  if (!any(seen)) return parts;
+  const Mask linear = seen & (from.piece == to.piece) & (p == p) & (q == q);
+  if (any(linear)) {
+    const Int lane = ints(std::countr_zero(bitsOf(linear)));
+    const Int same = permuted(from.piece, lane);
+    Knots a, b;
+    if (!any(without(linear, from.piece == same))) {
+      const int k = firstOf(same);
+      a = sameKnot(curve.knots[k < 0 ? 0 : k]);
+      b = sameKnot(curve.knots[k < 0 ? 0 : std::min(k + 1, curve.count - 1)]);
+    } else {
+      a = knotsAt(curve, maximum(from.piece, ints(0)));
+      b = knotsAt(curve, minimum(from.piece + ints(1), ints(curve.count - 1)));
+    }
+    parts = linearParts<kDetail>(a, b, from.piece, p, q);
+    const Float density = floats(channel.density);
+    parts.opacity = where(linear, parts.opacity * density);
+    for (Float& emission : parts.emission) emission = where(linear, emission * density);
+    parts.moment = where(linear, parts.moment * density);
+  }
+  // Stretches over knots, or beside voxels that are not finite.
+  for (unsigned left = bitsOf(without(seen, linear)); left != 0; left &= left - 1) {
+    const int i = std::countr_zero(left);
+    const float positions[] = {at(p, i), at(q, i)};
+    const kernel::Part part = kernel::partAlone(channel, positions);
+    put(part.opacity, i, &parts.opacity);
+    for (int c = 0; c < 3; ++c) put(part.emission[c], i, &parts.emission[c]);
+    put(part.moment, i, &parts.moment);
+  }
+  return parts;
+}
+
+}  // namespace scolopax::lanes
+#endif
