@@ -72,6 +72,11 @@ SCOLOPAX_AVX2 Int permuted(Int a, Int index) { return {_mm256_permutevar8x32_epi
 SCOLOPAX_AVX2 Int laneNumbers() { return {_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)}; }
 /// One lane.
 SCOLOPAX_AVX2 std::int32_t at(Int a, int lane) { return _mm256_cvtsi256_si32(permuted(a, ints(lane)).v); }
+SCOLOPAX_AVX2 int largestOf(Int a) {
+  const __m128i four = _mm_max_epi32(_mm256_castsi256_si128(a.v), _mm256_extracti128_si256(a.v, 1));
+  const __m128i two = _mm_max_epi32(four, _mm_shuffle_epi32(four, 0x4e));
+  return _mm_cvtsi128_si32(_mm_max_epi32(two, _mm_shuffle_epi32(two, 0xb1)));
+}
 SCOLOPAX_AVX2 int firstOf(Int a) { return _mm256_cvtsi256_si32(a.v); }
 
 struct Float {

@@ -73,7 +73,7 @@ class PacketLight {
       const Float weight = load(channel.weight), inverse = floats(1.0f) / weight;
       Vec color;
       for (int c = 0; c < 3; ++c) color[c] = load(channel.emission[c]) * inverse;
-      const Vec light = lightOf(scene_.channels[n], n, color, load(channel.t), lit) * weight;
+      const Vec light = lightOf(scene_.channels[n], color, load(channel.t), lit) * weight;
       for (int c = 0; c < 3; ++c) sum[c] = select(lit, sum[c] + light[c], sum[c]);
     }
     for (int i = 0; i < queue.count; ++i) {
@@ -172,34 +172,40 @@ class PacketLight {
 
   SCOLOPAX_AVX2 static Float sizeOf(Float x) { return maximum(x, negative(x)); }
 
-  /// kernel::gradientAt of channel n.
-  SCOLOPAX_AVX2 Vec gradientAt(int n, const Vec& point, Mask which) {
+  /// kernel::gradientAt.
+  SCOLOPAX_AVX2 Vec gradientAt(const kernel::ChannelView& channel, const Vec& point, Mask which) {
+    const glm::ivec3 dims = scene_.dims;
     Vec perVoxel = vectors(glm::vec3(0.0f));
     for (int axis = 0; axis < 3; ++axis) {
-      const Float last = floats(float(scene_.dims[axis] - 1)), one = floats(1.0f), zero = floats(0.0f);
-      if (scene_.dims[axis] < 2) continue;
+      if (dims[axis] < 2) continue;
+      const Float last = floats(float(dims[axis] - 1)), one = floats(1.0f), zero = floats(0.0f);
       const Float at = clamp(point[axis], zero, last);
       const Float low = maximum(at - one, zero), high = minimum(at + one, last);
-      const Float difference = sampleWith(n, point, axis, high) - sampleWith(n, point, axis, low);
+      const Float difference =
+          sampleBeside(channel, point, axis, high) - sampleBeside(channel, point, axis, low);
       perVoxel[axis] = difference / (high - low);
       spent_.fetches = spent_.fetches + onesOf(which) + onesOf(which);
     }
     const Mask finite = isFinite(perVoxel[0]) & isFinite(perVoxel[1]) & isFinite(perVoxel[2]);
     return select(finite, product(scene_.gradientFromVoxel, perVoxel), vectors(glm::vec3(0.0f)));
   }
-  SCOLOPAX_AVX2 Float sampleWith(int n, const Vec& point, int axis, Float place) const {
-    kernel::PointBatch points;
-    store(axis == 0 ? place : point[0], points.x);
-    store(axis == 1 ? place : point[1], points.y);
-    store(axis == 2 ? place : point[2], points.z);
-    float stored[kernel::kMaxVisibleChannels][kLanes];
-    scene_.sampleBatch(scene_, 1u << n, points, stored);
-    return load(stored[n]);
+  /// At the point that has another place on one axis.
+  SCOLOPAX_AVX2 Float sampleBeside(const kernel::ChannelView& channel, const Vec& point, int axis,
+                                   Float place) const {
+    const glm::ivec3 dims = scene_.dims;
+    Vec beside = point;
+    beside[axis] = place;
+    if (dims.x < 2 || dims.y < 2 || dims.z < 2) {
+      float places[3][kLanes], values[kLanes];
+      for (int i = 0; i < 3; ++i) store(beside[i], places[i]);
+      sampleByPoint(channel, dims, places, values);
+      return load(values);
+    }
+    return sampleChannel(pointsAt(dims, beside[0], beside[1], beside[2]), channel);
   }
 
   /// kernel::lit.
-  SCOLOPAX_AVX2 Vec lightOf(const kernel::ChannelView& channel, int n, const Vec& color, Float t,
-                            Mask which) {
+  SCOLOPAX_AVX2 Vec lightOf(const kernel::ChannelView& channel, const Vec& color, Float t, Mask which) {
     const kernel::MaterialView& material = channel.material;
     const Float one = floats(1.0f), zero = floats(0.0f);
     Vec ambient = vectors(glm::vec3(1.0f));
@@ -209,7 +215,7 @@ class PacketLight {
     const Vec unshaded = color * ambient;
     if constexpr (!Features::kShading) return unshaded;
 
-    const Vec point = pointAt(t), gradient = gradientAt(n, point, which);
+    const Vec point = pointAt(t), gradient = gradientAt(channel, point, which);
     const Float largest = maximum(maximum(sizeOf(gradient[0]), sizeOf(gradient[1])), sizeOf(gradient[2]));
     Mask shaded = which & (largest > zero);
     if (!any(shaded)) return unshaded;

@@ -3,6 +3,7 @@
 #pragma once
 #include "renderer/cpu/packet_parts.h"
 #include "renderer/cpu/packet_walk.h"
+#include "renderer/cpu/sample_lanes.h"
 #if defined(__x86_64__)
 
 namespace scolopax::lanes {
@@ -89,12 +90,9 @@ class PacketMarch {
   }
 
   SCOLOPAX_AVX2 void sample(Float t, Place* places) {
-    kernel::PointBatch points;
-    store(rays_.origin[0] + t * rays_.direction[0], points.x);
-    store(rays_.origin[1] + t * rays_.direction[1], points.y);
-    store(rays_.origin[2] + t * rays_.direction[2], points.z);
     float stored[kernel::kMaxVisibleChannels][kLanes];
-    scene_.sampleBatch(scene_, channels_, points, stored);
+    sampleLanes(scene_, channels_, rays_.origin[0] + t * rays_.direction[0],
+                rays_.origin[1] + t * rays_.direction[1], rays_.origin[2] + t * rays_.direction[2], stored);
     int count = 0;
     for (int n = 0; n < scene_.channelCount; ++n) {
       if (!(channels_ >> n & 1)) continue;

@@ -61,25 +61,60 @@ SCOLOPAX_AVX2 Parts noParts() {
   return {zero, {zero, zero, zero}, zero};
 }
 
-/// Of stretches on one piece each.
+/// kernel::opticalIn of both ends of stretches, then kernel::detail::addLinear.
 template <Detail kDetail>
-SCOLOPAX_AVX2 Parts linearParts(const Knots& a, const Knots& b, Int piece, Float p, Float q) {
-  // kernel::opticalIn of p and q, then kernel::detail::addLinear.
+SCOLOPAX_AVX2 void addLinear(const Knots& a, const Knots& b, Int piece, Float from, Float to, Float start,
+                             Float end, Mask which, Parts* parts) {
   const Mask sloped = piece > ints(-1);
-  const Float one = floats(1.0f), two = floats(2.0f), sixth = floats(0.166666667f);
-  const Float s = where(sloped, minimum((p - a.position) * a.inverseWidth, one));
-  const Float t = where(sloped, minimum((q - a.position) * a.inverseWidth, one));
+  const Float one = floats(1.0f), two = floats(2.0f), width = end - start;
+  const Float s = where(sloped, minimum((from - a.position) * a.inverseWidth, one));
+  const Float t = where(sloped, minimum((to - a.position) * a.inverseWidth, one));
   const Float u = a.opacity + s * (b.opacity - a.opacity), v = a.opacity + t * (b.opacity - a.opacity);
-  Parts parts = noParts();
-  parts.opacity = floats(0.5f) * (u + v);
-  const Float left = two * u + v, right = u + two * v;
+  parts->opacity = parts->opacity + where(which, width * floats(0.5f) * (u + v));
+  const Float left = two * u + v, right = u + two * v, sixth = width * floats(0.166666667f);
   if constexpr (kDetail >= Detail::emission)
     for (int i = 0; i < 3; ++i) {
       const Float rise = b.color[i] - a.color[i];
-      parts.emission[i] = sixth * (left * (a.color[i] + s * rise) + right * (a.color[i] + t * rise));
+      const Float emission = left * (a.color[i] + s * rise) + right * (a.color[i] + t * rise);
+      parts->emission[i] = parts->emission[i] + where(which, sixth * emission);
     }
-  if constexpr (kDetail >= Detail::moment) parts.moment = sixth * right;
-  return parts;
+  if constexpr (kDetail >= Detail::moment)
+    parts->moment = parts->moment + where(which, sixth * (left * start + right * end));
+}
+
+/// kernel::meansBetween for some rays, whose positions are numbers.
+template <Detail kDetail>
+SCOLOPAX_AVX2 Parts meansBetween(const kernel::OpticalCurveView& curve, const Place& p, const Place& q,
+                                 Mask which) {
+  const Float zero = floats(0.0f), one = floats(1.0f);
+  const Int step = ints(1), last = ints(curve.count - 1);
+  Parts means = noParts();
+  const Int same = permuted(p.piece, ints(std::countr_zero(bitsOf(which))));
+  if (!any(without(which, (p.piece == same) & (q.piece == same)))) {
+    const int k = firstOf(same);
+    addLinear<kDetail>(sameKnot(curve.knots[k < 0 ? 0 : k]),
+                       sameKnot(curve.knots[k < 0 ? 0 : std::min(k + 1, curve.count - 1)]), p.piece,
+                       p.position, q.position, zero, one, which, &means);
+    return means;
+  }
+  const Float scale = one / (q.position - p.position);
+  const Mask up = q.piece > p.piece;
+  const Int way = select(up, step, ints(-1));
+  Float from = p.position, start = zero;
+  Int k = p.piece;
+  for (Mask on = which; any(on);) {
+    const Mask ends = k == q.piece;
+    const Knots a = knotsAt(curve, minimum(maximum(k, ints(0)), last));
+    const Knots b = knotsAt(curve, minimum(maximum(k + step, ints(0)), last));
+    const Float to = select(ends, q.position, select(up, b.position, a.position));
+    const Float end = select(ends, one, clamp((to - p.position) * scale, start, one));
+    addLinear<kDetail>(a, b, k, from, to, start, end, on & (start < end), &means);
+    from = to;
+    start = end;
+    k = k + way;
+    on = without(on, ends);
+  }
+  return means;
 }
 
 /// kernel::partAlone of the channel for some rays; the others have none.
@@ -91,29 +126,18 @@ SCOLOPAX_AVX2 Parts partsOf(const kernel::ChannelView& channel, const Place& fro
   const Float first = floats(curve.first), last = floats(curve.last);
   const Mask outside = ((p <= first) & (q <= first)) | ((p >= last) & (q >= last));
   const Mask seen = without(wanted, outside);
+  if (!any(seen)) return noParts();
+  const Mask numbers = seen & (p == p) & (q == q);
   Parts parts = noParts();
-  if (!any(seen)) return parts;
-  const Mask linear = seen & (from.piece == to.piece) & (p == p) & (q == q);
-  if (any(linear)) {
-    const Int lane = ints(std::countr_zero(bitsOf(linear)));
-    const Int same = permuted(from.piece, lane);
-    Knots a, b;
-    if (!any(without(linear, from.piece == same))) {
-      const int k = firstOf(same);
-      a = sameKnot(curve.knots[k < 0 ? 0 : k]);
-      b = sameKnot(curve.knots[k < 0 ? 0 : std::min(k + 1, curve.count - 1)]);
-    } else {
-      a = knotsAt(curve, maximum(from.piece, ints(0)));
-      b = knotsAt(curve, minimum(from.piece + ints(1), ints(curve.count - 1)));
-    }
-    parts = linearParts<kDetail>(a, b, from.piece, p, q);
+  if (any(numbers)) {
+    parts = meansBetween<kDetail>(curve, from, to, numbers);
     const Float density = floats(channel.density);
-    parts.opacity = where(linear, parts.opacity * density);
-    for (Float& emission : parts.emission) emission = where(linear, emission * density);
-    parts.moment = where(linear, parts.moment * density);
+    parts.opacity = parts.opacity * density;
+    for (Float& emission : parts.emission) emission = emission * density;
+    parts.moment = parts.moment * density;
   }
-  // Stretches over knots, or beside voxels that are not finite.
-  for (unsigned left = bitsOf(without(seen, linear)); left != 0; left &= left - 1) {
+  // Beside voxels that are not finite.
+  for (unsigned left = bitsOf(without(seen, numbers)); left != 0; left &= left - 1) {
     const int i = std::countr_zero(left);
     const float positions[] = {at(p, i), at(q, i)};
     const kernel::Part part = kernel::partAlone(channel, positions);

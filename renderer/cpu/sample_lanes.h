@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+// kernel::sampleStored at eight points, bit by bit: of one channel by gathering, of neighbouring channels
+// four at once.
+#pragma once
+#include <cstring>
+
+#include "renderer/cpu/lanes.h"
+#include "renderer/kernel/sample_volume.h"
+#if defined(__x86_64__)
+
+namespace scolopax::lanes {
+
+/// kernel::axisWeight: neighbours' indices, and the weight of the second.
+struct Axis {
+  Int low, high;
+  Float t;
+  Mask swapped;  ///< at the last voxel, where the neighbour is the one before
+};
+/// The axis has two voxels or more.
+SCOLOPAX_AVX2 Axis axisOf(Float x, int size) {
+  const Float inside = clamp(x, floats(0.0f), floats(float(size - 1)));
+  const Int whole = truncated(inside), last = ints(size - 2);
+  const Mask swapped = whole > last;
+  const Float t = inside - toFloat(whole);
+  return {whole, select(swapped, last, whole + ints(1)), select(swapped, floats(0.0f), t), swapped};
+}
+
+/// Points among voxels.
+struct Points {
+  glm::ivec3 dims;
+  Float place[3];
+  Axis x, y, z;
+  std::size_t first;  ///< the slice that gathers' indices, which are of 32 bits, count from: that of lane 0
+  float slices;       ///< at most so many are between them
+};
+SCOLOPAX_AVX2 void setZ(Float z, Points* points) {
+  points->place[2] = z;
+  points->z = axisOf(z, points->dims.z);
+  points->first = std::size_t(firstOf(points->z.low));
+  const Int away = points->z.low - ints(int(points->first));
+  points->slices = float(largestOf(maximum(away, ints(0) - away)) + 3);
+}
+/// All axes have two voxels or more.
+SCOLOPAX_AVX2 Points pointsAt(glm::ivec3 dims, Float x, Float y, Float z) {
+  Points points;
+  points.dims = dims;
+  points.place[0] = x, points.place[1] = y;
+  points.x = axisOf(x, dims.x), points.y = axisOf(y, dims.y);
+  setZ(z, &points);
+  return points;
+}
+
+SCOLOPAX_AVX2 Float lerp(Float a, Float b, Float t) { return a + t * (b - a); }
+SCOLOPAX_AVX2 __m128 lerp4(__m128 a, __m128 b, float t) {
+  return _mm_add_ps(a, _mm_mul_ps(_mm_set1_ps(t), _mm_sub_ps(b, a)));
+}
+
+/// Voxels at eight indices.
+template <class T>
+SCOLOPAX_AVX2 Float voxelsAt(const T* voxels, Int index) {
+  if constexpr (std::is_same_v<T, float>) return gather(voxels, index);
+  const Int word{_mm256_i32gather_epi32(reinterpret_cast<const int*>(voxels), index.v, int(sizeof(T)))};
+  if constexpr (std::is_same_v<T, std::uint8_t>) return toFloat(word & ints(0xff));
+  if constexpr (std::is_same_v<T, std::uint16_t>) return toFloat(word & ints(0xffff));
+  return toFloat(rightSigned<16>(left<16>(word)));
+}
+
+/// Interpolates along x from the voxels at `index` to the neighbours, `stride` further; of small ones that
+/// are next to each other one read gets both.
+template <class T>
+SCOLOPAX_AVX2 Float alongX(const T* voxels, Int index, int stride, const Axis& x) {
+  Float a, b;
+  if (sizeof(T) == 4 || stride != 1) {
+    a = voxelsAt(voxels, index);
+    b = voxelsAt(voxels + stride, index);
+  } else {
+    const Int pair{_mm256_i32gather_epi32(reinterpret_cast<const int*>(voxels), index.v, int(sizeof(T)))};
+    if constexpr (std::is_same_v<T, std::uint8_t>)
+      a = toFloat(pair & ints(0xff)), b = toFloat(right<8>(pair) & ints(0xff));
+    else if constexpr (std::is_same_v<T, std::uint16_t>)
+      a = toFloat(pair & ints(0xffff)), b = toFloat(right<16>(pair));
+    else
+      a = toFloat(rightSigned<16>(left<16>(pair))), b = toFloat(rightSigned<16>(pair));
+  }
+  return lerp(select(x.swapped, b, a), select(x.swapped, a, b), x.t);
+}
+
+/// One channel.
+template <class T>
+SCOLOPAX_AVX2 Float sampleOne(const Points& at, const kernel::ChannelView& channel) {
+  const int stride = channel.stride;
+  const T* base = static_cast<const T*>(channel.voxels) + channel.lane +
+                  at.first * std::size_t(at.dims.x) * std::size_t(at.dims.y) * std::size_t(stride);
+  const Int row = ints(at.dims.x * stride), slice = ints(at.dims.x * at.dims.y * stride);
+  const Int start = ints(int(at.first));
+  const Int column = minimum(at.x.low, ints(at.dims.x - 2)) * ints(stride);
+  const Int yLow = at.y.low * row + column, yHigh = at.y.high * row + column;
+  const Int zLow = (at.z.low - start) * slice, zHigh = (at.z.high - start) * slice;
+  const Float c00 = alongX(base, yLow + zLow, stride, at.x);
+  const Float c10 = alongX(base, yHigh + zLow, stride, at.x);
+  const Float c01 = alongX(base, yLow + zHigh, stride, at.x);
+  const Float c11 = alongX(base, yHigh + zHigh, stride, at.x);
+  return lerp(lerp(c00, c10, at.y.t), lerp(c01, c11, at.y.t), at.z.t);
+}
+
+/// One point after the other.
+inline void sampleByPoint(const kernel::ChannelView& channel, glm::ivec3 dims, const float (*places)[kLanes],
+                          float* values) {
+  for (int i = 0; i < kLanes; ++i)
+    values[i] = kernel::sampleStored(channel, dims, {places[0][i], places[1][i], places[2][i]});
+}
+
+/// One channel, whatever its type.
+SCOLOPAX_AVX2 Float sampleChannel(const Points& at, const kernel::ChannelView& channel) {
+  if (!(at.slices * float(at.dims.x) * float(at.dims.y) * float(channel.stride) < 0x1p29f)) {
+    float places[3][kLanes], values[kLanes];
+    for (int axis = 0; axis < 3; ++axis) store(at.place[axis], places[axis]);
+    sampleByPoint(channel, at.dims, places, values);
+    return load(values);
+  }
+  switch (channel.type) {
+    case ScalarType::u8:
+      return sampleOne<std::uint8_t>(at, channel);
+    case ScalarType::u16:
+      return sampleOne<std::uint16_t>(at, channel);
+    case ScalarType::i16:
+      return sampleOne<std::int16_t>(at, channel);
+    case ScalarType::f32:
+      break;
+  }
+  return sampleOne<float>(at, channel);
+}
+
+/// Four channels of a voxel.
+SCOLOPAX_AVX2 __m128 load4(const std::uint8_t* v) {
+  int bytes;
+  std::memcpy(&bytes, v, sizeof bytes);
+  return _mm_cvtepi32_ps(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(bytes)));
+}
+SCOLOPAX_AVX2 __m128 load4(const std::uint16_t* v) {
+  return _mm_cvtepi32_ps(_mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(v))));
+}
+SCOLOPAX_AVX2 __m128 load4(const std::int16_t* v) {
+  return _mm_cvtepi32_ps(_mm_cvtepi16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(v))));
+}
+SCOLOPAX_AVX2 __m128 load4(const float* v) { return _mm_loadu_ps(v); }
+
+/// Four neighbouring channels; members[lane - first lane] is where a channel's values go, or
+/// null.
+template <class T>
+SCOLOPAX_AVX2_ONLY void sampleFour(const Points& at, const kernel::ChannelView& channel, int lane,
+                                   float* const* members) {
+  const auto stride = std::size_t(channel.stride), row = stride * std::size_t(at.dims.x),
+             slice = row * std::size_t(at.dims.y);
+  const T* base = static_cast<const T*>(channel.voxels) + lane;
+  alignas(32) std::int32_t low[3][kLanes], high[3][kLanes];
+  alignas(32) float t[3][kLanes];
+  const Axis* axes[] = {&at.x, &at.y, &at.z};
+  for (int a = 0; a < 3; ++a) {
+    store(axes[a]->low, low[a]);
+    store(axes[a]->high, high[a]);
+    store(axes[a]->t, t[a]);
+  }
+  for (int i = 0; i < kLanes; ++i) {
+    const std::size_t xLow = std::size_t(low[0][i]) * stride, xHigh = std::size_t(high[0][i]) * stride;
+    const std::size_t yLow = std::size_t(low[1][i]) * row, yHigh = std::size_t(high[1][i]) * row;
+    const T* zLow = base + std::size_t(low[2][i]) * slice;
+    const T* zHigh = base + std::size_t(high[2][i]) * slice;
+    const __m128 c00 = lerp4(load4(zLow + yLow + xLow), load4(zLow + yLow + xHigh), t[0][i]);
+    const __m128 c10 = lerp4(load4(zLow + yHigh + xLow), load4(zLow + yHigh + xHigh), t[0][i]);
+    const __m128 c01 = lerp4(load4(zHigh + yLow + xLow), load4(zHigh + yLow + xHigh), t[0][i]);
+    const __m128 c11 = lerp4(load4(zHigh + yHigh + xLow), load4(zHigh + yHigh + xHigh), t[0][i]);
+    alignas(16) float four[4];
+    _mm_store_ps(four, lerp4(lerp4(c00, c10, t[1][i]), lerp4(c01, c11, t[1][i]), t[2][i]));
+    for (int k = 0; k < 4; ++k)
+      if (members[k]) members[k][i] = four[k];
+  }
+}
+
+/// Channels by their bits; the values of channel n come into values[n].
+SCOLOPAX_AVX2 void sampleLanes(const kernel::SceneView& scene, std::uint32_t channels, Float x, Float y,
+                               Float z, float (*values)[kLanes]) {
+  const glm::ivec3 dims = scene.dims;
+  if (dims.x < 2 || dims.y < 2 || dims.z < 2) {
+    float places[3][kLanes];
+    store(x, places[0]), store(y, places[1]), store(z, places[2]);
+    for (int n = 0; n < scene.channelCount; ++n)
+      if (channels >> n & 1) sampleByPoint(scene.channels[n], dims, places, values[n]);
+    return;
+  }
+  const Points at = pointsAt(dims, x, y, z);
+  for (int n = 0; n < scene.channelCount; ++n) {
+    if (!(channels >> n & 1)) continue;
+    const kernel::ChannelView& channel = scene.channels[n];
+    // Channels that lie in the same four.
+    const int lane = channel.lane & ~3;
+    float* members[4] = {};
+    std::uint32_t found = 0;
+    for (int m = n; m < scene.channelCount; ++m)
+      if ((channels >> m & 1) && scene.channels[m].voxels == channel.voxels &&
+          (scene.channels[m].lane & ~3) == lane) {
+        members[scene.channels[m].lane - lane] = values[m];
+        found |= 1u << m;
+      }
+    if ((found & (found - 1)) != 0)
+      visitScalarType(channel.type,
+                      [&](auto zero) { sampleFour<decltype(zero)>(at, channel, lane, members); });
+    else
+      store(sampleChannel(at, channel), values[n]);
+    channels &= ~found;
+  }
+}
+
+}  // namespace scolopax::lanes
+#endif
