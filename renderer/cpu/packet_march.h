@@ -41,16 +41,17 @@ class PacketMarch {
     live_ = walk.meets();
     if (!any(live_)) return;
     int sampled = -2;  // segment whose end was sampled last
-    int taken = 0;
+    int looked = 0;
     for (int k = firstSegment(walk.enter()); any(live_);) {
+      // Also where segments are too many for floats to tell them apart.
+      if (++looked > kernel::kMaxSegments) {
+        cost_->truncated = cost_->truncated + onesOf(live_);
+        break;
+      }
       const Float start = k > 0 ? endOf(k - 1) : inside_.enter, end = endOf(k);
       if (!meetsSomething(walk, start, end)) {
         k = std::max(k + 1, firstSegment(select(walk.full(), walk.enter(), walk.exit())));
         continue;
-      }
-      if (++taken > kernel::kMaxSegments) {
-        cost_->truncated = cost_->truncated + onesOf(live_);
-        break;
       }
       if (sampled != k - 1) sample(start, from_);
       sampled = k;

@@ -157,7 +157,7 @@ class Reflection {
  public:
   SCOLOPAX_AVX2 Reflection(const SceneView& scene, const Rays& rays, std::uint32_t channels,
                            PacketSampler& ofStrata, PacketCost* cost)
-      : scene_(scene), channels_(channels), strata_(ofStrata, cost), light_(scene, rays, channels, cost) {
+      : light_(scene, rays, channels, cost), strata_(ofStrata, cost), scene_(scene), channels_(channels) {
     for (float(&row)[kLanes] : colors_) std::fill(std::begin(row), std::end(row), 0.0f);
   }
 
@@ -173,11 +173,12 @@ class Reflection {
     for (int n = 0; n < scene_.channelCount; ++n) {
       if (!(channels_ >> n & 1)) continue;
       const Parts& parts = parts_[n];
-      const Mask seen = parts.opacity > floats(0.0f);
+      const Float weight = parts.opacity * scale;
+      const Mask seen = weight > floats(kernel::kLeastWeight);
       if (!any(seen)) continue;
       const Float t = segment.start + minimum(parts.moment / parts.opacity, floats(1.0f)) * length;
       const Vec emission{{parts.emission[0], parts.emission[1], parts.emission[2]}};
-      strata_.add(n, seen, parts.opacity * scale, emission * scale, t);
+      strata_.add(n, seen, weight, emission * scale, t);
     }
     const Mask full = strata_.weight() >= floats(scene_.stratum);
     if (any(full)) strata_.hand(full, queue_, light_, colors_);
@@ -193,13 +194,13 @@ class Reflection {
   Absorption absorption;
 
  private:
+  PacketLight<Features> light_;
+  Parts parts_[kernel::kMaxVisibleChannels];
+  PacketStrata strata_;
   const SceneView& scene_;
   std::uint32_t channels_;
-  PacketStrata strata_;
-  PacketLight<Features> light_;
-  LightQueue queue_;
   float colors_[3][kLanes];
-  Parts parts_[kernel::kMaxVisibleChannels];
+  LightQueue queue_;
 };
 
 /// Rays of a packet, their light so far and what they have cost.

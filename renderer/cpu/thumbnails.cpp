@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "renderer/cpu/pass.h"
+#include "renderer/cpu/ray_packets.h"
 #include "renderer/cpu/sample_batch.h"
 #include "renderer/data/camera.h"
 #include "renderer/data/sampling.h"
@@ -27,7 +28,8 @@ class Thumbnails {
  public:
   /// `scene` says what of the plan's scene is looked at: with its light or without.
   Thumbnails(const RenderPlan& plan, const Scene& scene, int side)
-      : view_(plan.view()), render_(chooseTileFunction<kernel::RayMarch>(scene)) {
+      : view_(plan.view()), render_(packetTileFunction(scene, view_)) {
+    if (!render_) render_ = chooseTileFunction<kernel::RayMarch>(scene);
     const double longer = std::max(scene.width, scene.height);
     view_.width = std::max(1, int(std::lround(side * scene.width / longer)));
     view_.height = std::max(1, int(std::lround(side * scene.height / longer)));
@@ -102,6 +104,7 @@ double estimateBias(const RenderPlan& plan) {
 std::optional<BiasedStep> largestStep(const RenderPlan& plan, double target) {
   Scene unlit = plan.scene();
   unlit.shading = unlit.shadows = false;
+  unlit.method = Method::raymarch;
   Thumbnails thumbnails(plan, unlit, kThumbnailSide);
   Pictures coarse = thumbnails.render(kSteps[0], 1, kSamples);
   for (const double step : kSteps) {

@@ -155,6 +155,9 @@ SCOLOPAX_HD inline Collision collisionAt(const SceneView& scene, const Ray& ray,
   return {{t, 0.0f}, point, channel, 0.0f};
 }
 
+/// What absorbs less has no light of its own: its colour is divided by this.
+inline constexpr float kLeastWeight = 1.17549435e-38f;
+
 /// Gathers what channels absorb of a ray's light until there is a stratum of it, and lights that: each
 /// channel at one place, drawn with probability in proportion to what it absorbed, with the lights that are
 /// seen from such a place of them all.
@@ -164,7 +167,8 @@ class Strata {
   SCOLOPAX_HD Strata(const SceneView& scene, const Ray& ray, int only, Sampler& sampler, SampleCost* cost)
       : scene_(scene), ray_(ray), only_(only), sampler_(sampler), cost_(cost) {}
 
-  /// `weight`, above 0: of channel n's light, with `emission` that times its mean colour; absorbed about t.
+  /// `weight`, above kLeastWeight: of channel n's light, with `emission` that times its mean colour; absorbed
+  /// about t.
   SCOLOPAX_HD void add(int n, float weight, glm::vec3 emission, float t) {
     if (all_.weight == 0.0f) {
       random_ = sampler_.next();
@@ -271,7 +275,8 @@ SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval 
       if constexpr (Features::kAny) {
         visitParts<Blend>(scene, run, k, [&](int n, const Part& part) {
           const float t = run.t[k] + minimum(part.moment / part.opacity, 1.0f) * length;
-          strata.add(n, part.opacity * scale, part.emission * scale, t);
+          const float weight = part.opacity * scale;
+          if (weight > kLeastWeight) strata.add(n, weight, part.emission * scale, t);
         });
         if (strata.isFull()) color += strata.finish();
       } else {

@@ -13,8 +13,7 @@ def speed(bench):
     found = {}
     for name in bench.scenes:
         for light in bench.lights:
-            # A marcher with shadows takes seconds a sample.
-            steps = [4, 2, 1, 0.5] + ([] if LIGHTS[light][1] else [0.25])
+            steps = [4, 2, 1, 0.5, 0.25] + ([] if LIGHTS[light][1] else [0.125])
             result = bench.bench(name, light_settings(light), samples=[1, 16, 64], steps=steps,
                                  longest=0.02 if bench.quick else 0.25)
             if result:

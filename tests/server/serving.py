@@ -7,6 +7,7 @@ import signal
 import struct
 import subprocess
 import tempfile
+import unittest
 import urllib.error
 import urllib.request
 
@@ -29,6 +30,22 @@ def write_volume(folder, name="blob", size=16, channels=("a", "b")):
             file.write(voxels)
         paths.append(path)
     return paths
+
+
+class CommandTest(unittest.TestCase):
+    """Runs the program in a folder with a volume."""
+
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.data = write_volume(self.folder.name)
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    @staticmethod
+    def run_command(command, *options):
+        return subprocess.run([PROGRAM, command, *options], capture_output=True, text=True, timeout=300)
 
 
 class Server:

@@ -1,28 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """`scolopax reference`: the picture that the methods converge to, as a file."""
 import json
-import os
-import subprocess
-import tempfile
 import unittest
 
-from serving import PROGRAM, write_volume
+from serving import CommandTest
 
 SMALL = ["--set", "image.width=24", "--set", "image.height=20", "--set", "shading=true", "--set", "shadows=true"]
 
 
-class Reference(unittest.TestCase):
-    def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.addCleanup(self.folder.cleanup)
-        self.data = write_volume(self.folder.name)
-
-    def path(self, name):
-        return os.path.join(self.folder.name, name)
-
-    def run_command(self, command, *options):
-        return subprocess.run([PROGRAM, command, *options], capture_output=True, text=True, timeout=300)
-
+class Reference(CommandTest):
     def picture(self, command, name, *options):
         done = self.run_command(command, "--data", *self.data, *SMALL, "-o", self.path(name), *options)
         self.assertEqual(done.returncode, 0, done.stderr)

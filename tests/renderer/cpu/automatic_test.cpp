@@ -5,9 +5,8 @@
 #include <cstring>
 #include <random>
 
-#include "renderer/generate/orbitals.h"
 #include "renderer/renderer.h"
-#include "tests/support/volumes.h"
+#include "tests/support/orbitals.h"
 
 namespace scolopax {
 namespace {
@@ -16,21 +15,9 @@ using namespace test;
 
 const std::atomic<bool> kNever = false;
 
-std::shared_ptr<const Volume> orbitals() {
-  GeneratedVolume generated = generateOrbitals(24, 3);
-  return std::make_shared<const Volume>(generated.grid, std::move(generated.channels));
-}
-
 Scene automaticScene(const Volume& volume) {
-  Scene scene;
-  scene.width = scene.height = 40;
+  Scene scene = orbitalScene(volume);
   scene.method = Method::automatic;
-  scene.camera = framingCamera(volume.grid(), 35, 1);
-  scene.channels.resize(volume.channels().size());
-  for (std::size_t i = 0; i < scene.channels.size(); ++i) {
-    scene.channels[i].rangeHi = volume.channels()[i].histogram.maximum;
-    scene.channels[i].density = 0.5;
-  }
   return scene;
 }
 
@@ -73,7 +60,8 @@ TEST(Automatic, DependsOnSceneAndDataAlone) {
   const auto volume = orbitals();
   const Scene scene = automaticScene(*volume);
   Scene large = scene;
-  large.width = large.height = 160;
+  large.width *= 4;
+  large.height *= 4;
   Scene fine = scene;
   fine.targetError = 1e-4;
   // However the renderer came to the scene.

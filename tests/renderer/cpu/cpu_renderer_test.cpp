@@ -5,11 +5,10 @@
 #include <thread>
 
 #include "renderer/core/error.h"
-#include "renderer/generate/orbitals.h"
 #include "renderer/metrics/metrics.h"
 #include "renderer/reference/render.h"
 #include "renderer/renderer.h"
-#include "tests/support/volumes.h"
+#include "tests/support/orbitals.h"
 
 namespace scolopax {
 namespace {
@@ -17,25 +16,6 @@ namespace {
 using namespace test;
 
 const std::atomic<bool> kNever = false;
-
-std::shared_ptr<const Volume> orbitals() {
-  GeneratedVolume generated = generateOrbitals(24, 3);
-  return std::make_shared<const Volume>(generated.grid, std::move(generated.channels));
-}
-
-Scene orbitalScene(const Volume& volume) {
-  Scene scene;
-  scene.width = 50;  // neither a multiple of the tile
-  scene.height = 37;
-  scene.camera = framingCamera(volume.grid(), 35, 50.0 / 37.0);
-  scene.channels.resize(volume.channels().size());
-  for (std::size_t i = 0; i < scene.channels.size(); ++i) {
-    scene.channels[i].rangeHi = volume.channels()[i].histogram.maximum;
-    scene.channels[i].density = 0.5;
-    scene.channels[i].color = {{0, glm::dvec3(i == 0, i == 1, i == 2)}};
-  }
-  return scene;
-}
 
 bool sameBits(const Image& a, const Image& b) {
   return a.pixels.size() == b.pixels.size() &&

@@ -273,6 +273,8 @@ TEST(MajorantGrid, IsAfterAnySeriesOfEditsWhatAFreshOneIs) {
     edited.update(macrocells, tables, sums);
     EXPECT_EQ(fresh.update(macrocells, tables, sums), macrocells->cellCount());
     const kernel::MajorantView a = edited.view(), b = fresh.view();
+    ASSERT_EQ(a.filledLow, b.filledLow) << "edit " << edit;
+    ASSERT_EQ(a.filledHigh, b.filledHigh) << "edit " << edit;
     for (std::size_t cell = 0; cell < macrocells->cellCount(); ++cell) {
       ASSERT_EQ(a.totals[cell], b.totals[cell]) << "edit " << edit << " cell " << cell;
       float sum = 0;
@@ -327,7 +329,7 @@ TEST(MajorantGrid, WorksOutOnlyTheCellsWhoseValuesAnEditChanges) {
   }
 }
 
-TEST(MajorantGrid, KnowsHowFarAroundABlockNothingIs) {
+TEST(MajorantGrid, KnowsHowFarAroundABlockNothingIsAndWhichBoxHasEverything) {
   // A few bright voxels; blocks are cut at the far sides.
   std::mt19937 random(20);
   const glm::ivec3 dims(42, 10, 14);
@@ -349,8 +351,15 @@ TEST(MajorantGrid, KnowsHowFarAroundABlockNothingIs) {
       return glm::ivec3(cell % n.x, cell / n.x % n.y, cell / n.x / n.y) / 4;
     };
     std::vector<int> filled;
-    for (int cell = 0; cell < int(cells->cellCount()); ++cell)
-      if (view.bound(std::size_t(cell), 0) > 0) filled.push_back(cell);
+    glm::ivec3 low = (n + 3) / 4, high(0);  // blocks
+    for (int cell = 0; cell < int(cells->cellCount()); ++cell) {
+      if (!(view.bound(std::size_t(cell), 0) > 0)) continue;
+      filled.push_back(cell);
+      low = glm::min(low, blockOf(cell));
+      high = glm::max(high, blockOf(cell) + 1);
+    }
+    EXPECT_EQ(view.filledLow, low * 4);
+    EXPECT_EQ(view.filledHigh, glm::min(high * 4, n));
     for (int cell = 0; cell < int(cells->cellCount()); ++cell) {
       int nearest = 8;
       for (const int other : filled) {

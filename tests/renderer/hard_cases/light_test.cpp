@@ -268,5 +268,26 @@ TEST(ExactBlend, OfIdenticalChannelsInMixIsTheirWeightedSum) {
         ASSERT_NEAR(double(p[c]), weights[c] * double(p.a), 1e-5) << nameOf(method) << " component " << c;
 }
 
+TEST(Light, OnAChannelAsThinAsFloatsCanSayChangesNothing) {
+  // Its share of a stratum, or one over that, is beyond floats.
+  const glm::ivec3 dims(6);
+  for (const float thin : {1.0f, 1e3f, 1e6f, 1e9f}) {
+    const auto volume = volumeOf(gridOf(dims, glm::dvec3(0.25)), channelOf<float>(dims, lumps()),
+                                 channelOf<float>(dims, [&](int, int, int) { return thin * 1.4e-45f; }));
+    Scene scene = frontScene(*volume, 12, 12);
+    scene.channels[0] = scene.channels[1] = ramp(0, 1, 1, kBlue);
+    scene.shading = scene.shadows = true;
+    Scene alone = scene;
+    alone.channels[1].visible = false;
+    for (const Method method : {Method::raymarch, Method::hybrid}) {
+      const Image found = renderAnalog(volume, scene, method, 4);
+      const Image expected = renderAnalog(volume, alone, method, 4);
+      for (std::size_t i = 0; i < found.pixels.size(); ++i)
+        for (int c = 0; c < 4; ++c)
+          ASSERT_NEAR(found.pixels[i][c], expected.pixels[i][c], 1e-6) << nameOf(method) << " pixel " << i;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace scolopax

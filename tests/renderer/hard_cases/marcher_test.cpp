@@ -102,5 +102,20 @@ TEST(RayMarch, OfVoxelsThatAreNotFiniteIsFinite) {
   }
 }
 
+TEST(RayMarch, EndsWhereStepsAreTooManyToCount) {
+  // The step is one of the smallest spacing; along z there are 10^10 of them, and emptiness on the way.
+  const glm::ivec3 dims(8, 8, 32);
+  const auto volume =
+      volumeOf(gridOf(dims, {1, 1, 1e8}),
+               channelOf<std::uint8_t>(dims, [](int, int y, int z) { return y < 4 && z % 8 < 6 ? 0 : 200; }));
+  Scene scene = frontScene(*volume, 4, 4);
+  scene.channels = {ramp(0, 255, 1e-12)};
+  scene.step = 0.5;
+  scene.filter = PixelFilter::point;
+  const RenderStats stats = statsOf(volume, scene, Method::raymarch, 1);
+  EXPECT_EQ(stats.rays, 16u);
+  EXPECT_EQ(stats.truncatedRays, 16u);
+}
+
 }  // namespace
 }  // namespace scolopax
