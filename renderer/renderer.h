@@ -24,7 +24,8 @@ struct RebuildStats {
   double rebuildMs = 0;
 };
 
-/// Counts over all samples since the film was reset; independent of the machine.
+/// Counts over all samples since the film was reset. Those of trackers are the same on every machine; of
+/// quadrature, fetches and cells depend on how many rays the processor takes at once.
 struct RenderStats {
   std::uint64_t rays = 0;
   std::uint64_t fetches = 0;        ///< trilinear samples of one channel
@@ -47,7 +48,8 @@ class Renderer {
   /// Takes a new scene and redoes what it makes stale. Throws Error(badInput) for a scene that does not fit.
   virtual RebuildStats setScene(const Scene& scene) = 0;
   /// Adds one sample to every pixel. Returns false, with the film unchanged, when `cancel` became true or the
-  /// budget of time was used up; both are looked at between pixels. The next call goes on where this one
+  /// budget of time was used up; both are looked at every few
+  /// pixels. The next call goes on where this one
   /// stopped, unless a new scene came in between.
   virtual bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget = kNoBudget) = 0;
   static constexpr std::chrono::nanoseconds kNoBudget = std::chrono::hours(24 * 365);

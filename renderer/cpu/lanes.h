@@ -26,7 +26,6 @@ SCOLOPAX_AVX2 unsigned bitsOf(Mask a) { return unsigned(_mm256_movemask_ps(a.v))
 SCOLOPAX_AVX2 bool any(Mask a) {
   return !_mm256_testz_si256(_mm256_castps_si256(a.v), _mm256_castps_si256(a.v));
 }
-SCOLOPAX_AVX2 Mask noLane() { return {_mm256_setzero_ps()}; }
 
 struct Int {
   __m256i v;
@@ -77,6 +76,11 @@ SCOLOPAX_AVX2 int largestOf(Int a) {
   const __m128i two = _mm_max_epi32(four, _mm_shuffle_epi32(four, 0x4e));
   return _mm_cvtsi128_si32(_mm_max_epi32(two, _mm_shuffle_epi32(two, 0xb1)));
 }
+SCOLOPAX_AVX2 unsigned unionOf(Int a) {
+  const __m128i four = _mm_or_si128(_mm256_castsi256_si128(a.v), _mm256_extracti128_si256(a.v, 1));
+  const __m128i two = _mm_or_si128(four, _mm_shuffle_epi32(four, 0x4e));
+  return unsigned(_mm_cvtsi128_si32(_mm_or_si128(two, _mm_shuffle_epi32(two, 0xb1))));
+}
 SCOLOPAX_AVX2 int firstOf(Int a) { return _mm256_cvtsi256_si32(a.v); }
 
 struct Float {
@@ -102,6 +106,7 @@ SCOLOPAX_AVX2 void put(float x, int lane, Float* to) {
   *to = select(laneNumbers() == ints(lane), floats(x), *to);
 }
 /// a where the mask is set, else 0.
+SCOLOPAX_AVX2 Int where(Mask m, Int a) { return {_mm256_and_si256(_mm256_castps_si256(m.v), a.v)}; }
 SCOLOPAX_AVX2 Float where(Mask m, Float a) { return {_mm256_and_ps(m.v, a.v)}; }
 SCOLOPAX_AVX2 Float minimum(Float a, Float b) { return {_mm256_min_ps(a.v, b.v)}; }
 SCOLOPAX_AVX2 Float maximum(Float a, Float b) { return {_mm256_max_ps(a.v, b.v)}; }
@@ -124,6 +129,9 @@ SCOLOPAX_AVX2 float smallestOf(Float x) {
 
 /// base[index] of every lane.
 SCOLOPAX_AVX2 Float gather(const float* base, Int index) { return {_mm256_i32gather_ps(base, index.v, 4)}; }
+SCOLOPAX_AVX2 Int gather(const std::uint32_t* base, Int index) {
+  return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), index.v, 4)};
+}
 /// The same; reads two bytes more.
 SCOLOPAX_AVX2 Int gather(const std::uint16_t* base, Int index) {
   const __m256i words = _mm256_i32gather_epi32(reinterpret_cast<const int*>(base), index.v, 2);

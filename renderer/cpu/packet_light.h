@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light on eight rays: kernel::Strata, of which those that are finished wait until there are eight, and
-// kernel/shade.h for these.
+// kernel/shade.h for eight strata of rays at once.
 #pragma once
 #include "renderer/cpu/packet_march.h"
 #include "renderer/cpu/packet_sampler.h"
@@ -109,7 +108,7 @@ class PacketLight {
     if (light.kind == kernel::LightKind::directional)
       return {vectors(light.vector), floats(kernel::kInfinity)};
     if (light.kind == kernel::LightKind::headlight)
-      return {{{negative(ray_.direction[0]), negative(ray_.direction[1]), negative(ray_.direction[2])}}, t};
+      return {negative(Vec{{ray_.direction[0], ray_.direction[1], ray_.direction[2]}}), t};
     Vec way;
     for (int axis = 0; axis < 3; ++axis) way[axis] = floats(light.vector[axis]) - point[axis];
     const Vec world = product(scene_.worldFromVoxel, way);
@@ -120,14 +119,13 @@ class PacketLight {
   /// Optical depth of shadow rays (kernel::marchTransmittance).
   class Depth {
    public:
-    SCOLOPAX_AVX2 explicit Depth(const kernel::SceneView& scene, std::uint32_t channels)
-        : scene_(scene), channels_(channels), depth_(floats(0.0f)) {}
+    SCOLOPAX_AVX2 explicit Depth(const kernel::SceneView& scene) : scene_(scene), depth_(floats(0.0f)) {}
     SCOLOPAX_AVX2 Mask take(const PacketSegment& segment) {
       Float extinction = floats(0.0f);
-      for (int n = 0; n < scene_.channelCount; ++n) {
-        if (!(channels_ >> n & 1)) continue;
+      for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
+        const int n = std::countr_zero(left);
         extinction = extinction + partsOf<Detail::extinction>(scene_.channels[n], segment.from[n],
-                                                              segment.to[n], segment.live)
+                                                              segment.to[n], segment.of(scene_, n))
                                       .opacity;
       }
       depth_ = depth_ + extinction * (segment.end - segment.start);
@@ -137,7 +135,6 @@ class PacketLight {
 
    private:
     const kernel::SceneView& scene_;
-    std::uint32_t channels_;
     Float depth_;
   };
 
@@ -157,7 +154,7 @@ class PacketLight {
         Intervals inside = clipToBox(shadow, scene_.dims);
         inside.exit = minimum(inside.exit, way.distance);
         inside.meets = inside.meets & waiting_ & (inside.enter < inside.exit);
-        Depth depth(scene_, channels_);
+        Depth depth(scene_);
         if (any(inside.meets))
           PacketMarch(scene_, shadow, inside, channels_, offset, kernel::kShadowSteps * scene_.step, &spent_)
               .follow(depth);
@@ -195,12 +192,6 @@ class PacketLight {
     const glm::ivec3 dims = scene_.dims;
     Vec beside = point;
     beside[axis] = place;
-    if (dims.x < 2 || dims.y < 2 || dims.z < 2) {
-      float places[3][kLanes], values[kLanes];
-      for (int i = 0; i < 3; ++i) store(beside[i], places[i]);
-      sampleByPoint(channel, dims, places, values);
-      return load(values);
-    }
     return sampleChannel(pointsAt(dims, beside[0], beside[1], beside[2]), channel);
   }
 

@@ -57,10 +57,14 @@ SCOLOPAX_AVX2 Intervals clipToBox(const Rays& rays, glm::ivec3 dims) {
 /// blocks as one step.
 class PacketWalk {
  public:
-  /// Only the part of the interval in which there are cells that are not empty.
-  SCOLOPAX_AVX2 PacketWalk(const Rays& rays, const Intervals& inside, const kernel::MajorantView& grid)
+  /// Only the part of the interval in which there are cells that are not empty. Where the grid has them, bits
+  /// of `columns` say which channels matter.
+  SCOLOPAX_AVX2 PacketWalk(const Rays& rays, const Intervals& inside, const kernel::MajorantView& grid,
+                           std::uint32_t columns)
       : rays_(rays), grid_(grid), inverseSize_(floats(1.0f / grid.cellSize)), end_(inside.exit) {
     enter_ = inside.enter;
+    columns_ = ints(int(columns));
+    active_ = ints(0);
     meets_ = inside.meets;
     for (int axis = 0; axis < 3; ++axis) {
       const Float o = rays.origin[axis], d = rays.direction[axis];
@@ -87,6 +91,8 @@ class PacketWalk {
   SCOLOPAX_AVX2 Float enter() const { return enter_; }
   /// Rays whose cell at enter() may have extinction.
   SCOLOPAX_AVX2 Mask full() const { return full_; }
+  /// Bits of the columns that may have extinction there; only where the grid has them.
+  SCOLOPAX_AVX2 Int active() const { return active_; }
   /// Where the cells of enter(), or the cubes of empty blocks around them, end; infinite when nothing is
   /// left.
   SCOLOPAX_AVX2 Float exit() const { return exit_; }
@@ -102,7 +108,7 @@ class PacketWalk {
   /// Finds out exit(); before advance().
   SCOLOPAX_AVX2 void measure() {
     const Int one = ints(1);
-    const Int radius = code_ - ints(0x8000);
+    const Int radius = code_ - ints(kernel::kEmptyCode);
     const Mask wide = radius > ints(0);
     exit_ = end_;
     for (int axis = 0; axis < 3; ++axis) {
@@ -151,9 +157,12 @@ class PacketWalk {
     return truncated(clamp(at, floats(0.0f), floats(float(grid_.cells[axis] - 1))));
   }
   SCOLOPAX_AVX2 void ask() {
-    code_ =
-        gather(grid_.totals, (cell_[2] * ints(grid_.cells.y) + cell_[1]) * ints(grid_.cells.x) + cell_[0]);
-    full_ = (code_ > ints(0)) & (ints(0x8000) > code_);
+    const Int index = (cell_[2] * ints(grid_.cells.y) + cell_[1]) * ints(grid_.cells.x) + cell_[0];
+    code_ = gather(grid_.totals, index);
+    full_ = (code_ > ints(0)) & (ints(kernel::kEmptyCode) > code_);
+    if (!grid_.active) return;
+    active_ = gather(grid_.active, index) & columns_;
+    full_ = without(full_, active_ == ints(0));
   }
 
   const Rays& rays_;
@@ -162,7 +171,7 @@ class PacketWalk {
   Mask meets_, full_;
   Mask up_[3];
   Float inverse_[3], through_[3];
-  Int code_;
+  Int columns_, code_, active_;
   Int cell_[3], last_[3], next_[3];  // next: behind the plane through which a ray may leave
 };
 

@@ -7,6 +7,7 @@
 #include "renderer/cpu/packet_light.h"
 #include "renderer/cpu/packet_march.h"
 #include "renderer/cpu/packet_sampler.h"
+#include "renderer/cpu/packet_strata.h"
 #include "renderer/cpu/sample_batch.h"
 #include "renderer/data/instances.h"
 #include "renderer/kernel/blend_modes.h"
@@ -30,7 +31,8 @@ struct Absorption {
   /// Goes over a segment; returns its share of the light for every unit of extinction, 0 where there is none.
   SCOLOPAX_AVX2 Float pass(Float extinction, Float length) {
     const Mask some = extinction > floats(0.0f);
-    const Float alpha = absorbed(extinction * length);
+    // Without: rays that miss the volume have lengths that are no numbers.
+    const Float alpha = absorbed(where(some, extinction * length));
     const Float absorbedHere = transmittance * alpha;
     opacity = opacity + absorbedHere;
     transmittance = transmittance * (floats(1.0f) - alpha);
@@ -42,16 +44,15 @@ struct Absorption {
 /// Emission and absorption.
 class Glow {
  public:
-  SCOLOPAX_AVX2 Glow(const SceneView& scene, std::uint32_t channels)
-      : color(vectors(glm::vec3(0.0f))), scene_(scene), channels_(channels) {}
+  SCOLOPAX_AVX2 explicit Glow(const SceneView& scene) : color(vectors(glm::vec3(0.0f))), scene_(scene) {}
 
   SCOLOPAX_AVX2 Mask take(const PacketSegment& segment) {
     Float extinction = floats(0.0f);
     Vec emission = vectors(glm::vec3(0.0f));
-    for (int n = 0; n < scene_.channelCount; ++n) {
-      if (!(channels_ >> n & 1)) continue;
-      const Parts parts =
-          partsOf<Detail::emission>(scene_.channels[n], segment.from[n], segment.to[n], segment.live);
+    for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
+      const int n = std::countr_zero(left);
+      const Parts parts = partsOf<Detail::emission>(scene_.channels[n], segment.from[n], segment.to[n],
+                                                    segment.of(scene_, n));
       extinction = extinction + parts.opacity;
       for (int c = 0; c < 3; ++c) emission[c] = emission[c] + parts.emission[c];
     }
@@ -66,89 +67,6 @@ class Glow {
 
  private:
   const SceneView& scene_;
-  std::uint32_t channels_;
-};
-
-/// kernel::Strata.
-class PacketStrata {
- public:
-  SCOLOPAX_AVX2 PacketStrata(PacketSampler& sampler, PacketCost* cost) : sampler_(sampler), cost_(cost) {
-    all_.weight = floats(0.0f);
-    all_.t = all_.draw = all_.weight;
-    present_ = y_ = z_ = ints(0);
-  }
-
-  SCOLOPAX_AVX2 void add(int n, Mask which, Float weight, const Vec& emission, Float t) {
-    const Mask fresh = which & (all_.weight == floats(0.0f));
-    if (any(fresh)) {
-      const PacketSampler::Block random = sampler_.next(fresh);
-      cost_->randomBlocks = cost_->randomBlocks + onesOf(fresh);
-      all_.draw = select(fresh, uniformOf(random.x), all_.draw);
-      y_ = select(fresh, random.y, y_);
-      z_ = select(fresh, random.z, z_);
-      present_ = select(fresh, ints(0), present_);
-    }
-    Channel& channel = channels_[n];
-    const Int bit = ints(int(1u << n));
-    const Mask begins = without(which, (present_ & bit) == bit);
-    if (any(begins)) {
-      present_ = select(begins, present_ | bit, present_);
-      const Float zero = floats(0.0f), draw = uniformOf(y_ + ints(int(std::uint32_t(n) * 0x9e3779b9u)));
-      channel.place = {select(begins, zero, channel.place.weight), select(begins, draw, channel.place.draw),
-                       select(begins, zero, channel.place.t)};
-      channel.emission = select(begins, vectors(glm::vec3(0.0f)), channel.emission);
-    }
-    channel.emission = select(which, channel.emission + emission, channel.emission);
-    choose(channel.place, which, weight, t);
-    choose(all_, which, weight, t);
-  }
-
-  /// Those that have so much weight wait for light, and begin anew.
-  template <class Light>
-  SCOLOPAX_AVX2 void hand(Mask which, LightQueue& queue, Light& light, float (*colors)[kLanes]) {
-    for (unsigned left = bitsOf(which); left != 0; left &= left - 1) {
-      if (queue.count == kLanes) light.shine(queue, colors);
-      const int i = std::countr_zero(left), slot = queue.count++;
-      queue.lane[slot] = i;
-      queue.t[slot] = at(all_.t, i);
-      queue.offset[slot] = kernel::uniformOf(std::uint32_t(at(z_, i)));
-      const auto present = std::uint32_t(at(present_, i));
-      queue.channels[slot] = std::int32_t(present);
-      for (std::uint32_t bits = present; bits != 0; bits &= bits - 1) {
-        const int n = std::countr_zero(bits);
-        const Channel& from = channels_[n];
-        LightQueue::Channel& to = queue.channel[n];
-        to.weight[slot] = at(from.place.weight, i);
-        to.t[slot] = at(from.place.t, i);
-        for (int c = 0; c < 3; ++c) to.emission[c][slot] = at(from.emission[c], i);
-      }
-    }
-    all_.weight = select(which, floats(0.0f), all_.weight);
-  }
-  SCOLOPAX_AVX2 Float weight() const { return all_.weight; }
-
- private:
-  struct Place {
-    Float weight, draw, t;
-  };
-  struct Channel {
-    Place place;
-    Vec emission;
-  };
-  SCOLOPAX_AVX2 static void choose(Place& place, Mask which, Float weight, Float t) {
-    const Float one = floats(1.0f), sum = place.weight + weight, chance = weight / sum;
-    const Mask here = place.draw < chance;
-    const Float rest = select(here, place.draw / chance, (place.draw - chance) / (one - chance));
-    place.weight = select(which, sum, place.weight);
-    place.t = select(which & here, t, place.t);
-    place.draw = select(which, rest, place.draw);
-  }
-
-  PacketSampler& sampler_;
-  PacketCost* cost_;
-  Place all_;
-  Int present_, y_, z_;
-  Channel channels_[kernel::kMaxVisibleChannels];
 };
 
 /// Light that channels throw back.
@@ -157,21 +75,22 @@ class Reflection {
  public:
   SCOLOPAX_AVX2 Reflection(const SceneView& scene, const Rays& rays, std::uint32_t channels,
                            PacketSampler& ofStrata, PacketCost* cost)
-      : light_(scene, rays, channels, cost), strata_(ofStrata, cost), scene_(scene), channels_(channels) {
+      : light_(scene, rays, channels, cost), strata_(ofStrata, cost), scene_(scene) {
     for (float(&row)[kLanes] : colors_) std::fill(std::begin(row), std::end(row), 0.0f);
   }
 
   SCOLOPAX_AVX2 Mask take(const PacketSegment& segment) {
     Float extinction = floats(0.0f);
-    for (int n = 0; n < scene_.channelCount; ++n) {
-      if (!(channels_ >> n & 1)) continue;
-      parts_[n] = partsOf<Detail::moment>(scene_.channels[n], segment.from[n], segment.to[n], segment.live);
+    for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
+      const int n = std::countr_zero(left);
+      parts_[n] =
+          partsOf<Detail::moment>(scene_.channels[n], segment.from[n], segment.to[n], segment.of(scene_, n));
       extinction = extinction + parts_[n].opacity;
     }
     if (!any(extinction > floats(0.0f))) return absorption.lets();
     const Float length = segment.end - segment.start, scale = absorption.pass(extinction, length);
-    for (int n = 0; n < scene_.channelCount; ++n) {
-      if (!(channels_ >> n & 1)) continue;
+    for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
+      const int n = std::countr_zero(left);
       const Parts& parts = parts_[n];
       const Float weight = parts.opacity * scale;
       const Mask seen = weight > floats(kernel::kLeastWeight);
@@ -198,7 +117,6 @@ class Reflection {
   Parts parts_[kernel::kMaxVisibleChannels];
   PacketStrata strata_;
   const SceneView& scene_;
-  std::uint32_t channels_;
   float colors_[3][kLanes];
   LightQueue queue_;
 };
@@ -229,7 +147,7 @@ SCOLOPAX_AVX2 void march(const SceneView& scene, std::uint32_t channels, Float o
     Reflection<Features> reflection(scene, packet.rays, channels, ofStrata, &packet.cost);
     add(reflection);
   } else {
-    Glow glow(scene, channels);
+    Glow glow(scene);
     add(glow);
   }
 }
@@ -274,7 +192,7 @@ SCOLOPAX_AVX2_ONLY void renderPacket(const Pass& pass, int x, int y, int endX, i
       pass.cost[pixel].fetches += std::uint32_t(at(packet.cost.fetches, i));
       pass.cost[pixel].cellSteps += std::uint32_t(at(packet.cost.cellSteps, i));
       pass.cost[pixel].randomBlocks += std::uint32_t(at(packet.cost.randomBlocks + sampler.blocks(), i));
-      pass.cost[pixel].truncated += std::uint32_t(at(packet.cost.truncated, i));
+      pass.cost[pixel].truncated += at(packet.cost.truncated, i) > 0;
     }
     pass.done[pixel] = 1;
   }
@@ -299,6 +217,10 @@ TileFunction packetTileFunction(const Scene& scene, const SceneView& view) {
   const auto cells = glm::dvec3(view.majorants.cells);
   if (!hasStep(scene.method) || !available(InstructionSet::avx2) || cells.x * cells.y * cells.z >= 0x1p30)
     return nullptr;
+  // Without bits of channels, rays take segments for each other, and between voxels that are not finite a
+  // segment may cross values that are nowhere.
+  for (int n = 0; n < view.channelCount; ++n)
+    if (!view.majorants.active && !view.channels[n].finite) return nullptr;
   return visitBlendAndLight(scene, [](auto blend, auto features) -> TileFunction {
     using Blend = typename decltype(blend)::type;
     if constexpr (Blend::kSums)

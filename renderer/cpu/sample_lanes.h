@@ -33,22 +33,18 @@ struct Points {
   std::size_t first;  ///< the slice that gathers' indices, which are of 32 bits, count from: that of lane 0
   float slices;       ///< at most so many are between them
 };
-SCOLOPAX_AVX2 void setZ(Float z, Points* points) {
-  points->place[2] = z;
-  points->z = axisOf(z, points->dims.z);
-  points->first = std::size_t(firstOf(points->z.low));
-  const Int away = points->z.low - ints(int(points->first));
-  points->slices = float(largestOf(maximum(away, ints(0) - away)) + 3);
-}
-/// All axes have two voxels or more.
 SCOLOPAX_AVX2 Points pointsAt(glm::ivec3 dims, Float x, Float y, Float z) {
   Points points;
   points.dims = dims;
-  points.place[0] = x, points.place[1] = y;
-  points.x = axisOf(x, dims.x), points.y = axisOf(y, dims.y);
-  setZ(z, &points);
+  points.place[0] = x, points.place[1] = y, points.place[2] = z;
+  points.x = axisOf(x, dims.x), points.y = axisOf(y, dims.y), points.z = axisOf(z, dims.z);
+  points.first = std::size_t(firstOf(points.z.low));
+  const Int away = points.z.low - ints(int(points.first));
+  points.slices = float(largestOf(maximum(away, ints(0) - away)) + 3);
   return points;
 }
+/// Lanes need a neighbour on every axis.
+SCOLOPAX_AVX2 bool isFlat(glm::ivec3 dims) { return dims.x < 2 || dims.y < 2 || dims.z < 2; }
 
 SCOLOPAX_AVX2 Float lerp(Float a, Float b, Float t) { return a + t * (b - a); }
 SCOLOPAX_AVX2 __m128 lerp4(__m128 a, __m128 b, float t) {
@@ -112,7 +108,8 @@ inline void sampleByPoint(const kernel::ChannelView& channel, glm::ivec3 dims, c
 
 /// One channel, whatever its type.
 SCOLOPAX_AVX2 Float sampleChannel(const Points& at, const kernel::ChannelView& channel) {
-  if (!(at.slices * float(at.dims.x) * float(at.dims.y) * float(channel.stride) < 0x1p29f)) {
+  if (isFlat(at.dims) ||
+      !(at.slices * float(at.dims.x) * float(at.dims.y) * float(channel.stride) < 0x1p29f)) {
     float places[3][kLanes], values[kLanes];
     for (int axis = 0; axis < 3; ++axis) store(at.place[axis], places[axis]);
     sampleByPoint(channel, at.dims, places, values);
@@ -180,15 +177,7 @@ SCOLOPAX_AVX2_ONLY void sampleFour(const Points& at, const kernel::ChannelView& 
 /// Channels by their bits; the values of channel n come into values[n].
 SCOLOPAX_AVX2 void sampleLanes(const kernel::SceneView& scene, std::uint32_t channels, Float x, Float y,
                                Float z, float (*values)[kLanes]) {
-  const glm::ivec3 dims = scene.dims;
-  if (dims.x < 2 || dims.y < 2 || dims.z < 2) {
-    float places[3][kLanes];
-    store(x, places[0]), store(y, places[1]), store(z, places[2]);
-    for (int n = 0; n < scene.channelCount; ++n)
-      if (channels >> n & 1) sampleByPoint(scene.channels[n], dims, places, values[n]);
-    return;
-  }
-  const Points at = pointsAt(dims, x, y, z);
+  const Points at = pointsAt(scene.dims, x, y, z);
   for (int n = 0; n < scene.channelCount; ++n) {
     if (!(channels >> n & 1)) continue;
     const kernel::ChannelView& channel = scene.channels[n];
@@ -202,11 +191,11 @@ SCOLOPAX_AVX2 void sampleLanes(const kernel::SceneView& scene, std::uint32_t cha
         members[scene.channels[m].lane - lane] = values[m];
         found |= 1u << m;
       }
-    if ((found & (found - 1)) != 0)
+    if ((found & (found - 1)) != 0 && !isFlat(scene.dims))
       visitScalarType(channel.type,
                       [&](auto zero) { sampleFour<decltype(zero)>(at, channel, lane, members); });
     else
-      store(sampleChannel(at, channel), values[n]);
+      found = 1u << n, store(sampleChannel(at, channel), values[n]);
     channels &= ~found;
   }
 }

@@ -105,7 +105,10 @@ std::size_t MajorantGrid::update(std::shared_ptr<const MacrocellGrid> macrocells
   std::vector<std::uint8_t> radii(blocks.count()), scratch(blocks.count()), stale(blocks.count());
   if (newCells) {
     std::vector<std::uint8_t> noRadii(blocks.count());
-    totals_ = std::vector<TotalCode>(macrocells->cellCount() + 1);  // processors gather pairs of them
+    std::vector<TotalCode> totals(macrocells->cellCount() + 2);  // processors gather pairs of them
+    active_ =
+        std::vector<std::uint32_t>(macrocells->levels.size() > kFewColumns ? macrocells->cellCount() : 0);
+    totals_ = std::move(totals);
     radii_ = std::move(noRadii);
   }
   macrocells_ = std::move(macrocells);
@@ -129,6 +132,7 @@ std::size_t MajorantGrid::update(std::shared_ptr<const MacrocellGrid> macrocells
       const LevelInterval* intervals = &macrocells_->intervals[cell * columns];
       if (meets(intervals)) {
         totals_[cell] = kernel::codeOfTotal(totalOf(intervals));
+        if (!active_.empty()) active_[cell] = activeOf(intervals);
         ++count;
       }
       empty = empty && (totals_[cell] == 0 || totals_[cell] >= kernel::codeOfEmpty(0));
@@ -153,7 +157,7 @@ std::size_t MajorantGrid::update(std::shared_ptr<const MacrocellGrid> macrocells
     });
   });
   radii_ = std::move(radii);
-  measureFilled(blocks.size);
+  if (newCells || other) measureFilled(blocks.size);
   return touched;
 }
 
@@ -180,6 +184,13 @@ float MajorantGrid::totalOf(const LevelInterval* intervals) const {
   return total;
 }
 
+std::uint32_t MajorantGrid::activeOf(const LevelInterval* intervals) const {
+  std::uint32_t active = 0;
+  for (const BoundTable& table : tables_)
+    if (table.over(intervals[table.column]) > 0.0f) active |= 1u << table.column;
+  return active;
+}
+
 kernel::MajorantView MajorantGrid::view() const {
   return {macrocells_->cells,
           float(macrocells_->size),
@@ -188,7 +199,8 @@ kernel::MajorantView MajorantGrid::view() const {
           int(macrocells_->levels.size()),
           tables_.data(),
           filledLow_,
-          filledHigh_};
+          filledHigh_,
+          active_.empty() ? nullptr : active_.data()};
 }
 
 }  // namespace scolopax

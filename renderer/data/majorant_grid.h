@@ -26,13 +26,18 @@ class MajorantGrid {
 
  private:
   float totalOf(const kernel::LevelInterval* intervals) const;
+  std::uint32_t activeOf(const kernel::LevelInterval* intervals) const;
   void measureFilled(glm::ivec3 blocks);
   std::shared_ptr<const MacrocellGrid> macrocells_;
   std::vector<kernel::BoundTable> tables_;
   bool sums_ = true;
   std::vector<kernel::TotalCode> totals_;
   std::vector<std::uint8_t> radii_;  // per block
+  std::vector<std::uint32_t> active_;
   glm::ivec3 filledLow_{0}, filledHigh_{0};
+
+  /// Of so many channels all are looked at where one may be something.
+  static constexpr std::size_t kFewColumns = 4;
 };
 
 }  // namespace scolopax

@@ -166,6 +166,7 @@ kernel::ChannelView TransferFunction::view(const Channel& channel) const {
   view.weight = weight_;
   view.material = material_;
   view.inverseRange = inverseRange_;
+  view.finite = channel.histogram.nonFiniteCount == 0;
   view.opacity = opacity_.view();
   view.color = color_.view();
   view.optical = optical_.view();

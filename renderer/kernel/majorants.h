@@ -42,10 +42,11 @@ inline constexpr int kMaxEmptyRadius = 8;
 /// Bound of all visible channels together in a cell: the upper half of a float, so that it is rounded up by
 /// at most 1/128. With the sign bit, the bound is 0, and the rest is how far around nothing is (emptyRadius).
 using TotalCode = std::uint16_t;
+inline constexpr TotalCode kEmptyCode = 0x8000;
 SCOLOPAX_HD inline TotalCode codeOfTotal(float total) {
   return TotalCode((std::bit_cast<std::uint32_t>(total) + 0xffffu) >> 16);
 }
-SCOLOPAX_HD inline TotalCode codeOfEmpty(int radius) { return TotalCode(0x8000 | radius); }
+SCOLOPAX_HD inline TotalCode codeOfEmpty(int radius) { return TotalCode(kEmptyCode | radius); }
 
 /// Cell (i,j,k), at cells' index (k * cells.y + j) * cells.x + i, covers voxel coordinates [i, i+1] *
 /// cellSize; the outer cells reach to the faces of the box.
@@ -58,16 +59,19 @@ struct MajorantView {
   const BoundTable* tables;  ///< per visible channel
   /// All cells outside these are empty: from filledLow up to below filledHigh. Whole blocks.
   glm::ivec3 filledLow, filledHigh;
+  /// Per cell: bit tables[n].column: visible channel n has a bound above 0. For processors that want to know
+  /// of several cells at once; null where the volume has few channels.
+  const std::uint32_t* active;
 
   /// Bound of all visible channels together: of the sum of their extinctions, or, for blend modes that show
   /// one channel at a point, of the largest. Not below the sum (or maximum) of their bounds.
   SCOLOPAX_HD float total(std::size_t cell) const {
-    return totals[cell] < 0x8000u ? std::bit_cast<float>(std::uint32_t(totals[cell]) << 16) : 0.0f;
+    return totals[cell] < kEmptyCode ? std::bit_cast<float>(std::uint32_t(totals[cell]) << 16) : 0.0f;
   }
   /// Greatest r such that the blocks that are less than r blocks away from the cell's, along every axis, are
   /// empty; at most kMaxEmptyRadius.
   SCOLOPAX_HD int emptyRadius(std::size_t cell) const {
-    return totals[cell] < 0x8000u ? 0 : totals[cell] - 0x8000;
+    return totals[cell] < kEmptyCode ? 0 : totals[cell] - kEmptyCode;
   }
   /// Bound of visible channel n.
   SCOLOPAX_HD float bound(std::size_t cell, int n) const {

@@ -64,9 +64,10 @@ class SegmentWalk {
         waiting = 0;
       }
       if (active == 0) continue;
-      // The segment in which the cell begins; rounding may move the cut by as much.
+      // The segment in which the cell begins.
       const float place = (walk.enter() - inside_.enter) / step_ - offset_ + 1.0f;
-      const int guess = int(clamp(place, 0.0f, 1e9f));
+      int guess = int(clamp(place, 0.0f, 1e9f));
+      if (guess > 0 && walk.enter() < end(guess - 1)) --guess;  // rounding had come to the next
       if (guess > next) next = guess;
       while (end(next - 1) < walk.exit()) {
         if (++taken > kMaxSegments) {

@@ -69,6 +69,7 @@ struct ChannelView {
   float weight;                ///< of the colour in blend mode mix
   MaterialView material;
   float inverseRange;  ///< 1 / |hi - lo| of the range in stored values
+  bool finite;         ///< all voxels are
 };
 
 /// Points of a ray, in voxel coordinates, that are sampled together.

@@ -50,7 +50,7 @@ void expectSameOnBoth(const std::shared_ptr<const Volume>& volume, const Scene& 
     counted.truncatedRays += cost.truncated;
   }
   if (scene.method == Method::raymarch || scene.method == Method::hybrid) {
-    // The CPU samples several points at once, and so beyond the last one that shows.
+    // The CPU takes several rays or points at once, and so looks at some that do not show.
     EXPECT_LE(counted.fetches, stats.fetches);
     EXPECT_LE(counted.cellSteps, stats.cellSteps);
   } else {

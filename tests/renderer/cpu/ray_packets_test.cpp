@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
+#include <algorithm>
 #include <limits>
 #include <random>
 
@@ -107,7 +107,7 @@ TEST(RayPackets, HaveTheBitsOfOneRayAfterTheOther) {
     glm::ivec3 dims(2 + draw.upTo(40), 2 + draw.upTo(40), 2 + draw.upTo(40));
     if (draw.upTo(9) == 0) dims[draw.upTo(2)] = 1;
     std::vector<ChannelSource> sources;
-    for (int n = draw.of({1, 1, 2, 4, 5}); n > 0; --n) sources.push_back(anyBlobs(draw, dims));
+    for (int n = draw.of({1, 1, 2, 4, 5, 9}); n > 0; --n) sources.push_back(anyBlobs(draw, dims));
     const auto volume = std::make_shared<const Volume>(
         gridOf(dims, {draw.between(0.5, 2), draw.between(0.5, 2), draw.between(0.5, 2)}), std::move(sources));
     Scene scene = frontScene(*volume, 1 + draw.upTo(40), 1 + draw.upTo(40));
@@ -120,7 +120,7 @@ TEST(RayPackets, HaveTheBitsOfOneRayAfterTheOther) {
     scene.method = draw.of({Method::raymarch, Method::hybrid});
     scene.blend = draw.of({BlendMode::density, BlendMode::density, BlendMode::composite});
     scene.filter = draw.of({PixelFilter::point, PixelFilter::box});
-    scene.step = draw.of({0.1, 0.5, 1.0, 3.0, 20.0});
+    scene.step = draw.of({0.1, 0.5, 1.0, 4.0, 20.0});
     scene.macrocell = draw.of({1, 4, 4, 7, 64});
     scene.seed = seed;
     scene.shading = draw.upTo(1) == 1;
@@ -131,7 +131,10 @@ TEST(RayPackets, HaveTheBitsOfOneRayAfterTheOther) {
     kernel::SceneView view = plan.view();
     view.sampleBatch = sampleBatchFor(InstructionSet::avx2);
     const TileFunction tiles = packetTileFunction(scene, view);
-    ASSERT_NE(tiles, nullptr);
+    const bool finite =
+        std::all_of(view.channels, view.channels + view.channelCount, [](const auto& c) { return c.finite; });
+    ASSERT_EQ(tiles != nullptr, finite || scene.channels.size() > 4);
+    if (!tiles) continue;
     const auto count = std::size_t(scene.width) * std::size_t(scene.height);
     for (const std::uint32_t sample : {0u, 70u}) {
       const auto number = sampleNumber(scene.sampling, sample);
@@ -168,7 +171,7 @@ TEST(RayPackets, HaveTheBitsOfOneRayAfterTheOther) {
       ++pictures;
     }
   }
-  EXPECT_EQ(pictures, 800);
+  EXPECT_GT(pictures, 600);
   EXPECT_GT(seen, 40000);
   EXPECT_GT(opaque, 1000);
   RecordProperty("fetches", std::to_string(fetches));
