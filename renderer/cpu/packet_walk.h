@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Eight rays at once: through pixels, into the box and through the macrocells. What kernel/camera_rays.h and
-// kernel/cell_walk.h do with one, with the same numbers; but the walk takes no part of a block that is empty.
+// kernel/cell_walk.h do with one; but the walk asks at points, instead of going from cell to cell.
 #pragma once
 #include "renderer/cpu/lanes.h"
 #include "renderer/kernel/views.h"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Quadrature (kernel/raymarch.h) of eight rays at once, where that is possible: the same pictures bit by bit.
+// Quadrature (kernel/raymarch.h) of eight rays at once, where that is possible: the same pictures bit by bit,
+// but where rounding decides whether a ray meets a cell.
 #pragma once
 #include "renderer/cpu/pass.h"
 
