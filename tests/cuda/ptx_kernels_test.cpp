@@ -34,6 +34,14 @@ TEST(PtxKernels, AreCaughtReadingAndWritingWhereTheyMayNot) {
   EXPECT_THAT(faultOf(plan.view(), 64), testing::HasSubstr("load outside of memory"));  // the host's pointers
 }
 
+TEST(PtxInstructions, OfBitFieldsInsertOneAndCutWhatIsBeyond) {
+  EXPECT_EQ(ptx::insertBits<std::uint32_t>(0xabc, 0xffffffff, 8, 8), 0xffffbcffu);
+  EXPECT_EQ(ptx::insertBits<std::uint32_t>(0xabc, 0x12345678, 28, 8), 0xc2345678u);
+  EXPECT_EQ(ptx::insertBits<std::uint64_t>(3, 1, 1, 63), 7u);
+  EXPECT_EQ(ptx::insertBits<std::uint64_t>(~0ull, 5, 64, 4), 5u);
+  EXPECT_EQ(ptx::insertBits<std::uint64_t>(~0ull, 5, 0, 0), 5u);
+}
+
 TEST(PtxMemory, IsWhatAThreadOwnsAlignedAndOnlyWhileItDoes) {
   const std::vector<ptx::Range> global{{1000, 1024}, {2000, 2004}}, parameters{{3000, 3008}};
   ptx::Thread thread{{}, {}, {}, {}, global, parameters};

@@ -191,4 +191,15 @@ T reverseBits(T a) {
   return reversed;
 }
 
+/// `length` low bits of `field` in the place of those of `into` from `position` on; what is beyond is left
+/// out.
+template <class T>
+T insertBits(T field, T into, std::uint32_t position, std::uint32_t length) {
+  for (std::uint32_t i = 0; i < (length & 0xff) && (position & 0xff) + i < sizeof(T) * 8; ++i) {
+    const T bit = T(T(1) << ((position & 0xff) + i));
+    into = T((field >> i & 1) ? into | bit : into & T(~bit));
+  }
+  return into;
+}
+
 }  // namespace ptx

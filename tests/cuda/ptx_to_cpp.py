@@ -355,6 +355,12 @@ class FunctionTranslator:
     def do_brev(self, modifiers, operands):
         return self.assign(operands[0], modifiers[-1], f"ptx::reverseBits({self.value(operands[1], modifiers[-1])})")
 
+    def do_bfi(self, modifiers, operands):
+        type_name = plain(modifiers[-1])
+        field, into = (self.value(operand, type_name) for operand in operands[1:3])
+        position, length = (self.value(operand, "u32") for operand in operands[3:5])
+        return self.assign(operands[0], type_name, f"ptx::insertBits({field}, {into}, {position}, {length})")
+
     # Control
 
     def do_bra(self, modifiers, operands):
