@@ -31,7 +31,7 @@ struct Absorption {
   /// Goes over a segment; returns its share of the light for every unit of extinction, 0 where there is none.
   SCOLOPAX_AVX2 Float pass(Float extinction, Float length) {
     const Mask some = extinction > floats(0.0f);
-    // Without: rays that miss the volume have lengths that are no numbers.
+    // Masked, because the lengths of rays that miss the volume may not be numbers.
     const Float alpha = absorbed(where(some, extinction * length));
     const Float absorbedHere = transmittance * alpha;
     opacity = opacity + absorbedHere;
