@@ -8,6 +8,8 @@
 
 #include <cstdint>
 
+#include "renderer/kernel/math.h"
+
 #define SCOLOPAX_AVX2_ONLY __attribute__((target("avx2")))
 #define SCOLOPAX_AVX2 __attribute__((target("avx2"), always_inline)) inline
 
@@ -172,7 +174,7 @@ SCOLOPAX_AVX2 Float log2Of(Float x) {
 /// kernel::power of x in [0, 1].
 SCOLOPAX_AVX2 Float power(Float x, Float exponent) {
   const Float one = floats(1.0f);
-  const Mask some = x > floats(1.17549435e-38f), whole = x >= one;
+  const Mask some = x > floats(kernel::kLeastNormal), whole = x >= one;
   const Float inner = select(without(some, whole), x, floats(0.5f));
   const Float result = minimum(exp2Of(exponent * log2Of(inner)), one);
   return where(some, select(whole, one, result));

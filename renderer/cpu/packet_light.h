@@ -113,7 +113,7 @@ class PacketLight {
     for (int axis = 0; axis < 3; ++axis) way[axis] = floats(light.vector[axis]) - point[axis];
     const Vec world = product(scene_.worldFromVoxel, way);
     const Float distance = squareRoot(dot(world, world)) * floats(scene_.smallestSpacing);
-    return {way * (floats(1.0f) / maximum(distance, floats(1.17549435e-38f))), distance};
+    return {way * (floats(1.0f) / maximum(distance, floats(kernel::kLeastNormal))), distance};
   }
 
   /// Optical depth of shadow rays (kernel::marchTransmittance).

@@ -93,7 +93,7 @@ class Reflection {
       const int n = std::countr_zero(left);
       const Parts& parts = parts_[n];
       const Float weight = parts.opacity * scale;
-      const Mask seen = weight > floats(kernel::kLeastWeight);
+      const Mask seen = weight > floats(kernel::kLeastNormal);
       if (!any(seen)) continue;
       const Float t = segment.start + minimum(parts.moment / parts.opacity, floats(1.0f)) * length;
       const Vec emission{{parts.emission[0], parts.emission[1], parts.emission[2]}};

@@ -12,6 +12,7 @@ namespace scolopax::kernel {
 
 inline constexpr float kInfinity = __builtin_huge_valf();
 inline constexpr float kLargestFinite = 0x1.fffffep127f;
+inline constexpr float kLeastNormal = 0x1p-126f;
 
 SCOLOPAX_HD inline float squareRoot(float x) { return __builtin_sqrtf(x); }
 SCOLOPAX_HD inline float minimum(float a, float b) { return a < b ? a : b; }
@@ -95,7 +96,7 @@ SCOLOPAX_HD inline float absorbed(float depth) {
 
 /// x^exponent for x in [0, 1] and exponent > 0.
 SCOLOPAX_HD inline float power(float x, float exponent) {
-  if (!(x > 1.17549435e-38f)) return 0.0f;
+  if (!(x > kLeastNormal)) return 0.0f;
   if (x >= 1.0f) return 1.0f;
   return minimum(exp2Of(exponent * log2Of(x)), 1.0f);
 }

@@ -3,6 +3,8 @@
 // the curves exact (the paper's baseline of 5.2-5.3 takes one point instead). Lighting is worked out once for
 // every stratum of absorbed light, a thin one (raymarch) or not (hybrid). Biased; of order 2 in the step.
 #pragma once
+#include <type_traits>
+
 #include "renderer/kernel/segments.h"
 #include "renderer/kernel/shade.h"
 
@@ -43,6 +45,11 @@ struct Largests {
   float extinction[kPlacesAtKnots];
   int channel[kPlacesAtKnots];
 };
+
+/// In their place where extinctions add up.
+struct NoLargests {};
+template <class Blend>
+using LargestsOf = std::conditional_t<Blend::kSums, NoLargests, Largests>;
 
 /// What a channel is at a place in [0,1] of a segment.
 SCOLOPAX_HD inline Optical opticalOn(const ChannelView& channel, const float* position, float place) {
@@ -100,34 +107,55 @@ SCOLOPAX_HD Part partAmong(const ChannelView& channel, int n, const float* posit
   return part;
 }
 
-/// Calls visit(n, part) for every channel that is seen on a segment, and returns the segment's mean
-/// extinction. A run with one channel needs no comparisons.
-template <class Blend, class Visit>
-SCOLOPAX_HD float visitParts(const SceneView& scene, const SegmentRun& run, int k, Visit&& visit) {
-  if constexpr (!Blend::kSums) {
-    if ((run.active[k] & (run.active[k] - 1)) != 0) {
-      const Largests largests = largestsOn(scene, run, k);
-      for (int n = 0; n < scene.channelCount; ++n) {
-        if (!(run.active[k] >> n & 1)) continue;
-        const Part part = partAmong<Blend>(scene.channels[n], n, &run.position[n][k], largests);
-        if (part.opacity > 0.0f) visit(n, part);
-      }
-      return meanOf(largests);
+/// What the channels of a walk's segment do on it. A run with one channel needs no comparisons.
+template <class Blend>
+class SegmentParts {
+ public:
+  /// `largests` is apart from the rest as SegmentRun is.
+  SCOLOPAX_HD SegmentParts(LargestsOf<Blend>& largests, const SceneView& scene, const SegmentWalk& walk)
+      : largests_(largests), scene_(scene), run_(walk.run()), k_(walk.k()) {
+    if constexpr (!Blend::kSums) {
+      compared_ = (run_.active[k_] & (run_.active[k_] - 1)) != 0;
+      if (compared_) largests_ = largestsOn(scene, run_, k_);
     }
   }
-  float extinction = 0.0f;
-  for (int n = 0; n < scene.channelCount; ++n) {
-    if (!(run.active[k] >> n & 1)) continue;
-    const Part part = partAlone(scene.channels[n], &run.position[n][k]);
-    if (!(part.opacity > 0.0f)) continue;
-    extinction += part.opacity;
-    if constexpr (!Blend::kMixes)
-      visit(n, part);
-    else if (scene.channels[n].weight > 0.0f)
-      visit(n, scaled(part, scene.channels[n].weight));
+
+  /// Calls visit(n, part) for every channel that is seen, and returns the mean extinction.
+  template <class Visit>
+  SCOLOPAX_HD float visit(Visit&& visit) const {
+    float extinction = 0.0f;
+    for (int n = 0; n < scene_.channelCount; ++n) {
+      if (!(run_.active[k_] >> n & 1)) continue;
+      const ChannelView& channel = scene_.channels[n];
+      const float* position = &run_.position[n][k_];
+      Part part;
+      if constexpr (!Blend::kSums) {
+        if (compared_) {
+          part = partAmong<Blend>(channel, n, position, largests_);
+          if (part.opacity > 0.0f) visit(n, part);
+          continue;
+        }
+      }
+      part = partAlone(channel, position);
+      if (!(part.opacity > 0.0f)) continue;
+      extinction += part.opacity;
+      if constexpr (!Blend::kMixes)
+        visit(n, part);
+      else if (channel.weight > 0.0f)
+        visit(n, scaled(part, channel.weight));
+    }
+    if constexpr (!Blend::kSums)
+      if (compared_) return meanOf(largests_);
+    return extinction;
   }
-  return extinction;
-}
+
+ private:
+  LargestsOf<Blend>& largests_;
+  const SceneView& scene_;
+  const SegmentRun& run_;
+  int k_;
+  bool compared_ = false;
+};
 
 /// Step of shadow rays, in steps: what they find is one factor of the light, and varies less.
 inline constexpr float kShadowSteps = 2.0f;
@@ -137,14 +165,11 @@ template <class Blend>
 SCOLOPAX_HD float marchTransmittance(const SceneView& scene, const Ray& ray, Interval inside, int only,
                                      float offset, SampleCost* cost) {
   float depth = 0.0f;
-  const auto visit = [&](const SegmentRun& run) {
-    for (int k = 0; k < run.count; ++k) {
-      depth += visitParts<Blend>(scene, run, k, [](int, const Part&) {}) * (run.t[k + 1] - run.t[k]);
-      if (!(depth < kOpaqueDepth)) return false;  // here, not after the run: runs differ between launchers
-    }
-    return true;
-  };
-  SegmentWalk(scene, ray, inside, offset, kShadowSteps * scene.step, cost, visit).follow(only);
+  SegmentRun run;
+  LargestsOf<Blend> largests;
+  SegmentWalk walk(run, scene, ray, inside, only, offset, kShadowSteps * scene.step, cost);
+  while (depth < kOpaqueDepth && walk.next())
+    depth += SegmentParts<Blend>(largests, scene, walk).visit([](int, const Part&) {}) * walk.length();
   return 1.0f - absorbed(depth);
 }
 
@@ -155,8 +180,16 @@ SCOLOPAX_HD inline Collision collisionAt(const SceneView& scene, const Ray& ray,
   return {{t, 0.0f}, point, channel, 0.0f};
 }
 
-/// What absorbs less has no light of its own: its colour is divided by this.
-inline constexpr float kLeastWeight = 1.17549435e-38f;
+/// A place that is drawn in proportion to weights.
+struct WeightedPlace {
+  float weight, draw, t;
+};
+
+/// What a stratum knows of its channels; apart from the rest as SegmentRun is.
+struct StrataChannels {
+  WeightedPlace place[kMaxVisibleChannels];
+  glm::vec3 emission[kMaxVisibleChannels];
+};
 
 /// Gathers what channels absorb of a ray's light until there is a stratum of it, and lights that: each
 /// channel at one place, drawn with probability in proportion to what it absorbed, with the lights that are
@@ -164,11 +197,12 @@ inline constexpr float kLeastWeight = 1.17549435e-38f;
 template <class Blend, class Features>
 class Strata {
  public:
-  SCOLOPAX_HD Strata(const SceneView& scene, const Ray& ray, int only, Sampler& sampler, SampleCost* cost)
-      : scene_(scene), ray_(ray), only_(only), sampler_(sampler), cost_(cost) {}
+  SCOLOPAX_HD Strata(StrataChannels& channels, const SceneView& scene, const Ray& ray, int only,
+                     Sampler& sampler, SampleCost* cost)
+      : channels_(channels), scene_(scene), ray_(ray), only_(only), sampler_(sampler), cost_(cost) {}
 
-  /// `weight`, above kLeastWeight: of channel n's light, with `emission` that times its mean colour; absorbed
-  /// about t.
+  /// `weight`, above kLeastNormal, for its colour is divided by it: of channel n's light, with `emission`
+  /// that times its mean colour; absorbed about t.
   SCOLOPAX_HD void add(int n, float weight, glm::vec3 emission, float t) {
     if (all_.weight == 0.0f) {
       random_ = sampler_.next();
@@ -176,13 +210,13 @@ class Strata {
       all_.draw = uniformOf(random_.x);
       lit_ = 0;
     }
-    Place& place = channels_[n];
+    WeightedPlace& place = channels_.place[n];
     if (!(lit_ >> n & 1)) {
       lit_ |= 1u << n;
       place = {0.0f, uniformOf(random_.y + std::uint32_t(n) * 0x9e3779b9u), 0.0f};
-      emission_[n] = glm::vec3(0.0f);
+      channels_.emission[n] = glm::vec3(0.0f);
     }
-    emission_[n] += emission;
+    channels_.emission[n] += emission;
     draw(place, weight, t);
     draw(all_, weight, t);
   }
@@ -199,20 +233,18 @@ class Strata {
         });
     for (int n = 0; n < scene_.channelCount; ++n) {
       if (!(lit_ >> n & 1)) continue;
-      const Place& place = channels_[n];
-      color += place.weight * lit<Features>(scene_, scene_.channels[n], emission_[n] * (1.0f / place.weight),
-                                            ray_, collisionAt(scene_, ray_, place.t, n), visibility, cost_);
+      const WeightedPlace& place = channels_.place[n];
+      color += place.weight * lit<Features>(scene_, scene_.channels[n],
+                                            channels_.emission[n] * (1.0f / place.weight), ray_,
+                                            collisionAt(scene_, ray_, place.t, n), visibility, cost_);
     }
     all_.weight = 0.0f;
     return color;
   }
 
  private:
-  struct Place {
-    float weight = 0.0f, draw = 0.0f, t = 0.0f;
-  };
   /// One number serves all draws: what is left of it after a draw is uniform again.
-  SCOLOPAX_HD static void draw(Place& place, float weight, float t) {
+  SCOLOPAX_HD static void draw(WeightedPlace& place, float weight, float t) {
     place.weight += weight;
     const float chance = weight / place.weight;
     if (place.draw < chance) {
@@ -223,27 +255,24 @@ class Strata {
     }
   }
 
+  StrataChannels& channels_;
   const SceneView& scene_;
   const Ray& ray_;
   int only_;
   Sampler& sampler_;
   SampleCost* cost_;
   RandomBlock random_{};
-  Place all_;
+  WeightedPlace all_{};
   std::uint32_t lit_ = 0;  // channels of the stratum
-  Place channels_[kMaxVisibleChannels];
-  glm::vec3 emission_[kMaxVisibleChannels];
 };
 
 /// The channel that a collision on a segment happens in; `pick` in [0,1) decides where extinctions add up.
 template <class Blend>
-SCOLOPAX_HD int channelOf(const SceneView& scene, const SegmentRun& run, int k, float pick) {
-  float whole = 0.0f;
-  visitParts<Blend>(scene, run, k, [&](int, const Part& part) { whole += part.opacity; });
-  float left = pick * whole, most = -1.0f;
+SCOLOPAX_HD int channelOf(const SegmentParts<Blend>& parts, float extinction, float pick) {
+  float left = pick * extinction, most = -1.0f;
   int channel = 0;
   bool found = false;
-  visitParts<Blend>(scene, run, k, [&](int n, const Part& part) {
+  parts.visit([&](int n, const Part& part) {
     if (Blend::kMixes ? part.opacity > most : !found) channel = n, most = part.opacity;
     left -= part.opacity;
     found = found || left < 0.0f;
@@ -261,24 +290,28 @@ SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval 
   // A tracker's ray would end where the opacity passes this number.
   const float end = first ? uniformOf(random.y) : kInfinity;
   bool ended = false;
-  [[maybe_unused]] Strata<Blend, Features> strata(scene, ray, only, ofStrata, cost);
-  const auto visit = [&](const SegmentRun& run) {
-    for (int k = 0; k < run.count; ++k) {
-      const float length = run.t[k + 1] - run.t[k];
+  [[maybe_unused]] StrataChannels channels;
+  [[maybe_unused]] Strata<Blend, Features> strata(channels, scene, ray, only, ofStrata, cost);
+  SegmentRun run;
+  LargestsOf<Blend> largests;
+  SegmentWalk walk(run, scene, ray, inside, only, uniformOf(random.x), scene.step, cost);
+  for (bool more = true; more;) {
+    more = walk.next();
+    if (more) {
+      const float length = walk.length();
+      const SegmentParts<Blend> parts(largests, scene, walk);
       glm::vec3 emission(0.0f);
-      const float extinction =
-          visitParts<Blend>(scene, run, k, [&](int, const Part& part) { emission += part.emission; });
+      const float extinction = parts.visit([&](int, const Part& part) { emission += part.emission; });
       if (!(extinction > 0.0f)) continue;
       const float alpha = absorbed(extinction * length);
       const float absorbedHere = transmittance * alpha;
       const float scale = absorbedHere / extinction;
       if constexpr (Features::kAny) {
-        visitParts<Blend>(scene, run, k, [&](int n, const Part& part) {
-          const float t = run.t[k] + minimum(part.moment / part.opacity, 1.0f) * length;
+        parts.visit([&](int n, const Part& part) {
+          const float t = walk.start() + minimum(part.moment / part.opacity, 1.0f) * length;
           const float weight = part.opacity * scale;
-          if (weight > kLeastWeight) strata.add(n, weight, part.emission * scale, t);
+          if (weight > kLeastNormal) strata.add(n, weight, part.emission * scale, t);
         });
-        if (strata.isFull()) color += strata.finish();
       } else {
         color += emission * scale;
       }
@@ -289,14 +322,13 @@ SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval 
         ended = true;
         const float pick = (end - before) / absorbedHere;
         keepNearer(first,
-                   {run.t[k] + pick * length, only < 0 ? channelOf<Blend>(scene, run, k, pick) : only});
+                   {walk.start() + pick * length, only < 0 ? channelOf(parts, extinction, pick) : only});
       }
-      if (!(transmittance > kOpaqueTransmittance)) return false;
+      more = transmittance > kOpaqueTransmittance;
     }
-    return true;
-  };
-  SegmentWalk(scene, ray, inside, uniformOf(random.x), scene.step, cost, visit).follow(only);
-  if constexpr (Features::kAny) color += strata.finish();
+    if constexpr (Features::kAny)  // in one place, which is compiled once
+      if (strata.isFull() || !more) color += strata.finish();
+  }
   return glm::vec4(color, minimum(opacity, 1.0f));
 }
 

@@ -27,6 +27,9 @@ struct RenderPixel {
     const Ray ray = scene.rays(x, y);
     const Interval inside = clipToBox(ray, scene.dims);
 
+#if defined(__CUDA_ARCH__)
+    constexpr FirstCollision* const first = nullptr;  // devices are not asked, and need not compile it
+#endif
     SampleCost spent;
     glm::vec4 result(0.0f);
     FirstCollision met;

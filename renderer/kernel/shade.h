@@ -38,7 +38,7 @@ SCOLOPAX_HD inline ToLight toLight(const SceneView& scene, const LightView& ligh
   if (light.kind == LightKind::headlight) return {-ray.direction, hit.place.t()};
   const glm::vec3 way = light.vector - hit.point;
   const float distance = squareRoot(dot(toWorld(scene, way), toWorld(scene, way))) * scene.smallestSpacing;
-  return {way * (1.0f / maximum(distance, 1.17549435e-38f)), distance};
+  return {way * (1.0f / maximum(distance, kLeastNormal)), distance};
 }
 
 /// Gradient of one channel's stored values in world space, per smallest spacing: central differences of one

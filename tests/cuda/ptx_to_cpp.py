@@ -361,6 +361,10 @@ class FunctionTranslator:
         position, length = (self.value(operand, "u32") for operand in operands[3:5])
         return self.assign(operands[0], type_name, f"ptx::insertBits({field}, {into}, {position}, {length})")
 
+    def do_popc(self, modifiers, operands):
+        count = f"std::popcount({self.value(operands[1], plain(modifiers[-1]))})"
+        return self.assign(operands[0], "u32", f"std::uint32_t({count})")
+
     # Control
 
     def do_bra(self, modifiers, operands):
