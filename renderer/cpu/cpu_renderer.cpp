@@ -24,10 +24,9 @@
 namespace scolopax {
 namespace {
 
-/// Packets where they can; they record nothing.
 TileFunction chooseKernel(Scene scene, const kernel::SceneView& view, bool recording) {
   scene.shadows = scene.shadows && view.lightCount > 0;  // without light there is nothing to take away
-  if (const TileFunction packets = recording ? nullptr : packetTileFunction(scene, view)) return packets;
+  if (hasStep(scene.method) && !recording) return quadratureTileFunction(scene, view);
   return visitIntegrator(scene,
                          [&](auto type) { return chooseTileFunction<typename decltype(type)::type>(scene); });
 }

@@ -6,27 +6,27 @@
 #include "renderer/kernel/shade.h"
 #if defined(__x86_64__)
 
-namespace scolopax::lanes {
+namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
 struct Vec {
   Float x[3];
-  SCOLOPAX_AVX2 Float& operator[](int i) { return x[i]; }
-  SCOLOPAX_AVX2 const Float& operator[](int i) const { return x[i]; }
+  SCOLOPAX_SIMD Float& operator[](int i) { return x[i]; }
+  SCOLOPAX_SIMD const Float& operator[](int i) const { return x[i]; }
 };
-SCOLOPAX_AVX2 Vec vectors(glm::vec3 v) { return {{floats(v.x), floats(v.y), floats(v.z)}}; }
-SCOLOPAX_AVX2 Vec operator+(const Vec& a, const Vec& b) { return {{a[0] + b[0], a[1] + b[1], a[2] + b[2]}}; }
-SCOLOPAX_AVX2 Vec operator*(const Vec& a, const Vec& b) { return {{a[0] * b[0], a[1] * b[1], a[2] * b[2]}}; }
-SCOLOPAX_AVX2 Vec operator*(const Vec& a, Float b) { return {{a[0] * b, a[1] * b, a[2] * b}}; }
-SCOLOPAX_AVX2 Vec negative(const Vec& a) { return {{negative(a[0]), negative(a[1]), negative(a[2])}}; }
-SCOLOPAX_AVX2 Vec select(Mask m, const Vec& a, const Vec& b) {
+SCOLOPAX_SIMD Vec vectors(glm::vec3 v) { return {{floats(v.x), floats(v.y), floats(v.z)}}; }
+SCOLOPAX_SIMD Vec operator+(const Vec& a, const Vec& b) { return {{a[0] + b[0], a[1] + b[1], a[2] + b[2]}}; }
+SCOLOPAX_SIMD Vec operator*(const Vec& a, const Vec& b) { return {{a[0] * b[0], a[1] * b[1], a[2] * b[2]}}; }
+SCOLOPAX_SIMD Vec operator*(const Vec& a, Float b) { return {{a[0] * b, a[1] * b, a[2] * b}}; }
+SCOLOPAX_SIMD Vec negative(const Vec& a) { return {{negative(a[0]), negative(a[1]), negative(a[2])}}; }
+SCOLOPAX_SIMD Vec select(Mask m, const Vec& a, const Vec& b) {
   return {{select(m, a[0], b[0]), select(m, a[1], b[1]), select(m, a[2], b[2])}};
 }
-SCOLOPAX_AVX2 Float dot(const Vec& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-SCOLOPAX_AVX2 Vec normalize(const Vec& v) {
+SCOLOPAX_SIMD Float dot(const Vec& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+SCOLOPAX_SIMD Vec normalize(const Vec& v) {
   const Float lengthSquared = dot(v, v);
   return select(lengthSquared > floats(0.0f), v * (floats(1.0f) / squareRoot(lengthSquared)), v);
 }
-SCOLOPAX_AVX2 Vec product(const glm::mat3& m, const Vec& v) {
+SCOLOPAX_SIMD Vec product(const glm::mat3& m, const Vec& v) {
   Vec result;
   for (int i = 0; i < 3; ++i)
     result[i] = floats(m[0][i]) * v[0] + floats(m[1][i]) * v[1] + floats(m[2][i]) * v[2];
@@ -49,11 +49,11 @@ template <class Features>
 class PacketLight {
  public:
   /// Channels by their bits: those that shadow rays see too.
-  SCOLOPAX_AVX2 PacketLight(const kernel::SceneView& scene, const Rays& rays, std::uint32_t channels,
+  SCOLOPAX_SIMD PacketLight(const kernel::SceneView& scene, const Rays& rays, std::uint32_t channels,
                             PacketCost* cost)
       : scene_(scene), rays_(rays), channels_(channels), cost_(cost) {}
 
-  SCOLOPAX_AVX2_ONLY __attribute__((noinline)) void shine(LightQueue& queue, float (*colors)[kLanes]) {
+  SCOLOPAX_SIMD_ONLY __attribute__((noinline)) void shine(LightQueue& queue, float (*colors)[kLanes]) {
     const Int lane = load(queue.lane);
     waiting_ = ints(queue.count) > laneNumbers();
     for (int axis = 0; axis < 3; ++axis) {
@@ -86,12 +86,12 @@ class PacketLight {
   }
 
  private:
-  SCOLOPAX_AVX2 static void addLane(Int from, int i, int to, Int* sum) {
+  SCOLOPAX_SIMD static void addLane(Int from, int i, int to, Int* sum) {
     *sum = *sum + select(laneNumbers() == ints(to), ints(at(from, i)), ints(0));
   }
 
   /// kernel::collisionAt.
-  SCOLOPAX_AVX2 Vec pointAt(Float t) const {
+  SCOLOPAX_SIMD Vec pointAt(Float t) const {
     Vec point;
     for (int axis = 0; axis < 3; ++axis)
       point[axis] = clamp(ray_.origin[axis] + t * ray_.direction[axis], floats(-0.5f),
@@ -104,7 +104,7 @@ class PacketLight {
     Vec direction;
     Float distance;
   };
-  SCOLOPAX_AVX2 Way wayTo(const kernel::LightView& light, const Vec& point, Float t) const {
+  SCOLOPAX_SIMD Way wayTo(const kernel::LightView& light, const Vec& point, Float t) const {
     if (light.kind == kernel::LightKind::directional)
       return {vectors(light.vector), floats(kernel::kInfinity)};
     if (light.kind == kernel::LightKind::headlight)
@@ -119,8 +119,8 @@ class PacketLight {
   /// Optical depth of shadow rays (kernel::marchTransmittance).
   class Depth {
    public:
-    SCOLOPAX_AVX2 explicit Depth(const kernel::SceneView& scene) : scene_(scene), depth_(floats(0.0f)) {}
-    SCOLOPAX_AVX2 Mask take(const PacketSegment& segment) {
+    SCOLOPAX_SIMD explicit Depth(const kernel::SceneView& scene) : scene_(scene), depth_(floats(0.0f)) {}
+    SCOLOPAX_SIMD Mask take(const PacketSegment& segment) {
       Float extinction = floats(0.0f);
       for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
         const int n = std::countr_zero(left);
@@ -131,7 +131,7 @@ class PacketLight {
       depth_ = depth_ + extinction * (segment.end - segment.start);
       return depth_ < floats(kernel::kOpaqueDepth);
     }
-    SCOLOPAX_AVX2 Float transmittance() const { return floats(1.0f) - absorbed(depth_); }
+    SCOLOPAX_SIMD Float transmittance() const { return floats(1.0f) - absorbed(depth_); }
 
    private:
     const kernel::SceneView& scene_;
@@ -139,7 +139,7 @@ class PacketLight {
   };
 
   /// kernel::visibilityAt.
-  SCOLOPAX_AVX2 void findVisibility(Float t, Float offset) {
+  SCOLOPAX_SIMD void findVisibility(Float t, Float offset) {
     const Float one = floats(1.0f);
     share_ = vectors(glm::vec3(1.0f));
     for (int i = 0; i < scene_.lightCount; ++i) seen_[i] = one;
@@ -167,10 +167,10 @@ class PacketLight {
     }
   }
 
-  SCOLOPAX_AVX2 static Float sizeOf(Float x) { return maximum(x, negative(x)); }
+  SCOLOPAX_SIMD static Float sizeOf(Float x) { return maximum(x, negative(x)); }
 
   /// kernel::gradientAt.
-  SCOLOPAX_AVX2 Vec gradientAt(const kernel::ChannelView& channel, const Vec& point, Mask which) {
+  SCOLOPAX_SIMD Vec gradientAt(const kernel::ChannelView& channel, const Vec& point, Mask which) {
     const glm::ivec3 dims = scene_.dims;
     Vec perVoxel = vectors(glm::vec3(0.0f));
     for (int axis = 0; axis < 3; ++axis) {
@@ -187,7 +187,7 @@ class PacketLight {
     return select(finite, product(scene_.gradientFromVoxel, perVoxel), vectors(glm::vec3(0.0f)));
   }
   /// At the point that has another place on one axis.
-  SCOLOPAX_AVX2 Float sampleBeside(const kernel::ChannelView& channel, const Vec& point, int axis,
+  SCOLOPAX_SIMD Float sampleBeside(const kernel::ChannelView& channel, const Vec& point, int axis,
                                    Float place) const {
     const glm::ivec3 dims = scene_.dims;
     Vec beside = point;
@@ -196,7 +196,7 @@ class PacketLight {
   }
 
   /// kernel::lit.
-  SCOLOPAX_AVX2 Vec lightOf(const kernel::ChannelView& channel, const Vec& color, Float t, Mask which) {
+  SCOLOPAX_SIMD Vec lightOf(const kernel::ChannelView& channel, const Vec& color, Float t, Mask which) {
     const kernel::MaterialView& material = channel.material;
     const Float one = floats(1.0f), zero = floats(0.0f);
     Vec ambient = vectors(glm::vec3(1.0f));
@@ -253,5 +253,5 @@ class PacketLight {
   Vec share_;
 };
 
-}  // namespace scolopax::lanes
+}  // namespace scolopax::SCOLOPAX_SIMD_SPACE
 #endif

@@ -6,13 +6,13 @@
 #include "renderer/cpu/sample_lanes.h"
 #if defined(__x86_64__)
 
-namespace scolopax::lanes {
+namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
 /// kernel::SampleCost of eight rays.
 struct PacketCost {
   Int fetches, cellSteps, randomBlocks, truncated;
 };
-SCOLOPAX_AVX2 PacketCost noCost() { return {ints(0), ints(0), ints(0), ints(0)}; }
+SCOLOPAX_SIMD PacketCost noCost() { return {ints(0), ints(0), ints(0), ints(0)}; }
 
 /// A segment of every ray and where channels are on it.
 struct PacketSegment {
@@ -23,7 +23,7 @@ struct PacketSegment {
   const Int* met;          ///< bits of columns that may have extinction, or null where nobody has asked
 
   /// Rays for which channel n may have extinction.
-  SCOLOPAX_AVX2 Mask of(const kernel::SceneView& scene, int n) const {
+  SCOLOPAX_SIMD Mask of(const kernel::SceneView& scene, int n) const {
     if (!met) return live;
     const Int bit = ints(int(1u << scene.majorants.tables[n].column));
     return live & ((*met & bit) == bit);
@@ -33,7 +33,7 @@ struct PacketSegment {
 class PacketMarch {
  public:
   /// Channels by their bits; ray i takes segments as kernel::SegmentWalk does with offset and step.
-  SCOLOPAX_AVX2 PacketMarch(const kernel::SceneView& scene, const Rays& rays, const Intervals& inside,
+  SCOLOPAX_SIMD PacketMarch(const kernel::SceneView& scene, const Rays& rays, const Intervals& inside,
                             std::uint32_t channels, Float offset, float step, PacketCost* cost)
       : scene_(scene),
         rays_(rays),
@@ -45,7 +45,7 @@ class PacketMarch {
 
   /// sink.take(segment), for all that may have extinction, returns the rays that want more.
   template <class Sink>
-  SCOLOPAX_AVX2 void follow(Sink& sink) {
+  SCOLOPAX_SIMD void follow(Sink& sink) {
     PacketWalk walk(rays_, inside_, scene_.majorants, columns());
     live_ = walk.meets();
     if (!any(live_)) return;
@@ -81,7 +81,7 @@ class PacketMarch {
   }
 
  private:
-  SCOLOPAX_AVX2 void giveUp(Mask which) {
+  SCOLOPAX_SIMD void giveUp(Mask which) {
     cost_->truncated = maximum(cost_->truncated, onesOf(which));
     live_ = without(live_, which);
   }
@@ -101,7 +101,7 @@ class PacketMarch {
     return channels;
   }
 
-  SCOLOPAX_AVX2 Float endOf(int segment) const {
+  SCOLOPAX_SIMD Float endOf(int segment) const {
     return minimum(inside_.enter + (floats(float(segment)) + offset_) * step_, inside_.exit);
   }
 
@@ -109,7 +109,7 @@ class PacketMarch {
   /// to the next such cell of every ray or some way there; rays that have none left end. Without bits of
   /// channels the first such ray is enough: where voxels are finite, the others' segments are continuous and
   /// have no extinction.
-  SCOLOPAX_AVX2 bool meetsSomething(PacketWalk& walk, Float start, Float end) {
+  SCOLOPAX_SIMD bool meetsSomething(PacketWalk& walk, Float start, Float end) {
     walk.jump(start);
     cost_->cellSteps = cost_->cellSteps + onesOf(live_);
     met_ = ints(0);
@@ -135,7 +135,7 @@ class PacketMarch {
   }
 
   /// First segment that has one of these points, of rays that have not ended.
-  SCOLOPAX_AVX2 int firstSegment(Float t) const {
+  SCOLOPAX_SIMD int firstSegment(Float t) const {
     const Float place = (t - inside_.enter) / step_ - offset_ + floats(1.0f);
     const float first = smallestOf(select(live_, place, floats(kernel::kInfinity)));
     const int k = int(kernel::clamp(first, 0.0f, 1e9f));
@@ -143,7 +143,7 @@ class PacketMarch {
     return k > 0 && any(live_ & (t < endOf(k - 1))) ? k - 1 : k;
   }
 
-  SCOLOPAX_AVX2 void sample(Float t, std::uint32_t channels, Place* places) {
+  SCOLOPAX_SIMD void sample(Float t, std::uint32_t channels, Place* places) {
     float stored[kernel::kMaxVisibleChannels][kLanes];
     sampleLanes(scene_, channels, rays_.origin[0] + t * rays_.direction[0],
                 rays_.origin[1] + t * rays_.direction[1], rays_.origin[2] + t * rays_.direction[2], stored);
@@ -157,7 +157,7 @@ class PacketMarch {
   }
 
   /// kernel::stretchPosition.
-  SCOLOPAX_AVX2 static Float positionsOf(const kernel::ChannelView& channel, const float* stored) {
+  SCOLOPAX_SIMD static Float positionsOf(const kernel::ChannelView& channel, const float* stored) {
     if (channel.gamma != 1.0f) {
       float positions[kLanes];
       for (int i = 0; i < kLanes; ++i) positions[i] = kernel::stretchPosition(channel, stored[i]);
@@ -181,5 +181,5 @@ class PacketMarch {
   Place from_[kernel::kMaxVisibleChannels], to_[kernel::kMaxVisibleChannels];
 };
 
-}  // namespace scolopax::lanes
+}  // namespace scolopax::SCOLOPAX_SIMD_SPACE
 #endif

@@ -8,7 +8,7 @@
 #include "renderer/kernel/raymarch.h"
 #if defined(__x86_64__)
 
-namespace scolopax::lanes {
+namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
 /// Where rays are on a channel's curves, and on which piece.
 struct Place {
@@ -21,7 +21,7 @@ struct Knots {
 };
 inline constexpr int kKnotFloats = sizeof(kernel::OpticalKnot) / sizeof(float);
 
-SCOLOPAX_AVX2 Knots knotsAt(const kernel::OpticalCurveView& curve, Int index) {
+SCOLOPAX_SIMD Knots knotsAt(const kernel::OpticalCurveView& curve, Int index) {
   const Int at = index * ints(kKnotFloats);
   const kernel::OpticalKnot& first = curve.knots[0];
   return {gather(&first.position, at),
@@ -29,7 +29,7 @@ SCOLOPAX_AVX2 Knots knotsAt(const kernel::OpticalCurveView& curve, Int index) {
           gather(&first.opacity, at),
           {gather(&first.color.x, at), gather(&first.color.y, at), gather(&first.color.z, at)}};
 }
-SCOLOPAX_AVX2 Knots sameKnot(const kernel::OpticalKnot& knot) {
+SCOLOPAX_SIMD Knots sameKnot(const kernel::OpticalKnot& knot) {
   return {floats(knot.position),
           floats(knot.inverseWidth),
           floats(knot.opacity),
@@ -37,7 +37,7 @@ SCOLOPAX_AVX2 Knots sameKnot(const kernel::OpticalKnot& knot) {
 }
 
 /// kernel::pieceAt.
-SCOLOPAX_AVX2 Int piecesAt(const kernel::OpticalCurveView& curve, Float position) {
+SCOLOPAX_SIMD Int piecesAt(const kernel::OpticalCurveView& curve, Float position) {
   const Mask above = position >= floats(0.0f), inside = above & (position < floats(1.0f));
   Int k = gather(curve.buckets, truncated(where(inside, position) * floats(float(kernel::kCurveBuckets))));
   for (;;) {
@@ -56,14 +56,14 @@ enum class Detail { extinction, emission, moment };
 struct Parts {
   Float opacity, emission[3], moment;
 };
-SCOLOPAX_AVX2 Parts noParts() {
+SCOLOPAX_SIMD Parts noParts() {
   const Float zero = floats(0.0f);
   return {zero, {zero, zero, zero}, zero};
 }
 
 /// kernel::opticalIn of both ends of stretches, then kernel::detail::addLinear.
 template <Detail kDetail>
-SCOLOPAX_AVX2 void addLinear(const Knots& a, const Knots& b, Int piece, Float from, Float to, Float start,
+SCOLOPAX_SIMD void addLinear(const Knots& a, const Knots& b, Int piece, Float from, Float to, Float start,
                              Float end, Mask which, Parts* parts) {
   const Mask sloped = piece > ints(-1);
   const Float one = floats(1.0f), two = floats(2.0f), width = end - start;
@@ -84,7 +84,7 @@ SCOLOPAX_AVX2 void addLinear(const Knots& a, const Knots& b, Int piece, Float fr
 
 /// kernel::meansBetween for some rays, whose positions are numbers.
 template <Detail kDetail>
-SCOLOPAX_AVX2 Parts meansBetween(const kernel::OpticalCurveView& curve, const Place& p, const Place& q,
+SCOLOPAX_SIMD Parts meansBetween(const kernel::OpticalCurveView& curve, const Place& p, const Place& q,
                                  Mask which) {
   const Float zero = floats(0.0f), one = floats(1.0f);
   const Int step = ints(1), last = ints(curve.count - 1);
@@ -119,7 +119,7 @@ SCOLOPAX_AVX2 Parts meansBetween(const kernel::OpticalCurveView& curve, const Pl
 
 /// kernel::partAlone of the channel for some rays; the others have none.
 template <Detail kDetail>
-SCOLOPAX_AVX2 Parts partsOf(const kernel::ChannelView& channel, const Place& from, const Place& to,
+SCOLOPAX_SIMD Parts partsOf(const kernel::ChannelView& channel, const Place& from, const Place& to,
                             Mask wanted) {
   const kernel::OpticalCurveView& curve = channel.optical;
   const Float p = from.position, q = to.position;
@@ -148,5 +148,5 @@ SCOLOPAX_AVX2 Parts partsOf(const kernel::ChannelView& channel, const Place& fro
   return parts;
 }
 
-}  // namespace scolopax::lanes
+}  // namespace scolopax::SCOLOPAX_SIMD_SPACE
 #endif

@@ -5,10 +5,10 @@
 #include "renderer/kernel/rng.h"
 #if defined(__x86_64__)
 
-namespace scolopax::lanes {
+namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
 /// kernel::uniformOf.
-SCOLOPAX_AVX2 Float uniformOf(Int k) {
+SCOLOPAX_SIMD Float uniformOf(Int k) {
   // Both halves are exact, so that their sum is rounded as the number itself would be.
   const Float whole = toFloat(right<16>(k)) * floats(65536.0f) + toFloat(k & ints(0xffff));
   return minimum((whole + floats(0.5f)) * floats(0x1p-32f), floats(0x1.fffffep-1f));
@@ -20,11 +20,11 @@ class PacketSampler {
   struct Block {
     Int x, y, z;
   };
-  SCOLOPAX_AVX2 PacketSampler(Int pixels, const kernel::SampleNumber& number, std::uint32_t seed)
+  SCOLOPAX_SIMD PacketSampler(Int pixels, const kernel::SampleNumber& number, std::uint32_t seed)
       : pixels_(pixels), number_(number), seed_(seed), block_(ints(0)) {}
 
   /// The others stay where they are, and get anything.
-  SCOLOPAX_AVX2 Block next(Mask which) {
+  SCOLOPAX_SIMD Block next(Mask which) {
     const Int block = block_;
     block_ = block_ + onesOf(which);
     const Mask low = ints(number_.lowDiscrepancy ? int(kernel::kLowDiscrepancyBlocks) : 0) > block;
@@ -37,19 +37,17 @@ class PacketSampler {
             select(low, owenScramble(point(row, 1), scrambling.y), random.y),
             select(low, owenScramble(point(row, 2), scrambling.z), random.z)};
   }
-  SCOLOPAX_AVX2 Int blocks() const { return block_; }
+  SCOLOPAX_SIMD Int blocks() const { return block_; }
   /// kernel::Sampler::aside.
-  SCOLOPAX_AVX2 PacketSampler aside() const {
+  SCOLOPAX_SIMD PacketSampler aside() const {
     return PacketSampler(pixels_ | word(0x80000000u), number_, seed_);
   }
 
  private:
-  SCOLOPAX_AVX2 static Int word(std::uint32_t k) { return ints(int(k)); }
-  SCOLOPAX_AVX2 Int point(Int row, int column) const {
-    return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(&number_.point[0][column]), row.v, 4)};
-  }
+  SCOLOPAX_SIMD static Int word(std::uint32_t k) { return ints(int(k)); }
+  SCOLOPAX_SIMD Int point(Int row, int column) const { return gather(&number_.point[0][column], row); }
 
-  SCOLOPAX_AVX2 Block pcg4d(Int sample, Int block) const {
+  SCOLOPAX_SIMD Block pcg4d(Int sample, Int block) const {
     const Int factor = word(1664525u), term = word(1013904223u);
     Int x = pixels_ * factor + term, y = sample * factor + term, z = block * factor + term;
     Int w = word(seed_ * 1664525u + 1013904223u);
@@ -61,18 +59,13 @@ class PacketSampler {
     return {x, y, z};
   }
 
-  SCOLOPAX_AVX2 static Int reverseBits(Int x) {
+  SCOLOPAX_SIMD static Int reverseBits(Int x) {
     // Bytes by a table of their halves, then the bytes themselves.
     const Int low = ints(0x0f0f0f0f);
-    const __m256i reversed =
-        _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15));
-    const Int lower{_mm256_shuffle_epi8(reversed, (x & low).v)};
-    const Int upper{_mm256_shuffle_epi8(reversed, (right<4>(x) & low).v)};
-    const __m256i order =
-        _mm256_broadcastsi128_si256(_mm_setr_epi8(3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12));
-    return {_mm256_shuffle_epi8((left<4>(lower) | upper).v, order)};
+    static constexpr std::int8_t kReversed[] = {0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15};
+    return bytesReversed(left<4>(looked(kReversed, x & low)) | looked(kReversed, right<4>(x) & low));
   }
-  SCOLOPAX_AVX2 static Int owenScramble(Int reversed, Int seed) {
+  SCOLOPAX_SIMD static Int owenScramble(Int reversed, Int seed) {
     Int x = reversed + (seed ^ right<16>(seed));
     x = x ^ x * word(0x6c50b47cu);
     x = x ^ x * word(0xb82f1e52u);
@@ -87,5 +80,5 @@ class PacketSampler {
   Int block_;
 };
 
-}  // namespace scolopax::lanes
+}  // namespace scolopax::SCOLOPAX_SIMD_SPACE
 #endif

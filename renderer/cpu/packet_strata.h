@@ -5,18 +5,18 @@
 #include "renderer/cpu/packet_sampler.h"
 #if defined(__x86_64__)
 
-namespace scolopax::lanes {
+namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
 /// kernel::Strata.
 class PacketStrata {
  public:
-  SCOLOPAX_AVX2 PacketStrata(PacketSampler& sampler, PacketCost* cost) : sampler_(sampler), cost_(cost) {
+  SCOLOPAX_SIMD PacketStrata(PacketSampler& sampler, PacketCost* cost) : sampler_(sampler), cost_(cost) {
     all_.weight = floats(0.0f);
     all_.t = all_.draw = all_.weight;
     present_ = y_ = z_ = ints(0);
   }
 
-  SCOLOPAX_AVX2 void add(int n, Mask which, Float weight, const Vec& emission, Float t) {
+  SCOLOPAX_SIMD void add(int n, Mask which, Float weight, const Vec& emission, Float t) {
     const Mask fresh = which & (all_.weight == floats(0.0f));
     if (any(fresh)) {
       const PacketSampler::Block random = sampler_.next(fresh);
@@ -43,7 +43,7 @@ class PacketStrata {
 
   /// Those that have so much weight wait for light, and begin anew.
   template <class Light>
-  SCOLOPAX_AVX2 void hand(Mask which, LightQueue& queue, Light& light, float (*colors)[kLanes]) {
+  SCOLOPAX_SIMD void hand(Mask which, LightQueue& queue, Light& light, float (*colors)[kLanes]) {
     for (unsigned left = bitsOf(which); left != 0; left &= left - 1) {
       if (queue.count == kLanes) light.shine(queue, colors);
       const int i = std::countr_zero(left), slot = queue.count++;
@@ -63,7 +63,7 @@ class PacketStrata {
     }
     all_.weight = select(which, floats(0.0f), all_.weight);
   }
-  SCOLOPAX_AVX2 Float weight() const { return all_.weight; }
+  SCOLOPAX_SIMD Float weight() const { return all_.weight; }
 
  private:
   struct Place {
@@ -73,7 +73,7 @@ class PacketStrata {
     Place place;
     Vec emission;
   };
-  SCOLOPAX_AVX2 static void choose(Place& place, Mask which, Float weight, Float t) {
+  SCOLOPAX_SIMD static void choose(Place& place, Mask which, Float weight, Float t) {
     const Float one = floats(1.0f), sum = place.weight + weight, chance = weight / sum;
     const Mask here = place.draw < chance;
     const Float rest = select(here, place.draw / chance, (place.draw - chance) / (one - chance));
@@ -89,5 +89,5 @@ class PacketStrata {
   Channel channels_[kernel::kMaxVisibleChannels];
 };
 
-}  // namespace scolopax::lanes
+}  // namespace scolopax::SCOLOPAX_SIMD_SPACE
 #endif

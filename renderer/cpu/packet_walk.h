@@ -6,14 +6,14 @@
 #include "renderer/kernel/views.h"
 #if defined(__x86_64__)
 
-namespace scolopax::lanes {
+namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
 struct Rays {
   Float origin[3], direction[3];
 };
 
 /// kernel::CameraRays.
-SCOLOPAX_AVX2 Rays raysThrough(const kernel::CameraRays& camera, Float x, Float y) {
+SCOLOPAX_SIMD Rays raysThrough(const kernel::CameraRays& camera, Float x, Float y) {
   const Float sx = (x - floats(camera.halfSize.x)) * floats(camera.pixelSize);
   const Float sy = (floats(camera.halfSize.y) - y) * floats(camera.pixelSize);
   const Float inverseLength =
@@ -36,7 +36,7 @@ struct Intervals {
 };
 
 /// kernel::clipToBox.
-SCOLOPAX_AVX2 Intervals clipToBox(const Rays& rays, glm::ivec3 dims) {
+SCOLOPAX_SIMD Intervals clipToBox(const Rays& rays, glm::ivec3 dims) {
   const Float zero = floats(0.0f), infinity = floats(kernel::kInfinity);
   Intervals inside{zero, infinity, zero == zero};
   for (int axis = 0; axis < 3; ++axis) {
@@ -59,7 +59,7 @@ class PacketWalk {
  public:
   /// Only the part of the interval in which there are cells that are not empty. Where the grid has them, bits
   /// of `columns` say which channels matter.
-  SCOLOPAX_AVX2 PacketWalk(const Rays& rays, const Intervals& inside, const kernel::MajorantView& grid,
+  SCOLOPAX_SIMD PacketWalk(const Rays& rays, const Intervals& inside, const kernel::MajorantView& grid,
                            std::uint32_t columns)
       : rays_(rays), grid_(grid), inverseSize_(floats(1.0f / grid.cellSize)), end_(inside.exit) {
     enter_ = inside.enter;
@@ -86,19 +86,19 @@ class PacketWalk {
     ask();
   }
 
-  SCOLOPAX_AVX2 Mask meets() const { return meets_; }
+  SCOLOPAX_SIMD Mask meets() const { return meets_; }
   /// Up to here there is nothing, but what was asked before.
-  SCOLOPAX_AVX2 Float enter() const { return enter_; }
+  SCOLOPAX_SIMD Float enter() const { return enter_; }
   /// Rays whose cell at enter() may have extinction.
-  SCOLOPAX_AVX2 Mask full() const { return full_; }
+  SCOLOPAX_SIMD Mask full() const { return full_; }
   /// Bits of the columns that may have extinction there; only where the grid has them.
-  SCOLOPAX_AVX2 Int active() const { return active_; }
+  SCOLOPAX_SIMD Int active() const { return active_; }
   /// Where the cells of enter(), or the cubes of empty blocks around them, end; infinite when nothing is
   /// left.
-  SCOLOPAX_AVX2 Float exit() const { return exit_; }
+  SCOLOPAX_SIMD Float exit() const { return exit_; }
 
   /// Asks at t where that is further.
-  SCOLOPAX_AVX2 void jump(Float t) {
+  SCOLOPAX_SIMD void jump(Float t) {
     const Mask further = t > enter_;
     enter_ = maximum(t, enter_);
     for (int axis = 0; axis < 3; ++axis) cell_[axis] = select(further, cellAt(axis, t), cell_[axis]);
@@ -106,7 +106,7 @@ class PacketWalk {
   }
 
   /// Finds out exit(); before advance().
-  SCOLOPAX_AVX2 void measure() {
+  SCOLOPAX_SIMD void measure() {
     const Int one = ints(1);
     const Int radius = code_ - ints(kernel::kEmptyCode);
     const Mask wide = radius > ints(0);
@@ -126,7 +126,7 @@ class PacketWalk {
   }
 
   /// These rays, which have something left, go where their cells or cubes end.
-  SCOLOPAX_AVX2 void advance(Mask which) {
+  SCOLOPAX_SIMD void advance(Mask which) {
     const Float t = exit_;
     enter_ = select(which, t, enter_);
     Mask first = which;  // a ray leaves through one axis: the first of those that are as near
@@ -147,16 +147,16 @@ class PacketWalk {
   static_assert(kernel::kBlockEdge == 1 << kShift);
 
   /// The interval begins (or else ends) at t; along the plane, rays are on the right side or see nothing.
-  SCOLOPAX_AVX2 void narrow(Mask begins, Mask along, Float t, Mask right) {
+  SCOLOPAX_SIMD void narrow(Mask begins, Mask along, Float t, Mask right) {
     enter_ = select(begins, maximum(enter_, t), enter_);
     end_ = select(begins | along, end_, minimum(end_, t));
     meets_ = without(meets_, without(along, right));
   }
-  SCOLOPAX_AVX2 Int cellAt(int axis, Float t) const {
+  SCOLOPAX_SIMD Int cellAt(int axis, Float t) const {
     const Float at = (rays_.origin[axis] + t * rays_.direction[axis]) * inverseSize_;
     return truncated(clamp(at, floats(0.0f), floats(float(grid_.cells[axis] - 1))));
   }
-  SCOLOPAX_AVX2 void ask() {
+  SCOLOPAX_SIMD void ask() {
     const Int index = (cell_[2] * ints(grid_.cells.y) + cell_[1]) * ints(grid_.cells.x) + cell_[0];
     code_ = gather(grid_.totals, index);
     full_ = (code_ > ints(0)) & (ints(kernel::kEmptyCode) > code_);
@@ -175,5 +175,5 @@ class PacketWalk {
   Int cell_[3], last_[3], next_[3];  // next: behind the plane through which a ray may leave
 };
 
-}  // namespace scolopax::lanes
+}  // namespace scolopax::SCOLOPAX_SIMD_SPACE
 #endif

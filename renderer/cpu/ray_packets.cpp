@@ -1,236 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/cpu/ray_packets.h"
 
-#include <algorithm>
-#include <bit>
-
-#include "renderer/cpu/packet_light.h"
-#include "renderer/cpu/packet_march.h"
-#include "renderer/cpu/packet_sampler.h"
-#include "renderer/cpu/packet_strata.h"
-#include "renderer/cpu/sample_batch.h"
-#include "renderer/data/instances.h"
-#include "renderer/kernel/blend_modes.h"
+#include "renderer/cpu/tile_kernels.h"
+#include "renderer/kernel/raymarch.h"
 
 namespace scolopax {
-#if defined(__x86_64__)
-namespace {
 
-using namespace lanes;
-using kernel::SceneView;
-
-/// Pixels of a packet: neighbours, which share voxels and macrocells.
-constexpr int kPacketWidth = 4, kPacketHeight = kLanes / kPacketWidth;
-static_assert(kLanes == kernel::kBatchPoints && kTile % kPacketWidth == 0 && kTile % kPacketHeight == 0);
-
-/// What is left behind a part of the rays, and what that has absorbed: kernel::marchRay's sums.
-struct Absorption {
-  Float transmittance, opacity;
-  SCOLOPAX_AVX2 Absorption() : transmittance(floats(1.0f)), opacity(floats(0.0f)) {}
-
-  /// Goes over a segment; returns its share of the light for every unit of extinction, 0 where there is none.
-  SCOLOPAX_AVX2 Float pass(Float extinction, Float length) {
-    const Mask some = extinction > floats(0.0f);
-    // Masked, because the lengths of rays that miss the volume may not be numbers.
-    const Float alpha = absorbed(where(some, extinction * length));
-    const Float absorbedHere = transmittance * alpha;
-    opacity = opacity + absorbedHere;
-    transmittance = transmittance * (floats(1.0f) - alpha);
-    return where(some, absorbedHere / extinction);
-  }
-  SCOLOPAX_AVX2 Mask lets() const { return transmittance > floats(kernel::kOpaqueTransmittance); }
-};
-
-/// Emission and absorption.
-class Glow {
- public:
-  SCOLOPAX_AVX2 explicit Glow(const SceneView& scene) : color(vectors(glm::vec3(0.0f))), scene_(scene) {}
-
-  SCOLOPAX_AVX2 Mask take(const PacketSegment& segment) {
-    Float extinction = floats(0.0f);
-    Vec emission = vectors(glm::vec3(0.0f));
-    for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
-      const int n = std::countr_zero(left);
-      const Parts parts = partsOf<Detail::emission>(scene_.channels[n], segment.from[n], segment.to[n],
-                                                    segment.of(scene_, n));
-      extinction = extinction + parts.opacity;
-      for (int c = 0; c < 3; ++c) emission[c] = emission[c] + parts.emission[c];
-    }
-    if (any(extinction > floats(0.0f)))
-      color = color + emission * absorption.pass(extinction, segment.end - segment.start);
-    return absorption.lets();
-  }
-  SCOLOPAX_AVX2 void finish() {}
-
-  Vec color;
-  Absorption absorption;
-
- private:
-  const SceneView& scene_;
-};
-
-/// Light that channels throw back.
-template <class Features>
-class Reflection {
- public:
-  SCOLOPAX_AVX2 Reflection(const SceneView& scene, const Rays& rays, std::uint32_t channels,
-                           PacketSampler& ofStrata, PacketCost* cost)
-      : light_(scene, rays, channels, cost), strata_(ofStrata, cost), scene_(scene) {
-    for (float(&row)[kLanes] : colors_) std::fill(std::begin(row), std::end(row), 0.0f);
-  }
-
-  SCOLOPAX_AVX2 Mask take(const PacketSegment& segment) {
-    Float extinction = floats(0.0f);
-    for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
-      const int n = std::countr_zero(left);
-      parts_[n] =
-          partsOf<Detail::moment>(scene_.channels[n], segment.from[n], segment.to[n], segment.of(scene_, n));
-      extinction = extinction + parts_[n].opacity;
-    }
-    if (!any(extinction > floats(0.0f))) return absorption.lets();
-    const Float length = segment.end - segment.start, scale = absorption.pass(extinction, length);
-    for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
-      const int n = std::countr_zero(left);
-      const Parts& parts = parts_[n];
-      const Float weight = parts.opacity * scale;
-      const Mask seen = weight > floats(kernel::kLeastNormal);
-      if (!any(seen)) continue;
-      const Float t = segment.start + minimum(parts.moment / parts.opacity, floats(1.0f)) * length;
-      const Vec emission{{parts.emission[0], parts.emission[1], parts.emission[2]}};
-      strata_.add(n, seen, weight, emission * scale, t);
-    }
-    const Mask full = strata_.weight() >= floats(scene_.stratum);
-    if (any(full)) strata_.hand(full, queue_, light_, colors_);
-    return absorption.lets();
-  }
-  SCOLOPAX_AVX2 void finish() {
-    strata_.hand(strata_.weight() > floats(0.0f), queue_, light_, colors_);
-    if (queue_.count > 0) light_.shine(queue_, colors_);
-    color = {{load(colors_[0]), load(colors_[1]), load(colors_[2])}};
-  }
-
-  Vec color;
-  Absorption absorption;
-
- private:
-  PacketLight<Features> light_;
-  Parts parts_[kernel::kMaxVisibleChannels];
-  PacketStrata strata_;
-  const SceneView& scene_;
-  float colors_[3][kLanes];
-  LightQueue queue_;
-};
-
-/// Rays of a packet, their light so far and what they have cost.
-struct Packet {
-  SCOLOPAX_AVX2 Packet() : color(vectors(glm::vec3(0.0f))), opacity(floats(0.0f)), cost(noCost()) {}
-  Rays rays;
-  Intervals inside;
-  Vec color;
-  Float opacity;
-  PacketCost cost;
-};
-
-/// kernel::marchRay of these channels, added to the packet's.
-template <class Features>
-SCOLOPAX_AVX2 void march(const SceneView& scene, std::uint32_t channels, Float offset,
-                         PacketSampler& ofStrata, Packet& packet) {
-  PacketMarch along(scene, packet.rays, packet.inside, channels, offset, scene.step, &packet.cost);
-  const auto add = [&](auto& sink) __attribute__((target("avx2"))) {
-    along.follow(sink);
-    sink.finish();
-    packet.color = packet.color + sink.color;
-    const Float one = floats(1.0f), opacity = minimum(sink.absorption.opacity, one);
-    packet.opacity = packet.opacity + (one - packet.opacity) * opacity;
-  };
-  if constexpr (Features::kAny) {
-    Reflection<Features> reflection(scene, packet.rays, channels, ofStrata, &packet.cost);
-    add(reflection);
-  } else {
-    Glow glow(scene);
-    add(glow);
-  }
-}
-
-/// kernel::RenderPixel for the pixels of a packet from (x, y) on, as far as they are below (endX, endY).
-template <class Blend, class Features>
-SCOLOPAX_AVX2_ONLY void renderPacket(const Pass& pass, int x, int y, int endX, int endY) {
-  const SceneView& scene = pass.scene;
-  std::int32_t columns[kLanes], rows[kLanes], pixels[kLanes];
-  unsigned todo = 0;
-  for (int i = 0; i < kLanes; ++i) {
-    const int column = x + i % kPacketWidth, row = y + i / kPacketWidth;
-    columns[i] = column, rows[i] = row;
-    pixels[i] = row * scene.width + column;
-    if (column < endX && row < endY && !pass.done[pixels[i]]) todo |= 1u << i;
-  }
-  if (todo == 0) return;
-  const Int bit{_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128)};
-  const Mask wanted = (ints(int(todo)) & bit) == bit;
-  PacketSampler sampler(load(pixels), pass.number, scene.seed);
-  PacketSampler ofStrata = sampler.aside();
-  Float across = floats(0.5f), down = across;
-  const PacketSampler::Block jitter = sampler.next(wanted);
-  if (scene.filterBox) across = uniformOf(jitter.x), down = uniformOf(jitter.y);
-  Packet packet;
-  packet.rays = raysThrough(scene.rays, toFloat(load(columns)) + across, toFloat(load(rows)) + down);
-  packet.inside = clipToBox(packet.rays, scene.dims);
-  packet.inside.meets = packet.inside.meets & wanted;
-  if (scene.channelCount > 0 && any(packet.inside.meets)) {
-    const std::uint32_t all = ~0u >> (32 - scene.channelCount);
-    for (int n = 0; n < (Blend::kSeparate ? scene.channelCount : 1); ++n) {
-      const Float offset = uniformOf(sampler.next(packet.inside.meets).x);
-      march<Features>(scene, Blend::kSeparate ? 1u << n : all, offset, ofStrata, packet);
-    }
-  }
-
-  for (; todo != 0; todo &= todo - 1) {
-    const int i = std::countr_zero(todo), pixel = pixels[i];
-    pass.pixels[pixel] = {at(packet.color[0], i), at(packet.color[1], i), at(packet.color[2], i),
-                          at(packet.opacity, i)};
-    if (pass.cost) {
-      pass.cost[pixel].fetches += std::uint32_t(at(packet.cost.fetches, i));
-      pass.cost[pixel].cellSteps += std::uint32_t(at(packet.cost.cellSteps, i));
-      pass.cost[pixel].randomBlocks += std::uint32_t(at(packet.cost.randomBlocks + sampler.blocks(), i));
-      pass.cost[pixel].truncated += at(packet.cost.truncated, i) > 0;
-    }
-    pass.done[pixel] = 1;
-  }
-}
-
-template <class Blend, class Features>
-void renderTilePackets(const Pass& pass, int tileX, int tileY) {
-  const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
-  const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
-  for (int y = tileY * kTile; y < endY; y += kPacketHeight) {
-    if (std::chrono::steady_clock::now() >= pass.deadline) return;
-    for (int x = tileX * kTile; x < endX; x += kPacketWidth) {
-      if (pass.cancel->load(std::memory_order_relaxed)) return;
-      renderPacket<Blend, Features>(pass, x, y, endX, endY);
-    }
-  }
-}
-
-}  // namespace
-
-TileFunction packetTileFunction(const Scene& scene, const SceneView& view) {
+TileFunction packetTileFunction(const Scene& scene, const kernel::SceneView& view, InstructionSet set) {
   const auto cells = glm::dvec3(view.majorants.cells);
-  if (!hasStep(scene.method) || !available(InstructionSet::avx2) || cells.x * cells.y * cells.z >= 0x1p30)
-    return nullptr;
+  if (!hasStep(scene.method) || cells.x * cells.y * cells.z >= 0x1p30) return nullptr;
   // Without bits of channels, rays take segments for each other, and between voxels that are not finite a
   // segment may cross values that are nowhere.
   for (int n = 0; n < view.channelCount; ++n)
     if (!view.majorants.active && !view.channels[n].finite) return nullptr;
-  return visitBlendAndLight(scene, [](auto blend, auto features) -> TileFunction {
-    using Blend = typename decltype(blend)::type;
-    if constexpr (Blend::kSums)
-      return renderTilePackets<Blend, typename decltype(features)::type>;
-    else
-      return nullptr;  // channels that hide each other are compared along a segment, which packets do not
-  });
+  switch (set) {
+    case InstructionSet::avx512:
+      return avx512PacketTiles(scene);
+    case InstructionSet::avx2:
+      return avx2PacketTiles(scene);
+    case InstructionSet::baseline:
+      break;
+  }
+  return nullptr;
 }
-#else
-TileFunction packetTileFunction(const Scene&, const kernel::SceneView&) { return nullptr; }
-#endif
+
+TileFunction quadratureTileFunction(const Scene& scene, const kernel::SceneView& view) {
+  const TileFunction packets = packetTileFunction(scene, view, fastestInstructionSet());
+  return packets ? packets : chooseTileFunction<kernel::RayMarch>(scene);
+}
 
 }  // namespace scolopax

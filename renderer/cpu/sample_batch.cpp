@@ -22,32 +22,21 @@ void sampleBaseline(const SceneView& scene, std::uint32_t channels, const PointB
 }
 
 #if defined(__x86_64__)
-SCOLOPAX_AVX2_ONLY void sampleAvx2(const SceneView& scene, std::uint32_t channels, const PointBatch& points,
+SCOLOPAX_SIMD_ONLY void sampleAvx2(const SceneView& scene, std::uint32_t channels, const PointBatch& points,
                                    float (*values)[kBatchPoints]) {
-  static_assert(lanes::kLanes == kBatchPoints);
-  lanes::sampleLanes(scene, channels, lanes::load(points.x), lanes::load(points.y), lanes::load(points.z),
-                     values);
+  static_assert(lanes_avx2::kLanes == kBatchPoints);
+  lanes_avx2::sampleLanes(scene, channels, lanes_avx2::load(points.x), lanes_avx2::load(points.y),
+                          lanes_avx2::load(points.z), values);
 }
 #endif
 
 }  // namespace
 
-bool available(InstructionSet set) {
-#if defined(__x86_64__)
-  if (set == InstructionSet::avx2) return __builtin_cpu_supports("avx2");
-#endif
-  return set == InstructionSet::baseline;
-}
-
-InstructionSet fastestInstructionSet() {
-  return available(InstructionSet::avx2) ? InstructionSet::avx2 : InstructionSet::baseline;
-}
-
 kernel::SampleBatch sampleBatchFor(InstructionSet set) {
 #if defined(__x86_64__)
-  if (set == InstructionSet::avx2) return sampleAvx2;
+  if (set != InstructionSet::baseline) return sampleAvx2;  // a batch has no more points
 #endif
-  return set == InstructionSet::baseline ? sampleBaseline : nullptr;
+  return sampleBaseline;
 }
 
 }  // namespace scolopax

@@ -2,15 +2,10 @@
 // Sampling several points of a ray at once, in the instruction set that the processor has. Every version
 // gives the bits of kernel/sample_volume.h, which all are tested against.
 #pragma once
+#include "renderer/cpu/instruction_set.h"
 #include "renderer/kernel/views.h"
 
 namespace scolopax {
-
-enum class InstructionSet { baseline, avx2 };
-
-/// Whether this processor has it.
-bool available(InstructionSet set);
-InstructionSet fastestInstructionSet();
 
 /// Voxels must have kVoxelPadding readable bytes after the last (VoxelBuffer has).
 kernel::SampleBatch sampleBatchFor(InstructionSet set);

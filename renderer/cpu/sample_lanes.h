@@ -8,7 +8,7 @@
 #include "renderer/kernel/sample_volume.h"
 #if defined(__x86_64__)
 
-namespace scolopax::lanes {
+namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
 /// kernel::axisWeight: neighbours' indices, and the weight of the second.
 struct Axis {
@@ -17,7 +17,7 @@ struct Axis {
   Mask swapped;  ///< at the last voxel, where the neighbour is the one before
 };
 /// The axis has two voxels or more.
-SCOLOPAX_AVX2 Axis axisOf(Float x, int size) {
+SCOLOPAX_SIMD Axis axisOf(Float x, int size) {
   const Float inside = clamp(x, floats(0.0f), floats(float(size - 1)));
   const Int whole = truncated(inside), last = ints(size - 2);
   const Mask swapped = whole > last;
@@ -33,7 +33,7 @@ struct Points {
   std::size_t first;  ///< the slice that gathers' indices, which are of 32 bits, count from: that of lane 0
   float slices;       ///< at most so many are between them
 };
-SCOLOPAX_AVX2 Points pointsAt(glm::ivec3 dims, Float x, Float y, Float z) {
+SCOLOPAX_SIMD Points pointsAt(glm::ivec3 dims, Float x, Float y, Float z) {
   Points points;
   points.dims = dims;
   points.place[0] = x, points.place[1] = y, points.place[2] = z;
@@ -44,18 +44,18 @@ SCOLOPAX_AVX2 Points pointsAt(glm::ivec3 dims, Float x, Float y, Float z) {
   return points;
 }
 /// Lanes need a neighbour on every axis.
-SCOLOPAX_AVX2 bool isFlat(glm::ivec3 dims) { return dims.x < 2 || dims.y < 2 || dims.z < 2; }
+SCOLOPAX_SIMD bool isFlat(glm::ivec3 dims) { return dims.x < 2 || dims.y < 2 || dims.z < 2; }
 
-SCOLOPAX_AVX2 Float lerp(Float a, Float b, Float t) { return a + t * (b - a); }
-SCOLOPAX_AVX2 __m128 lerp4(__m128 a, __m128 b, float t) {
+SCOLOPAX_SIMD Float lerp(Float a, Float b, Float t) { return a + t * (b - a); }
+SCOLOPAX_SIMD __m128 lerp4(__m128 a, __m128 b, float t) {
   return _mm_add_ps(a, _mm_mul_ps(_mm_set1_ps(t), _mm_sub_ps(b, a)));
 }
 
 /// Voxels at eight indices.
 template <class T>
-SCOLOPAX_AVX2 Float voxelsAt(const T* voxels, Int index) {
+SCOLOPAX_SIMD Float voxelsAt(const T* voxels, Int index) {
   if constexpr (std::is_same_v<T, float>) return gather(voxels, index);
-  const Int word{_mm256_i32gather_epi32(reinterpret_cast<const int*>(voxels), index.v, int(sizeof(T)))};
+  const Int word = gatherWords<int(sizeof(T))>(voxels, index);
   if constexpr (std::is_same_v<T, std::uint8_t>) return toFloat(word & ints(0xff));
   if constexpr (std::is_same_v<T, std::uint16_t>) return toFloat(word & ints(0xffff));
   return toFloat(rightSigned<16>(left<16>(word)));
@@ -64,13 +64,13 @@ SCOLOPAX_AVX2 Float voxelsAt(const T* voxels, Int index) {
 /// Interpolates along x from the voxels at `index` to the neighbours, `stride` further; of small ones that
 /// are next to each other one read gets both.
 template <class T>
-SCOLOPAX_AVX2 Float alongX(const T* voxels, Int index, int stride, const Axis& x) {
+SCOLOPAX_SIMD Float alongX(const T* voxels, Int index, int stride, const Axis& x) {
   Float a, b;
   if (sizeof(T) == 4 || stride != 1) {
     a = voxelsAt(voxels, index);
     b = voxelsAt(voxels + stride, index);
   } else {
-    const Int pair{_mm256_i32gather_epi32(reinterpret_cast<const int*>(voxels), index.v, int(sizeof(T)))};
+    const Int pair = gatherWords<int(sizeof(T))>(voxels, index);
     if constexpr (std::is_same_v<T, std::uint8_t>)
       a = toFloat(pair & ints(0xff)), b = toFloat(right<8>(pair) & ints(0xff));
     else if constexpr (std::is_same_v<T, std::uint16_t>)
@@ -83,7 +83,7 @@ SCOLOPAX_AVX2 Float alongX(const T* voxels, Int index, int stride, const Axis& x
 
 /// One channel.
 template <class T>
-SCOLOPAX_AVX2 Float sampleOne(const Points& at, const kernel::ChannelView& channel) {
+SCOLOPAX_SIMD Float sampleOne(const Points& at, const kernel::ChannelView& channel) {
   const int stride = channel.stride;
   const T* base = static_cast<const T*>(channel.voxels) + channel.lane +
                   at.first * std::size_t(at.dims.x) * std::size_t(at.dims.y) * std::size_t(stride);
@@ -107,7 +107,7 @@ inline void sampleByPoint(const kernel::ChannelView& channel, glm::ivec3 dims, c
 }
 
 /// One channel, whatever its type.
-SCOLOPAX_AVX2 Float sampleChannel(const Points& at, const kernel::ChannelView& channel) {
+SCOLOPAX_SIMD Float sampleChannel(const Points& at, const kernel::ChannelView& channel) {
   if (isFlat(at.dims) ||
       !(at.slices * float(at.dims.x) * float(at.dims.y) * float(channel.stride) < 0x1p29f)) {
     float places[3][kLanes], values[kLanes];
@@ -129,23 +129,23 @@ SCOLOPAX_AVX2 Float sampleChannel(const Points& at, const kernel::ChannelView& c
 }
 
 /// Four channels of a voxel.
-SCOLOPAX_AVX2 __m128 load4(const std::uint8_t* v) {
+SCOLOPAX_SIMD __m128 load4(const std::uint8_t* v) {
   int bytes;
   std::memcpy(&bytes, v, sizeof bytes);
   return _mm_cvtepi32_ps(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(bytes)));
 }
-SCOLOPAX_AVX2 __m128 load4(const std::uint16_t* v) {
+SCOLOPAX_SIMD __m128 load4(const std::uint16_t* v) {
   return _mm_cvtepi32_ps(_mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(v))));
 }
-SCOLOPAX_AVX2 __m128 load4(const std::int16_t* v) {
+SCOLOPAX_SIMD __m128 load4(const std::int16_t* v) {
   return _mm_cvtepi32_ps(_mm_cvtepi16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(v))));
 }
-SCOLOPAX_AVX2 __m128 load4(const float* v) { return _mm_loadu_ps(v); }
+SCOLOPAX_SIMD __m128 load4(const float* v) { return _mm_loadu_ps(v); }
 
 /// Four neighbouring channels; members[lane - first lane] is where a channel's values go, or
 /// null.
 template <class T>
-SCOLOPAX_AVX2_ONLY void sampleFour(const Points& at, const kernel::ChannelView& channel, int lane,
+SCOLOPAX_SIMD_ONLY void sampleFour(const Points& at, const kernel::ChannelView& channel, int lane,
                                    float* const* members) {
   const auto stride = std::size_t(channel.stride), row = stride * std::size_t(at.dims.x),
              slice = row * std::size_t(at.dims.y);
@@ -175,7 +175,7 @@ SCOLOPAX_AVX2_ONLY void sampleFour(const Points& at, const kernel::ChannelView& 
 }
 
 /// Channels by their bits; the values of channel n come into values[n].
-SCOLOPAX_AVX2 void sampleLanes(const kernel::SceneView& scene, std::uint32_t channels, Float x, Float y,
+SCOLOPAX_SIMD void sampleLanes(const kernel::SceneView& scene, std::uint32_t channels, Float x, Float y,
                                Float z, float (*values)[kLanes]) {
   const Points at = pointsAt(scene.dims, x, y, z);
   for (int n = 0; n < scene.channelCount; ++n) {
@@ -200,5 +200,5 @@ SCOLOPAX_AVX2 void sampleLanes(const kernel::SceneView& scene, std::uint32_t cha
   }
 }
 
-}  // namespace scolopax::lanes
+}  // namespace scolopax::SCOLOPAX_SIMD_SPACE
 #endif

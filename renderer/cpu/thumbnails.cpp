@@ -12,7 +12,6 @@
 #include "renderer/cpu/sample_batch.h"
 #include "renderer/data/camera.h"
 #include "renderer/data/sampling.h"
-#include "renderer/kernel/raymarch.h"
 
 namespace scolopax {
 namespace {
@@ -28,8 +27,7 @@ class Thumbnails {
  public:
   /// `scene` says what of the plan's scene is looked at: with its light or without.
   Thumbnails(const RenderPlan& plan, const Scene& scene, int side)
-      : view_(plan.view()), render_(packetTileFunction(scene, view_)) {
-    if (!render_) render_ = chooseTileFunction<kernel::RayMarch>(scene);
+      : view_(plan.view()), render_(quadratureTileFunction(scene, view_)) {
     const double longer = std::max(scene.width, scene.height);
     view_.width = std::max(1, int(std::lround(side * scene.width / longer)));
     view_.height = std::max(1, int(std::lround(side * scene.height / longer)));

@@ -125,10 +125,10 @@ struct Picture {
   std::vector<kernel::SampleCost> cost;
 };
 
-class RayPackets : public testing::Test {
+class RayPackets : public testing::TestWithParam<InstructionSet> {
  protected:
   void SetUp() override {
-    if (!available(InstructionSet::avx2)) GTEST_SKIP() << "this processor has no AVX2";
+    if (!available(GetParam())) GTEST_SKIP() << "this processor does not have the instruction set";
   }
   /// False where packets leave the scene to single rays.
   bool take(const std::shared_ptr<const Volume>& volume, const Scene& scene) {
@@ -136,8 +136,8 @@ class RayPackets : public testing::Test {
     plan_.emplace(volume);
     plan_->update(scene);
     view_ = plan_->view();
-    view_.sampleBatch = sampleBatchFor(InstructionSet::avx2);
-    tiles_ = packetTileFunction(scene, view_);
+    view_.sampleBatch = sampleBatchFor(GetParam());
+    tiles_ = packetTileFunction(scene, view_, GetParam());
     return tiles_ != nullptr;
   }
   std::size_t count() const { return std::size_t(scene_.width) * std::size_t(scene_.height); }
@@ -193,7 +193,7 @@ class RayPackets : public testing::Test {
   int seen_ = 0, opaque_ = 0;
 };
 
-TEST_F(RayPackets, HaveTheBitsOfOneRayAfterTheOther) {
+TEST_P(RayPackets, HaveTheBitsOfOneRayAfterTheOther) {
   int scenes = 0;
   for (unsigned seed = 0; seed < 400; ++seed) {
     SCOPED_TRACE(seed);
@@ -224,7 +224,7 @@ TEST_F(RayPackets, HaveTheBitsOfOneRayAfterTheOther) {
   EXPECT_GT(opaque_, 1000);
 }
 
-TEST_F(RayPackets, SeeNothingBesideTheVolumeHoweverSteepTheirWay) {
+TEST_P(RayPackets, SeeNothingBesideTheVolumeHoweverSteepTheirWay) {
   const glm::ivec3 dims(16);
   const auto volume =
       volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int) { return 200; }));
@@ -240,7 +240,7 @@ TEST_F(RayPackets, SeeNothingBesideTheVolumeHoweverSteepTheirWay) {
   EXPECT_GT(seen_, 500);
 }
 
-TEST_F(RayPackets, CountEveryRaysSegmentsForItself) {
+TEST_P(RayPackets, CountEveryRaysSegmentsForItself) {
   // Every second ray is in cells of matter all the way, which is more segments than a ray may have; beside it
   // one has half of them, near or far.
   const glm::ivec3 dims(8, 8, 400);
@@ -272,7 +272,7 @@ TEST_F(RayPackets, CountEveryRaysSegmentsForItself) {
   EXPECT_EQ(cut, 5 * 4);
 }
 
-TEST_F(RayPackets, LeaveWhatTheyCannotDoToSingleRays) {
+TEST_P(RayPackets, LeaveWhatTheyCannotDoToSingleRays) {
   const glm::ivec3 dims(8);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int) { return 9; }));
   Scene scene = frontScene(*volume, 8, 8);
@@ -288,6 +288,11 @@ TEST_F(RayPackets, LeaveWhatTheyCannotDoToSingleRays) {
   EXPECT_FALSE(takes([](Scene& s) { s.blend = BlendMode::max; }));
   EXPECT_FALSE(takes([](Scene& s) { s.blend = BlendMode::mix; }));
 }
+
+INSTANTIATE_TEST_SUITE_P(Of, RayPackets, testing::Values(InstructionSet::avx2, InstructionSet::avx512),
+                         [](const auto& set) {
+                           return std::string(set.param == InstructionSet::avx2 ? "Eight" : "Sixteen");
+                         });
 
 }  // namespace
 }  // namespace scolopax

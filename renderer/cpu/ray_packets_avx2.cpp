@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/cpu/packet_tiles.h"
+#include "renderer/cpu/ray_packets.h"
+
+namespace scolopax {
+
+TileFunction avx2PacketTiles([[maybe_unused]] const Scene& scene) {
+#if defined(__x86_64__)
+  return lanes_avx2::packetTiles(scene);
+#else
+  return nullptr;
+#endif
+}
+
+}  // namespace scolopax

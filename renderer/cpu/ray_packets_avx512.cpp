@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#define SCOLOPAX_SIMD_AVX512
+#include "renderer/cpu/packet_tiles.h"
+#include "renderer/cpu/ray_packets.h"
+
+namespace scolopax {
+
+TileFunction avx512PacketTiles([[maybe_unused]] const Scene& scene) {
+#if defined(__x86_64__)
+  return lanes_avx512::packetTiles(scene);
+#else
+  return nullptr;
+#endif
+}
+
+}  // namespace scolopax
