@@ -7,8 +7,9 @@ bool available(InstructionSet set) {
   switch (set) {
 #if defined(__x86_64__)
     case InstructionSet::avx512:
-      return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-             __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+      return available(InstructionSet::avx2) && __builtin_cpu_supports("avx512f") &&
+             __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+             __builtin_cpu_supports("avx512vl");
     case InstructionSet::avx2:
       return __builtin_cpu_supports("avx2");
 #endif

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// As many numbers at once as an instruction set has lanes, with the meaning, to the last bit, that
-// kernel/math.h gives to one. A file that defines SCOLOPAX_SIMD_AVX512 before it includes this gets AVX-512,
-// others AVX2, each with all that is built of it in a namespace of its own. Functions, not files, have the
-// instruction set: an inline function of a header that a file compiled for AVX2 might be the one that the
-// linker keeps for everybody.
+// As many numbers at once as an instruction set has lanes, each with the meaning, to the last bit, that
+// kernel/math.h gives to one: AVX-512 in files that define SCOLOPAX_SIMD_AVX512 before they include this,
+// AVX2 in others. What is built of it lies in a namespace of the set's own.
 #pragma once
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -12,6 +10,7 @@
 
 #include "renderer/kernel/math.h"
 // What there is for each: Mask (all of a lane, or nothing), Int, Float, and
+//   maskOf(bits)        and bitsOf(mask): bit i is lane i
 //   without(a, b)       a, but not where b is
 //   select(m, a, b)     a where the mask is set, else b; where(m, a) with b = 0; onesOf(m) with a = 1, b = 0
 //   left, right<bits>   shifts, right of a number without sign; rightSigned
@@ -19,6 +18,9 @@
 //   minimum(a, b)       b where either is NaN; comparisons with NaN are false
 //   looked(table, i)    entries of every byte; bytesReversed(a) of every lane
 //   gather(base, i)     base[i]; gatherWords<scale>(base, i): four bytes from base + scale * i
+//
+// Functions, not files, have the instruction set: an inline function of a header that a file compiled for
+// AVX2 might be the one that the linker keeps for everybody.
 #if defined(SCOLOPAX_SIMD_AVX512)
 #include "renderer/cpu/lanes_avx512.h"
 #else

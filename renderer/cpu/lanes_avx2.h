@@ -16,6 +16,11 @@ SCOLOPAX_SIMD Mask operator&(Mask a, Mask b) { return {_mm256_and_ps(a.v, b.v)};
 SCOLOPAX_SIMD Mask operator|(Mask a, Mask b) { return {_mm256_or_ps(a.v, b.v)}; }
 SCOLOPAX_SIMD Mask without(Mask a, Mask b) { return {_mm256_andnot_ps(b.v, a.v)}; }
 SCOLOPAX_SIMD Mask everywhere() { return {_mm256_castsi256_ps(_mm256_set1_epi32(-1))}; }
+SCOLOPAX_SIMD Mask maskOf(unsigned bits) {
+  const __m256i each = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+  const __m256i set = _mm256_and_si256(_mm256_set1_epi32(int(bits)), each);
+  return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(set, each))};
+}
 SCOLOPAX_SIMD unsigned bitsOf(Mask a) { return unsigned(_mm256_movemask_ps(a.v)); }
 SCOLOPAX_SIMD bool any(Mask a) {
   return !_mm256_testz_si256(_mm256_castps_si256(a.v), _mm256_castps_si256(a.v));

@@ -16,6 +16,7 @@ SCOLOPAX_SIMD Mask operator&(Mask a, Mask b) { return {_kand_mask16(a.v, b.v)}; 
 SCOLOPAX_SIMD Mask operator|(Mask a, Mask b) { return {_kor_mask16(a.v, b.v)}; }
 SCOLOPAX_SIMD Mask without(Mask a, Mask b) { return {_kandn_mask16(b.v, a.v)}; }
 SCOLOPAX_SIMD Mask everywhere() { return {0xffff}; }
+SCOLOPAX_SIMD Mask maskOf(unsigned bits) { return {_cvtu32_mask16(bits)}; }
 SCOLOPAX_SIMD unsigned bitsOf(Mask a) { return _cvtmask16_u32(a.v); }
 SCOLOPAX_SIMD bool any(Mask a) { return _cvtmask16_u32(a.v) != 0; }
 

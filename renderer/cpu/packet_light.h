@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// kernel/shade.h for eight strata of rays at once.
+// kernel/shade.h for as many strata of rays at once as there are lanes.
 #pragma once
 #include "renderer/cpu/packet_march.h"
 #include "renderer/cpu/packet_sampler.h"
@@ -33,7 +33,7 @@ SCOLOPAX_SIMD Vec product(const glm::mat3& m, const Vec& v) {
   return result;
 }
 
-/// Eight strata that are to be lit, and whose they are.
+/// Strata that are to be lit, at most one a lane, and whose they are.
 struct LightQueue {
   int count = 0;
   std::int32_t lane[kLanes];

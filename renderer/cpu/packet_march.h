@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Eight rays cut into the same segments as by kernel/segments.h, in step with each other.
+// A packet of rays, one a lane, cut into the same segments as by kernel/segments.h, in step with each other.
 #pragma once
 #include "renderer/cpu/packet_parts.h"
 #include "renderer/cpu/packet_walk.h"
@@ -8,7 +8,7 @@
 
 namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
-/// kernel::SampleCost of eight rays.
+/// kernel::SampleCost of every ray.
 struct PacketCost {
   Int fetches, cellSteps, randomBlocks, truncated;
 };

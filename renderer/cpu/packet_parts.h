@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What channels do on a segment of eight rays: kernel/optical_curve.h and kernel::partAlone, bit by bit.
+// What channels do on a segment of every ray: kernel/optical_curve.h and kernel::partAlone, bit by bit.
 #pragma once
 #include <algorithm>
 #include <bit>
@@ -52,7 +52,7 @@ SCOLOPAX_SIMD Int piecesAt(const kernel::OpticalCurveView& curve, Float position
 /// How much of a part is wanted: up to its extinction, emission or moment.
 enum class Detail { extinction, emission, moment };
 
-/// kernel::Part of eight rays; 0 beyond the detail.
+/// kernel::Part of every ray; 0 beyond the detail.
 struct Parts {
   Float opacity, emission[3], moment;
 };

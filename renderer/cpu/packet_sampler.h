@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The random numbers of eight pixels at once: kernel/rng.h, which says what they are and where they are from.
+// The random numbers of a packet of pixels at once: kernel/rng.h, which says what they are and where they are
+// from.
 #pragma once
 #include "renderer/cpu/lanes.h"
 #include "renderer/kernel/rng.h"

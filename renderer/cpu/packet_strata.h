@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What eight rays absorb, gathered in strata that wait for light until there are eight of them.
+// What the rays of a packet absorb, gathered in strata that wait for light until there are as many as lanes.
 #pragma once
 #include "renderer/cpu/packet_light.h"
 #include "renderer/cpu/packet_sampler.h"

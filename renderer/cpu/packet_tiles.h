@@ -17,7 +17,7 @@
 namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
 /// Pixels of a packet: neighbours, which share voxels and macrocells.
-constexpr int kPacketWidth = 4, kPacketHeight = kLanes / kPacketWidth;
+inline constexpr int kPacketWidth = 4, kPacketHeight = kLanes / kPacketWidth;
 static_assert(kTile % kPacketWidth == 0 && kTile % kPacketHeight == 0);
 
 /// What is left behind a part of the rays, and what that has absorbed: kernel::marchRay's sums.
@@ -154,19 +154,18 @@ SCOLOPAX_SIMD void march(const kernel::SceneView& scene, std::uint32_t channels,
 template <class Blend, class Features>
 SCOLOPAX_SIMD_ONLY void renderPacket(const Pass& pass, int x, int y, int endX, int endY) {
   const kernel::SceneView& scene = pass.scene;
-  std::int32_t pixels[kLanes], bits[kLanes];
+  std::int32_t pixels[kLanes];
   unsigned todo = 0;
   for (int i = 0; i < kLanes; ++i) {
     const int column = x + i % kPacketWidth, row = y + i / kPacketWidth;
     pixels[i] = row * scene.width + column;
-    bits[i] = 1 << i;
     if (column < endX && row < endY && !pass.done[pixels[i]]) todo |= 1u << i;
   }
   if (todo == 0) return;
   // Not what was stored one by one: a load that has to wait for many stores is slow.
   const Int columns = ints(x) + (laneNumbers() & ints(kPacketWidth - 1));
   const Int rows = ints(y) + right<std::countr_zero(unsigned(kPacketWidth))>(laneNumbers());
-  const Mask wanted = (ints(int(todo)) & load(bits)) == load(bits);
+  const Mask wanted = maskOf(todo);
   PacketSampler sampler(rows * ints(scene.width) + columns, pass.number, scene.seed);
   PacketSampler ofStrata = sampler.aside();
   Float across = floats(0.5f), down = across;
@@ -184,10 +183,12 @@ SCOLOPAX_SIMD_ONLY void renderPacket(const Pass& pass, int x, int y, int endX, i
     }
   }
 
+  float values[4][kLanes];
+  for (int c = 0; c < 3; ++c) store(packet.color[c], values[c]);
+  store(packet.opacity, values[3]);
   for (; todo != 0; todo &= todo - 1) {
     const int i = std::countr_zero(todo), pixel = pixels[i];
-    pass.pixels[pixel] = {at(packet.color[0], i), at(packet.color[1], i), at(packet.color[2], i),
-                          at(packet.opacity, i)};
+    pass.pixels[pixel] = {values[0][i], values[1][i], values[2][i], values[3][i]};
     if (pass.cost) {
       pass.cost[pixel].fetches += std::uint32_t(at(packet.cost.fetches, i));
       pass.cost[pixel].cellSteps += std::uint32_t(at(packet.cost.cellSteps, i));

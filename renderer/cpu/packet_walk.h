@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Eight rays at once: through pixels, into the box and through the macrocells. What kernel/camera_rays.h and
-// kernel/cell_walk.h do with one; but the walk asks at points, instead of going from cell to cell.
+// A packet of rays at once: through pixels, into the box and through the macrocells. What
+// kernel/camera_rays.h and kernel/cell_walk.h do with one; but the walk asks at points, instead of going from
+// cell to cell.
 #pragma once
 #include "renderer/cpu/lanes.h"
 #include "renderer/kernel/views.h"

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/cpu/ray_packets.h"
 
-#include "renderer/cpu/tile_kernels.h"
-#include "renderer/kernel/raymarch.h"
+#include <glm/vec3.hpp>
+
+#include "renderer/data/instances.h"
 
 namespace scolopax {
 

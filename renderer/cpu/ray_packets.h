@@ -10,7 +10,8 @@ namespace scolopax {
 /// The fastest there is for quadrature; packets record no first collisions.
 TileFunction quadratureTileFunction(const Scene& scene, const kernel::SceneView& view);
 
-/// Packets alone; null where the scene needs kernels that go ray by ray, or the set has none.
+/// Packets alone, by a set that the processor has; null where it has none or the scene needs kernels that go
+/// ray by ray.
 TileFunction packetTileFunction(const Scene& scene, const kernel::SceneView& view, InstructionSet set);
 
 /// Those of an instruction set, each compiled in a file of its own: of 8 and 16 rays.

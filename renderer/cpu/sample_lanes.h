@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// kernel::sampleStored at eight points, bit by bit: of one channel by gathering, of neighbouring channels
-// four at once.
+// kernel::sampleStored at a point in every lane, bit by bit: of one channel by gathering, of neighbouring
+// channels four at once.
 #pragma once
 #include <cstring>
 
@@ -51,7 +51,7 @@ SCOLOPAX_SIMD __m128 lerp4(__m128 a, __m128 b, float t) {
   return _mm_add_ps(a, _mm_mul_ps(_mm_set1_ps(t), _mm_sub_ps(b, a)));
 }
 
-/// Voxels at eight indices.
+/// Voxels at these indices.
 template <class T>
 SCOLOPAX_SIMD Float voxelsAt(const T* voxels, Int index) {
   if constexpr (std::is_same_v<T, float>) return gather(voxels, index);
@@ -150,8 +150,8 @@ SCOLOPAX_SIMD_ONLY void sampleFour(const Points& at, const kernel::ChannelView& 
   const auto stride = std::size_t(channel.stride), row = stride * std::size_t(at.dims.x),
              slice = row * std::size_t(at.dims.y);
   const T* base = static_cast<const T*>(channel.voxels) + lane;
-  alignas(32) std::int32_t low[3][kLanes], high[3][kLanes];
-  alignas(32) float t[3][kLanes];
+  alignas(4 * kLanes) std::int32_t low[3][kLanes], high[3][kLanes];
+  alignas(4 * kLanes) float t[3][kLanes];
   const Axis* axes[] = {&at.x, &at.y, &at.z};
   for (int a = 0; a < 3; ++a) {
     store(axes[a]->low, low[a]);

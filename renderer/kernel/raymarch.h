@@ -62,8 +62,8 @@ SCOLOPAX_HD inline Optical opticalOn(const ChannelView& channel, const float* po
   return optical;
 }
 
-SCOLOPAX_HD inline Largests largestsOn(const SceneView& scene, const SegmentRun& run, int k) {
-  Largests largests;
+SCOLOPAX_HD inline void findLargests(const SceneView& scene, const SegmentRun& run, int k,
+                                     Largests& largests) {
   largests.places = kPlaces;
   for (int n = 0; n < scene.channelCount; ++n) {
     if (!(run.active[k] >> n & 1)) continue;
@@ -81,7 +81,6 @@ SCOLOPAX_HD inline Largests largestsOn(const SceneView& scene, const SegmentRun&
       if (extinction > largests.extinction[i]) largests.extinction[i] = extinction, largests.channel[i] = n;
     }
   }
-  return largests;
 }
 SCOLOPAX_HD inline float meanOf(const Largests& largests) {
   float sum = 0.0f;
@@ -107,7 +106,7 @@ SCOLOPAX_HD Part partAmong(const ChannelView& channel, int n, const float* posit
   return part;
 }
 
-/// What the channels of a walk's segment do on it. A run with one channel needs no comparisons.
+/// What the channels of a walk's segment do on it. One channel alone needs no comparisons.
 template <class Blend>
 class SegmentParts {
  public:
@@ -116,7 +115,7 @@ class SegmentParts {
       : largests_(largests), scene_(scene), run_(walk.run()), k_(walk.k()) {
     if constexpr (!Blend::kSums) {
       compared_ = (run_.active[k_] & (run_.active[k_] - 1)) != 0;
-      if (compared_) largests_ = largestsOn(scene, run_, k_);
+      if (compared_) findLargests(scene, run_, k_, largests_);
     }
   }
 

@@ -101,7 +101,7 @@ class SegmentWalk {
         if (fresh_) skipToCell();
         if (end(following_ - 1) < cells_.exit()) {
           if (++taken_ > kMaxSegments) {
-            cost_->truncated = 1;
+            if (count_ == 0) cost_->truncated = 1;  // else this looks ahead of what may be the last
             return false;
           }
           found_ = following_++;

@@ -90,7 +90,8 @@ than {BAR} times faster. -: no step measured does.
 
 {summary(all_rows, 4, "errors that VTK reaches")} {floor(measured)}
 VTK adds 15-bit numbers, looked up by rounded values, so that smaller steps stop lowering its error: it has a floor. The
-marcher here goes on converging. Its start is jittered per pixel: at large steps its error is noise, VTK's is rings.
+marcher here goes on converging. Its start is jittered per pixel: at large steps its error is a blur along the ray and some
+noise, VTK's is rings.
 
 """ + "\n".join(parts))
 

@@ -16,7 +16,7 @@ def marching_arrays(name):
     if "RayMarch" not in name:
         return 0
     sums = "BlendDensity" in name or "BlendComposite" in name
-    segment = 268 + (0 if sums else 136)  # positions at both ends; which channel is largest
+    segment = 268 + (0 if sums else 68)  # positions at both ends; which channel is largest
     lit = re.search(r"LightFeaturesILb(\d)ELb(\d)E", name)
     strata = 768 if lit.group(1) + lit.group(2) != "00" else 0
     return segment + strata + (segment if lit.group(2) == "1" else 0)  # shadow rays have a segment too
