@@ -40,7 +40,7 @@ def channels(bench):
     """Section 5.2: the first 1 to 12 of twelve orbitals."""
     found = {}
     data = bench.orbitals(12)
-    for light in ("emission-absorption", "both"):
+    for light in bench.lights:
         for count in (1, 4, 12) if bench.quick else (1, 2, 3, 4, 6, 8, 10, 12):
             hidden = {f"channels.{i}.visible": False for i in range(count, 12)}
             # The reference of twelve channels with shadows is slow and told by `speed`.
