@@ -180,16 +180,18 @@ json openApi(const std::vector<Route>& routes) {
                             {"schema", {{"type", p.type}}}});
     json content = json::object();
     for (const std::string& type : route.responseTypes) content[type] = json::object();
+    json responses = {{"default",
+                       {{"description", "What is wrong, with a pointer to the field (RFC 9457)"},
+                        {"content", {{std::string(protocol::kProblemType), json::object()}}}}}};
+    const int usual = route.responseTypes.empty() ? 204 : 200;
+    for (const int status : route.statuses.empty() ? std::vector{usual} : route.statuses)
+      responses[std::to_string(status)] = {{"description", "Done"},
+                                           {"content", status == 204 ? json::object() : content}};
     std::string method;
     for (const char c : route.method) method += char(c - 'A' + 'a');
     json operation = {{"summary", route.summary},
                       {"parameters", std::move(parameters)},
-                      {"responses",
-                       {{route.responseTypes.empty() ? "204" : "200",
-                         {{"description", "Done"}, {"content", std::move(content)}}},
-                        {"default",
-                         {{"description", "What is wrong, with a pointer to the field (RFC 9457)"},
-                          {"content", {{std::string(protocol::kProblemType), json::object()}}}}}}}};
+                      {"responses", std::move(responses)}};
     if (!route.requestType.empty())
       operation["requestBody"] = {{"content", {{route.requestType, json::object()}}}};
     paths[route.path][method] = std::move(operation);

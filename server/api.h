@@ -48,6 +48,7 @@ struct Route {
   std::vector<std::string> responseTypes;  ///< of the good answers; the first is the usual
   net::RouteKind kind = net::RouteKind::quick;
   net::Handler handler;
+  std::vector<int> statuses = {};  ///< of the good answers where they are not 200, or 204 without a body
 };
 
 std::vector<Route> datasetRoutes(ApiContext& context);

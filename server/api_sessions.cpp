@@ -149,7 +149,8 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
        "application/json",
        kJson,
        {},
-       [&context](const net::Request& request) { return create(context, request); }},
+       [&context](const net::Request& request) { return create(context, request); },
+       {201}},
       {"GET",
        "/api/v1/sessions/{id}",
        "Revision, data set, viewers and latest frame of a session",
@@ -213,7 +214,8 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
        "",
        imageTypes,
        net::RouteKind::slow,
-       [&context](const net::Request& request) { return frame(context, request); }},
+       [&context](const net::Request& request) { return frame(context, request); },
+       {200, 204}},
   };
 }
 

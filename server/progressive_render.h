@@ -36,7 +36,7 @@ class ProgressiveRender {
     std::chrono::milliseconds slice{100};      ///< of a slow pass, before other sessions have their turn
     std::chrono::milliseconds politeSlice{8};  ///< when one of them waits for an edit's first picture
     std::chrono::milliseconds shield{300};     ///< for so long a pass goes on when its scene is stale
-    std::uint64_t filmPixels = 67'108'864;     ///< of all sessions' films together, at 120 bytes each
+    std::uint64_t filmPixels = 67'108'864;     ///< of all sessions' films together, at some 90 bytes each
   };
   /// What its pass must leave to the other sessions.
   struct Others {

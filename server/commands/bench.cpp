@@ -248,11 +248,16 @@ CLI::App* addBenchCommand(CLI::App& root) {
       root.add_subcommand("bench", "Measure speed against error of the methods on one scene, in one run");
   const auto o = std::make_shared<Options>();
   addSceneArguments(*command, o->scene);
-  command->add_option("--methods", o->methods, "Methods to measure; all without this")->delimiter(',');
-  command->add_option("--samples", o->samples, "Sample counts")
+  command
+      ->add_option("--methods", o->methods,
+                   "Methods to measure, separated by commas; all but auto without this")
+      ->delimiter(',');
+  command->add_option("--samples", o->samples, "Sample counts; 1,4,16,64 without this")
       ->delimiter(',')
       ->check(CLI::Range(1u, 1u << 24));
-  command->add_option("--steps", o->steps, "Steps of the methods that have one, in voxels")
+  command
+      ->add_option("--steps", o->steps,
+                   "Steps of the methods that have one, in voxels; 4,2,1,0.5 without this")
       ->delimiter(',')
       ->check(CLI::Range(0.01, 100.0) & numberUpTo(100, false));
   command->add_option("--macrocells", o->macrocells, "Macrocell edges, in voxels; the scene's without this")

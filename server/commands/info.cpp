@@ -39,7 +39,8 @@ CLI::App* addInfoCommand(CLI::App& root) {
       "info", "Say what files hold: dimensions, spacing, and each channel's name, type and range");
   const auto options = std::make_shared<Options>();
   command->add_option("PATH", options->paths, "Volume files; those of one grid are one data set")->required();
-  command->add_flag("--json", options->json, "Print JSON, as GET /api/v1/datasets/ID answers");
+  command->add_flag("--json", options->json,
+                    "Print a list in JSON of what GET /api/v1/datasets/ID answers for each");
   command->callback([options] {
     const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
     const auto datasets = io::loadDatasets(options->paths, io::defaultMemoryLimitBytes(), warn);

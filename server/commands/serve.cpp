@@ -129,12 +129,13 @@ CLI::App* addServeCommand(CLI::App& root) {
   };
 
   command->add_option("PATH", options->paths,
-                      "Volume files. Files of one grid become the channels of one data set");
+                      "Volume files, at least one. Files of one grid become the channels of one data set");
   add("host", config.host, "Address to listen on; 0.0.0.0 is every one of this machine")
       ->type_name("ADDRESS");
   add("port", config.port, "Port to listen on; 0 takes any free one")->type_name("PORT");
   add("token-file", options->tokenFile,
-      "File with the token that opens the server; without it, a new one each start")
+      "File with the token that opens the server, one line of 16 to 512 letters, digits and -._~+/=; without "
+      "it, a new one each start")
       ->type_name("FILE");
   add("tls-cert", config.certificateFile, "Certificate (PEM, with its chain): https instead of http")
       ->type_name("FILE");

@@ -9,7 +9,7 @@ from common import LIGHTS, MULTICHANNEL, PROGRAM, SCENES, light_settings, median
 
 
 def speed(bench):
-    """All methods, scenes and lights: time against error (measuring.md's points; the paper's Figure 8 configurations)."""
+    """All methods, scenes and lights: time against error (the paper's Figure 8 configurations)."""
     found = {}
     for name in bench.scenes:
         for light in bench.lights:
@@ -27,7 +27,7 @@ def macrocells(bench):
     lit = () if bench.quick else ("orbitals", "tcga", "heptane")
     for name in bench.scenes:
         for light in ("emission-absorption", "both") if name in lit else ("emission-absorption",):
-            # A marcher with shadows takes seconds a sample.
+            # The marcher with shadows is told by `speed`.
             methods = ["superposed", "cumulative", "sync-dda", "n-dda", *(["raymarch"] if light != "both" else [])]
             result = bench.bench(name, light_settings(light), truth=False, macrocells=[1, 2, 4, 8, 16, 32], samples=[1, 4],
                                  methods=methods, steps=[1], longest=0.05 if bench.quick else 0.3)
@@ -122,7 +122,7 @@ def threads(bench):
     found = {}
     for name in ("orbitals",) if bench.quick else ("orbitals", "tcga", "heptane"):
         for light in ("emission-absorption", "both"):
-            # A marcher with shadows takes seconds a sample.
+            # The marcher with shadows is told by `speed`.
             methods = ["superposed", "sync-dda", *(["raymarch"] if light != "both" else [])]
             result = bench.bench(name, light_settings(light), truth=False, threads=counts, samples=[4], steps=[1],
                                  methods=methods, side=64 if bench.quick else 256, repetitions=bench.repetitions + 2)

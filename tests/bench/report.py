@@ -7,7 +7,7 @@ import json
 import os
 import re
 
-from common import HERE
+from common import HERE, processor
 from plots import save
 from sections import REPORT
 
@@ -33,7 +33,7 @@ def main():
     for name, path in (("rebuild", options.rebuild), ("layout", options.layout)):
         if path:
             with open(path, encoding="utf-8") as file:
-                measured[name] = {"found": json.load(file)}
+                measured[name] = {"found": json.load(file), "tool": f"bench_{name} --json"}
     os.makedirs(options.out, exist_ok=True)
     written = remarks()
 
@@ -47,7 +47,7 @@ def main():
             continue
         text = f"# {title}\nMade by `tests/bench/run.py` and `tests/bench/report.py`; "
         known = [entry for _, entry in entries if "machine" in entry]
-        text += f"machine: {known[0]['machine']}.\n" if known else "see there for the machine.\n"
+        text += f"machine: {known[0]['machine'] if known else processor()}.\n"
         if name in ("speed", "quality", "channels"):
             text += (f"Pictures of {known[0]['side']}x{known[0]['side']} rays through pixel centres; errors over every third "
                      "pixel each way, against the\ndouble-precision reference.\n")
@@ -56,6 +56,8 @@ def main():
         for section, entry in entries:
             if len(sections) > 1:
                 text += f"\n## {section.__name__.capitalize()}\n"
+            if "tool" in entry:
+                text += f"\nMeasured by `{entry['tool']}` where the report was made.\n"
             if section.__name__ in written:
                 text += "\n" + written[section.__name__] + "\n"
             text += "\n" + section(entry, plot)
