@@ -47,7 +47,7 @@ void measure(const StridedVoxels<T>& voxels, glm::ivec3 dims, const MacrocellGri
           const T* row = &voxels[(std::size_t(k) * std::size_t(dims.y) + std::size_t(j)) * rowLength];
           for (std::size_t i = 0; i < rowLength; ++i) {
             const T value = row[i * voxels.stride];
-            const bool counts = !kFloat || value - value == 0;
+            const bool counts = !kFloat || (value > kLeast && value < kMost);  // finite
             const T low = counts ? value : kMost, high = counts ? value : kLeast;
             least[i] = low < least[i] ? low : least[i];
             most[i] = high > most[i] ? high : most[i];

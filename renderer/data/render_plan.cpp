@@ -145,6 +145,7 @@ RebuildStats RenderPlan::update(const Scene& scene) {
     visible.push_back(int(i));
     bounds.push_back(*plan->bounds);
   }
+  views.reserve(visible.size());
   for (const int i : visible)
     views.push_back(plans[std::size_t(i)]->transfer.view(volume_->channels()[std::size_t(i)]));
   std::optional<Scene> next = scene;
