@@ -23,7 +23,8 @@ def main(out):
                      "--samples", "160", "--set", f"blend.mode={blend}", "--set", f"shading={light}",
                      "--set", f"shadows={light}"], check=True)
         # Debian's openimageio-tools: puts pictures side by side.
-        subprocess.run(["oiiotool", *pictures, "--mosaic:pad=4", "4x2", "--compression", "jpeg:88", "-o", out], check=True)
+        subprocess.run(["oiiotool", *pictures, "--mosaic:pad=4", "4x2", "--nosoftwareattrib", "--compression", "jpeg:88", "-o", out],
+                       check=True)
 
 
 if __name__ == "__main__":
