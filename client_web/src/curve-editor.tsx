@@ -75,7 +75,12 @@ export function CurveEditor({ curve, range, histogram, paint, onChange }: Props)
   const area = `polygon(0 100%, ${corners.map(([x, y]) => `${x}% ${y}%`).join(', ')}, 100% 100%)`;
 
   return (
-    <div class="plot curve" ref={plot} onDblClick={onDoubleClick} title="Double-click adds a point or removes one; with a point chosen, arrows move it, Enter adds, Delete removes">
+    <div
+      class="plot curve"
+      ref={plot}
+      onDblClick={onDoubleClick}
+      title="Double-click adds a point or removes one; with a point chosen, arrows move it, Enter adds, Delete removes"
+    >
       <div class="plot-paint" style={{ background: paint, clipPath: area }} />
       <svg viewBox="0 0 100 100" preserveAspectRatio="none" aria-hidden="true">
         {histogram && <path class="plot-bars" d={histogramPath(histogram, range[0], range[1], 100, 100)} />}

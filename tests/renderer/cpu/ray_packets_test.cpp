@@ -2,6 +2,7 @@
 // Rays that are marched many at a time give the bits of marching one after the other.
 #include "renderer/cpu/ray_packets.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -269,6 +270,35 @@ TEST_P(RayPackets, CountEveryRaysSegmentsForItself) {
   }
   EXPECT_EQ(whole, 3 * 4);  // rows 1, 3 and 5 are between cells of one kind, the last in that of row 6
   EXPECT_EQ(cut, 5 * 4);
+}
+
+TEST_P(RayPackets, CountRaysThatEndInTheirLastSegmentAsWhole) {
+  // Nearly nothing up to a wall, which from ray to ray stands half a step nearer to the eye and in the middle
+  // one is met after as many segments as a ray may have. Single rays look some segments ahead.
+  const glm::ivec3 dims(8, 8, 400);
+  const double spacing = 40, step = 0.01;
+  const double wall = kernel::kMaxSegments * step / spacing - 0.5;  // in voxels; the box begins at -1/2
+  const auto volume =
+      volumeOf(gridOf(dims, {1, 1, spacing}), channelOf<float>(dims, [&](int x, int y, int z) {
+                 return float(z + (x + 8 * y - 32) * step / 2 / spacing);
+               }));
+  Scene scene = frontScene(*volume, 8, 8);
+  scene.method = Method::raymarch;
+  scene.channels[0] = solid(1e6);
+  scene.channels[0].rangeHi = 400;
+  scene.channels[0].opacity = {{0, 1e-12}, {wall / 400, 1e-12}, {wall / 400, 1}, {1, 1}};
+  scene.step = step;
+  scene.filter = PixelFilter::point;
+  ASSERT_TRUE(take(volume, scene));
+  const std::vector<std::uint8_t> none(count());
+  const Picture found = packets(0, none), expected = single(0, none);
+  int whole = 0;
+  for (std::size_t i = 0; i < count(); ++i) {
+    EXPECT_EQ(expected.cost[i].truncated, expected.pixels[i].a < 0.5f) << i;
+    EXPECT_EQ(found.cost[i].truncated, expected.cost[i].truncated) << i;
+    whole += expected.cost[i].truncated == 0;
+  }
+  EXPECT_THAT(whole, testing::AllOf(testing::Gt(8), testing::Lt(56)));
 }
 
 TEST_P(RayPackets, LeaveWhatTheyCannotDoToSingleRays) {
