@@ -367,6 +367,9 @@ class Http(unittest.TestCase):
         paths = self.server.json("GET", "/api/v1/openapi.json")[1]["paths"]
         for path in ("/api/v1/render", "/api/v1/sessions/{id}/frame", "/healthz"):
             self.assertIn(path, paths)
+        for method, path, statuses in (("post", "/api/v1/sessions", {"201"}), ("delete", "/api/v1/sessions/{id}", {"204"}),
+                                       ("get", "/api/v1/sessions/{id}/frame", {"200", "204"})):
+            self.assertEqual(set(paths[path][method]["responses"]) - {"default"}, statuses)
         self.assertIn("properties", self.server.json("GET", "/api/v1/schema.json")[1])
         capabilities = self.server.json("GET", "/api/v1/capabilities")[1]
         self.assertIn("superposed", [method["name"] for method in capabilities["methods"]])
