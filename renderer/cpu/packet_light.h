@@ -37,10 +37,11 @@ SCOLOPAX_SIMD Vec product(const glm::mat3& m, const Vec& v) {
 struct LightQueue {
   int count = 0;
   std::int32_t lane[kLanes];
-  float t[kLanes], offset[kLanes];  ///< place for shadow rays, and their jitter
-  std::int32_t channels[kLanes];    ///< bit n: channel n is in the stratum
+  float mass[kLanes];               ///< of the ray's light
+  float t[kLanes], offset[kLanes];  ///< the place, and the jitter of its shadow rays
+  std::int32_t channels[kLanes];    ///< bit n: channel n is there
   struct Channel {
-    float weight[kLanes], t[kLanes], emission[3][kLanes];
+    float share[kLanes], color[3][kLanes];
   } channel[kernel::kMaxVisibleChannels];
 };
 
@@ -61,7 +62,9 @@ class PacketLight {
       ray_.direction[axis] = permuted(rays_.direction[axis], lane);
     }
     spent_ = noCost();
-    findVisibility(load(queue.t), load(queue.offset));
+    place_ = load(queue.t);
+    point_ = pointAt(place_);
+    findVisibility(load(queue.offset));
     Vec sum = vectors(glm::vec3(0.0f));
     const Int present = load(queue.channels);
     for (int n = 0; n < scene_.channelCount; ++n) {
@@ -69,12 +72,11 @@ class PacketLight {
       const Mask lit = waiting_ & ((present & bit) == bit);
       if (!any(lit)) continue;
       const LightQueue::Channel& channel = queue.channel[n];
-      const Float weight = load(channel.weight), inverse = floats(1.0f) / weight;
-      Vec color;
-      for (int c = 0; c < 3; ++c) color[c] = load(channel.emission[c]) * inverse;
-      const Vec light = lightOf(scene_.channels[n], color, load(channel.t), lit) * weight;
+      const Vec color{{load(channel.color[0]), load(channel.color[1]), load(channel.color[2])}};
+      const Vec light = lightOf(scene_.channels[n], color, lit) * load(channel.share);
       for (int c = 0; c < 3; ++c) sum[c] = select(lit, sum[c] + light[c], sum[c]);
     }
+    sum = sum * load(queue.mass);
     for (int i = 0; i < queue.count; ++i) {
       const int to = queue.lane[i];
       for (int c = 0; c < 3; ++c) colors[c][to] += at(sum[c], i);
@@ -104,13 +106,13 @@ class PacketLight {
     Vec direction;
     Float distance;
   };
-  SCOLOPAX_SIMD Way wayTo(const kernel::LightView& light, const Vec& point, Float t) const {
+  SCOLOPAX_SIMD Way wayTo(const kernel::LightView& light) const {
     if (light.kind == kernel::LightKind::directional)
       return {vectors(light.vector), floats(kernel::kInfinity)};
     if (light.kind == kernel::LightKind::headlight)
-      return {negative(Vec{{ray_.direction[0], ray_.direction[1], ray_.direction[2]}}), t};
+      return {negative(Vec{{ray_.direction[0], ray_.direction[1], ray_.direction[2]}}), place_};
     Vec way;
-    for (int axis = 0; axis < 3; ++axis) way[axis] = floats(light.vector[axis]) - point[axis];
+    for (int axis = 0; axis < 3; ++axis) way[axis] = floats(light.vector[axis]) - point_[axis];
     const Vec world = product(scene_.worldFromVoxel, way);
     const Float distance = squareRoot(dot(world, world)) * floats(scene_.smallestSpacing);
     return {way * (floats(1.0f) / maximum(distance, floats(kernel::kLeastNormal))), distance};
@@ -139,17 +141,16 @@ class PacketLight {
   };
 
   /// kernel::visibilityAt.
-  SCOLOPAX_SIMD void findVisibility(Float t, Float offset) {
+  SCOLOPAX_SIMD void findVisibility(Float offset) {
     const Float one = floats(1.0f);
     share_ = vectors(glm::vec3(1.0f));
     for (int i = 0; i < scene_.lightCount; ++i) seen_[i] = one;
     if constexpr (Features::kShadows) {
-      const Vec point = pointAt(t);
       glm::vec3 all(0.0f);
       Vec sum = vectors(all);
       for (int i = 0; i < scene_.lightCount; ++i) {
-        const Way way = wayTo(scene_.lights[i], point, t);
-        const Rays shadow{{point[0], point[1], point[2]},
+        const Way way = wayTo(scene_.lights[i]);
+        const Rays shadow{{point_[0], point_[1], point_[2]},
                           {way.direction[0], way.direction[1], way.direction[2]}};
         Intervals inside = clipToBox(shadow, scene_.dims);
         inside.exit = minimum(inside.exit, way.distance);
@@ -196,7 +197,7 @@ class PacketLight {
   }
 
   /// kernel::lit.
-  SCOLOPAX_SIMD Vec lightOf(const kernel::ChannelView& channel, const Vec& color, Float t, Mask which) {
+  SCOLOPAX_SIMD Vec lightOf(const kernel::ChannelView& channel, const Vec& color, Mask which) {
     const kernel::MaterialView& material = channel.material;
     const Float one = floats(1.0f), zero = floats(0.0f);
     Vec ambient = vectors(glm::vec3(1.0f));
@@ -206,7 +207,7 @@ class PacketLight {
     const Vec unshaded = color * ambient;
     if constexpr (!Features::kShading) return unshaded;
 
-    const Vec point = pointAt(t), gradient = gradientAt(channel, point, which);
+    const Vec gradient = gradientAt(channel, point_, which);
     const Float largest = maximum(maximum(sizeOf(gradient[0]), sizeOf(gradient[1])), sizeOf(gradient[2]));
     Mask shaded = which & (largest > zero);
     if (!any(shaded)) return unshaded;
@@ -226,7 +227,7 @@ class PacketLight {
       const kernel::LightView& light = scene_.lights[i];
       const Mask reached = seen_[i] > zero;
       if (!any(reached & shaded)) continue;
-      const Vec l = normalize(product(scene_.worldFromVoxel, wayTo(light, point, t).direction));
+      const Vec l = normalize(product(scene_.worldFromVoxel, wayTo(light).direction));
       const Vec h = normalize(l + toViewer);
       const Vec arriving = vectors(light.intensity) * seen_[i];
       const Float lambert = maximum(dot(normal, l), zero);
@@ -247,6 +248,8 @@ class PacketLight {
   std::uint32_t channels_;
   PacketCost* cost_;
   Rays ray_;  // of the strata
+  Float place_;
+  Vec point_;
   Mask waiting_;
   PacketCost spent_;
   Float seen_[kernel::kMaxLights];

@@ -15,6 +15,13 @@ SCOLOPAX_SIMD Float uniformOf(Int k) {
   return minimum((whole + floats(0.5f)) * floats(0x1p-32f), floats(0x1.fffffep-1f));
 }
 
+/// kernel::hashOf.
+SCOLOPAX_SIMD Int hashOf(Int x) {
+  x = (x ^ right<16>(x)) * ints(0x7feb352d);
+  x = (x ^ right<15>(x)) * ints(int(0x846ca68bu));
+  return x ^ right<16>(x);
+}
+
 /// kernel::Sampler, for blocks of which the first three words are wanted; every pixel at a block of its own.
 class PacketSampler {
  public:
@@ -28,6 +35,10 @@ class PacketSampler {
   SCOLOPAX_SIMD Block next(Mask which) {
     const Int block = block_;
     block_ = block_ + onesOf(which);
+    return at(block, which);
+  }
+  /// kernel::Sampler::at.
+  SCOLOPAX_SIMD Block at(Int block, Mask which) const {
     const Mask low = ints(number_.lowDiscrepancy ? int(kernel::kLowDiscrepancyBlocks) : 0) > block;
     const Block random = pcg4d(ints(int(number_.sample)), block);
     if (!any(low & which)) return random;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the rays of a packet absorb, gathered in strata that wait for light until there are as many as lanes.
+// What the rays of a packet absorb, in strata (kernel/strata.h) that wait for light until there are as many
+// as lanes.
 #pragma once
 #include "renderer/cpu/packet_light.h"
 #include "renderer/cpu/packet_sampler.h"
@@ -8,84 +9,152 @@
 namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
 /// kernel::Strata.
+template <class Features>
 class PacketStrata {
  public:
-  SCOLOPAX_SIMD PacketStrata(PacketSampler& sampler, PacketCost* cost) : sampler_(sampler), cost_(cost) {
-    all_.weight = floats(0.0f);
-    all_.t = all_.draw = all_.weight;
-    present_ = y_ = z_ = ints(0);
+  /// `only` >= 0: of that channel alone.
+  SCOLOPAX_SIMD PacketStrata(const kernel::SceneView& scene, const Rays& rays, std::uint32_t channels,
+                             int only, const PacketSampler& sampler, PacketCost* cost)
+      : light_(scene, rays, channels, cost),
+        stratum_(floats(scene.stratum)),
+        perLight_(floats(1.0f / scene.stratum)),
+        block_(ints(std::max(only, 0) * (int(1.0f / scene.stratum) + 1))),
+        sampler_(sampler),
+        cost_(cost) {
+    begin_ = mass_ = next_ = first_ = offset_ = shared_ = place_ = floats(0.0f);
+    index_ = chain_ = kept_ = ints(0);
+    for (float(&row)[kLanes] : colors_) std::fill(std::begin(row), std::end(row), 0.0f);
   }
 
-  SCOLOPAX_SIMD void add(int n, Mask which, Float weight, const Vec& emission, Float t) {
-    const Mask fresh = which & (all_.weight == floats(0.0f));
-    if (any(fresh)) {
-      const PacketSampler::Block random = sampler_.next(fresh);
-      cost_->randomBlocks = cost_->randomBlocks + onesOf(fresh);
-      all_.draw = select(fresh, uniformOf(random.x), all_.draw);
-      y_ = select(fresh, random.y, y_);
-      z_ = select(fresh, random.z, z_);
-      present_ = select(fresh, ints(0), present_);
+  /// Takes what a segment absorbs, [before, after) of the rays' light. `parts` are those of `channels`, whose
+  /// extinctions add up to `extinction`.
+  SCOLOPAX_SIMD void absorb(Float before, Float after, const PacketSegment& segment, Float extinction,
+                            std::uint32_t channels, const Parts* parts) {
+    const Float zero = floats(0.0f);
+    const Int reached = truncated(after * perLight_);
+    for (Mask on = after > before; any(on);) {
+      const Mask full = on & (reached > index_);
+      const Float end = select(full, toFloat(reached) * stratum_, after);
+      mass_ = select(on, end - begin_, mass_);
+      const Float earlier = maximum(before - begin_, zero);
+      const Mask absorbs = on & (mass_ > earlier), fresh = absorbs & (next_ == zero);
+      if (any(fresh)) draw(fresh);
+      const Mask sharing = absorbs & (reached > index_ + ints(1));
+      const Mask moves = without(absorbs, sharing | (mass_ < next_));
+      Float place = select(sharing, shared_ * mass_, floats(-1.0f));
+      if (any(moves)) place = select(moves, largestRecord(moves), place);
+      const Mask here = absorbs & (place >= earlier);
+      if (any(here))
+        keep(here, (place + begin_ - before) / (after - before), segment, extinction, channels, parts);
+      if (!any(full)) return;
+      hand(full & (mass_ > zero));
+      index_ = select(full, reached, index_);
+      begin_ = select(full, end, begin_);
+      next_ = select(full, zero, next_);
+      mass_ = select(full, zero, mass_);
+      on = full & (after > end);
     }
-    Channel& channel = channels_[n];
-    const Int bit = ints(int(1u << n));
-    const Mask begins = without(which, (present_ & bit) == bit);
-    if (any(begins)) {
-      present_ = select(begins, present_ | bit, present_);
-      const Float zero = floats(0.0f), draw = uniformOf(y_ + ints(int(std::uint32_t(n) * 0x9e3779b9u)));
-      channel.place = {select(begins, zero, channel.place.weight), select(begins, draw, channel.place.draw),
-                       select(begins, zero, channel.place.t)};
-      channel.emission = select(begins, vectors(glm::vec3(0.0f)), channel.emission);
-    }
-    channel.emission = select(which, channel.emission + emission, channel.emission);
-    choose(channel.place, which, weight, t);
-    choose(all_, which, weight, t);
   }
 
-  /// Those that have so much weight wait for light, and begin anew.
-  template <class Light>
-  SCOLOPAX_SIMD void hand(Mask which, LightQueue& queue, Light& light, float (*colors)[kLanes]) {
-    for (unsigned left = bitsOf(which); left != 0; left &= left - 1) {
-      if (queue.count == kLanes) light.shine(queue, colors);
-      const int i = std::countr_zero(left), slot = queue.count++;
-      queue.lane[slot] = i;
-      queue.t[slot] = at(all_.t, i);
-      queue.offset[slot] = kernel::uniformOf(std::uint32_t(at(z_, i)));
-      const auto present = std::uint32_t(at(present_, i));
-      queue.channels[slot] = std::int32_t(present);
-      for (std::uint32_t bits = present; bits != 0; bits &= bits - 1) {
-        const int n = std::countr_zero(bits);
-        const Channel& from = channels_[n];
-        LightQueue::Channel& to = queue.channel[n];
-        to.weight[slot] = at(from.place.weight, i);
-        to.t[slot] = at(from.place.t, i);
-        for (int c = 0; c < 3; ++c) to.emission[c][slot] = at(from.emission[c], i);
-      }
-    }
-    all_.weight = select(which, floats(0.0f), all_.weight);
+  /// Of all that was absorbed.
+  SCOLOPAX_SIMD Vec finish() {
+    hand(mass_ > floats(0.0f));
+    if (queue_.count > 0) light_.shine(queue_, colors_);
+    return {{load(colors_[0]), load(colors_[1]), load(colors_[2])}};
   }
-  SCOLOPAX_SIMD Float weight() const { return all_.weight; }
 
  private:
-  struct Place {
-    Float weight, draw, t;
-  };
-  struct Channel {
-    Place place;
-    Vec emission;
-  };
-  SCOLOPAX_SIMD static void choose(Place& place, Mask which, Float weight, Float t) {
-    const Float one = floats(1.0f), sum = place.weight + weight, chance = weight / sum;
-    const Mask here = place.draw < chance;
-    const Float rest = select(here, place.draw / chance, (place.draw - chance) / (one - chance));
-    place.weight = select(which, sum, place.weight);
-    place.t = select(which & here, t, place.t);
-    place.draw = select(which, rest, place.draw);
+  SCOLOPAX_SIMD void draw(Mask which) {
+    const PacketSampler::Block random = sampler_.at(block_ + index_, which);
+    cost_->randomBlocks = cost_->randomBlocks + onesOf(which);
+    first_ = select(which, uniformOf(random.x) * stratum_, first_);
+    chain_ = select(which, random.y, chain_);
+    offset_ = select(which, uniformOf(random.z), offset_);
+    shared_ = select(which, uniformOf(hashOf(random.z)), shared_);
   }
 
-  PacketSampler& sampler_;
+  SCOLOPAX_SIMD Float largestRecord(Mask which) {
+    Float record = first_, next = floats(kernel::kInfinity);
+    Int chain = chain_;
+    for (;;) {
+      const Mask above = which & (record > mass_);
+      if (!any(above)) break;
+      next = select(above, record, next);
+      record = select(above, record * uniformOf(chain), record);
+      chain = select(above, hashOf(chain + ints(int(0x9e3779b9u))), chain);
+    }
+    next_ = select(which, next, next_);
+    return record;
+  }
+
+  SCOLOPAX_SIMD void keep(Mask which, Float part, const PacketSegment& segment, Float extinction,
+                          std::uint32_t channels, const Parts* parts) {
+    Float opacity = floats(0.0f), moment = opacity;
+    kept_ = select(which, ints(0), kept_);
+    for (std::uint32_t left = channels; left != 0; left &= left - 1) {
+      const int n = std::countr_zero(left);
+      const Parts& own = parts[n];
+      opacity = opacity + own.opacity;
+      moment = moment + own.moment;
+      const Mask seen = which & (own.opacity > floats(kernel::kLeastNormal));
+      if (!any(seen)) continue;
+      kept_ = kept_ | where(seen, ints(int(1u << n)));
+      const Float inverse = floats(1.0f) / own.opacity;
+      Channel& channel = channels_[n];
+      channel.share = select(seen, own.opacity / extinction, channel.share);
+      const Vec emission{{own.emission[0], own.emission[1], own.emission[2]}};
+      channel.color = select(seen, emission * inverse, channel.color);
+    }
+    const Float length = segment.end - segment.start;
+    const Float place =
+        segment.start + length * placeOfAbsorption(part, extinction * length, moment / opacity);
+    place_ = select(which, place, place_);
+  }
+
+  /// kernel::placeOfAbsorption.
+  SCOLOPAX_SIMD static Float placeOfAbsorption(Float part, Float depth, Float centre) {
+    const Float one = floats(1.0f);
+    const Float passed = minimum(part * absorbed(depth), floats(0x1.fffffep-1f));
+    const Float share = minimum(opticalDepth(passed) / depth, one);
+    const Float slope = clamp(floats(6.0f) * centre - floats(3.0f), floats(-1.0f), one);
+    const Float rest = one - slope;
+    const Float below = rest + squareRoot(rest * rest + floats(4.0f) * slope * share);
+    return minimum(floats(2.0f) * share / maximum(below, floats(kernel::kLeastNormal)), one);
+  }
+
+  /// These wait for light.
+  SCOLOPAX_SIMD void hand(Mask which) {
+    for (unsigned left = bitsOf(which); left != 0; left &= left - 1) {
+      if (queue_.count == kLanes) light_.shine(queue_, colors_);
+      const int i = std::countr_zero(left), slot = queue_.count++;
+      queue_.lane[slot] = i;
+      queue_.mass[slot] = at(mass_, i);
+      queue_.t[slot] = at(place_, i);
+      queue_.offset[slot] = at(offset_, i);
+      const auto kept = std::uint32_t(at(kept_, i));
+      queue_.channels[slot] = std::int32_t(kept);
+      for (std::uint32_t bits = kept; bits != 0; bits &= bits - 1) {
+        const int n = std::countr_zero(bits);
+        LightQueue::Channel& to = queue_.channel[n];
+        to.share[slot] = at(channels_[n].share, i);
+        for (int c = 0; c < 3; ++c) to.color[c][slot] = at(channels_[n].color[c], i);
+      }
+    }
+  }
+
+  struct Channel {
+    Float share;
+    Vec color;
+  };
+  PacketLight<Features> light_;
+  LightQueue queue_;
+  float colors_[3][kLanes];
+  Float stratum_, perLight_;
+  Int block_;
+  const PacketSampler& sampler_;
   PacketCost* cost_;
-  Place all_;
-  Int present_, y_, z_;
+  Float begin_, mass_, next_, first_, offset_, shared_, place_;
+  Int index_, chain_, kept_;
   Channel channels_[kernel::kMaxVisibleChannels];
 };
 

@@ -71,11 +71,9 @@ class Glow {
 template <class Features>
 class Reflection {
  public:
-  SCOLOPAX_SIMD Reflection(const kernel::SceneView& scene, const Rays& rays, std::uint32_t channels,
-                           PacketSampler& ofStrata, PacketCost* cost)
-      : light_(scene, rays, channels, cost), strata_(ofStrata, cost), scene_(scene) {
-    for (float(&row)[kLanes] : colors_) std::fill(std::begin(row), std::end(row), 0.0f);
-  }
+  SCOLOPAX_SIMD Reflection(const kernel::SceneView& scene, const Rays& rays, std::uint32_t channels, int only,
+                           const PacketSampler& ofStrata, PacketCost* cost)
+      : strata_(scene, rays, channels, only, ofStrata, cost), scene_(scene) {}
 
   SCOLOPAX_SIMD Mask take(const PacketSegment& segment) {
     Float extinction = floats(0.0f);
@@ -86,37 +84,20 @@ class Reflection {
       extinction = extinction + parts_[n].opacity;
     }
     if (!any(extinction > floats(0.0f))) return absorption.lets();
-    const Float length = segment.end - segment.start, scale = absorption.pass(extinction, length);
-    for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
-      const int n = std::countr_zero(left);
-      const Parts& parts = parts_[n];
-      const Float weight = parts.opacity * scale;
-      const Mask seen = weight > floats(kernel::kLeastNormal);
-      if (!any(seen)) continue;
-      const Float t = segment.start + minimum(parts.moment / parts.opacity, floats(1.0f)) * length;
-      const Vec emission{{parts.emission[0], parts.emission[1], parts.emission[2]}};
-      strata_.add(n, seen, weight, emission * scale, t);
-    }
-    const Mask full = strata_.weight() >= floats(scene_.stratum);
-    if (any(full)) strata_.hand(full, queue_, light_, colors_);
+    const Float before = absorption.opacity;
+    absorption.pass(extinction, segment.end - segment.start);
+    strata_.absorb(before, absorption.opacity, segment, extinction, segment.channels, parts_);
     return absorption.lets();
   }
-  SCOLOPAX_SIMD void finish() {
-    strata_.hand(strata_.weight() > floats(0.0f), queue_, light_, colors_);
-    if (queue_.count > 0) light_.shine(queue_, colors_);
-    color = {{load(colors_[0]), load(colors_[1]), load(colors_[2])}};
-  }
+  SCOLOPAX_SIMD void finish() { color = strata_.finish(); }
 
   Vec color;
   Absorption absorption;
 
  private:
-  PacketLight<Features> light_;
+  PacketStrata<Features> strata_;
   Parts parts_[kernel::kMaxVisibleChannels];
-  PacketStrata strata_;
   const kernel::SceneView& scene_;
-  float colors_[3][kLanes];
-  LightQueue queue_;
 };
 
 /// Rays of a packet, their light so far and what they have cost.
@@ -129,10 +110,11 @@ struct Packet {
   PacketCost cost;
 };
 
-/// kernel::marchRay of these channels, added to the packet's.
+/// kernel::marchRay of all channels or of `only` one, added to the packet's.
 template <class Features>
-SCOLOPAX_SIMD void march(const kernel::SceneView& scene, std::uint32_t channels, Float offset,
-                         PacketSampler& ofStrata, Packet& packet) {
+SCOLOPAX_SIMD void march(const kernel::SceneView& scene, int only, Float offset,
+                         const PacketSampler& ofStrata, Packet& packet) {
+  const std::uint32_t channels = only < 0 ? ~0u >> (32 - scene.channelCount) : 1u << only;
   PacketMarch along(scene, packet.rays, packet.inside, channels, offset, scene.step, &packet.cost);
   const auto add = [&](auto& sink) SCOLOPAX_SIMD_ONLY {
     along.follow(sink);
@@ -142,7 +124,7 @@ SCOLOPAX_SIMD void march(const kernel::SceneView& scene, std::uint32_t channels,
     packet.opacity = packet.opacity + (one - packet.opacity) * opacity;
   };
   if constexpr (Features::kAny) {
-    Reflection<Features> reflection(scene, packet.rays, channels, ofStrata, &packet.cost);
+    Reflection<Features> reflection(scene, packet.rays, channels, only, ofStrata, &packet.cost);
     add(reflection);
   } else {
     Glow glow(scene);
@@ -167,7 +149,7 @@ SCOLOPAX_SIMD_ONLY void renderPacket(const Pass& pass, int x, int y, int endX, i
   const Int rows = ints(y) + right<std::countr_zero(unsigned(kPacketWidth))>(laneNumbers());
   const Mask wanted = maskOf(todo);
   PacketSampler sampler(rows * ints(scene.width) + columns, pass.number, scene.seed);
-  PacketSampler ofStrata = sampler.aside();
+  const PacketSampler ofStrata = sampler.aside();
   Float across = floats(0.5f), down = across;
   const PacketSampler::Block jitter = sampler.next(wanted);
   if (scene.filterBox) across = uniformOf(jitter.x), down = uniformOf(jitter.y);
@@ -176,10 +158,9 @@ SCOLOPAX_SIMD_ONLY void renderPacket(const Pass& pass, int x, int y, int endX, i
   packet.inside = clipToBox(packet.rays, scene.dims);
   packet.inside.meets = packet.inside.meets & wanted;
   if (scene.channelCount > 0 && any(packet.inside.meets)) {
-    const std::uint32_t all = ~0u >> (32 - scene.channelCount);
     for (int n = 0; n < (Blend::kSeparate ? scene.channelCount : 1); ++n) {
       const Float offset = uniformOf(sampler.next(packet.inside.meets).x);
-      march<Features>(scene, Blend::kSeparate ? 1u << n : all, offset, ofStrata, packet);
+      march<Features>(scene, Blend::kSeparate ? n : -1, offset, ofStrata, packet);
     }
   }
 

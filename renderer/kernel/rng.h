@@ -34,6 +34,14 @@ SCOLOPAX_HD inline float uniformOf(std::uint32_t k) {
   return u < 0x1.fffffep-1f ? u : 0x1.fffffep-1f;
 }
 
+/// A bijection of 32 bits whose output bits all depend on all input bits (Wellons, "Prospecting for Hash
+/// Functions", 2018: lowbias32).
+SCOLOPAX_HD inline std::uint32_t hashOf(std::uint32_t x) {
+  x ^= x >> 16, x *= 0x7feb352du;
+  x ^= x >> 15, x *= 0x846ca68bu;
+  return x ^ (x >> 16);
+}
+
 /// Blocks of a sample whose words x, y, z come from a Sobol sequence.
 inline constexpr std::uint32_t kLowDiscrepancyBlocks = 3;
 /// Consecutive samples of a pixel that share a scrambling. Between replicates samples are independent, so the
@@ -75,8 +83,9 @@ class Sampler {
   /// Borrows `number`.
   SCOLOPAX_HD Sampler(std::uint32_t pixel, const SampleNumber& number, std::uint32_t seed)
       : number_(number), pixel_(pixel), seed_(seed) {}
-  SCOLOPAX_HD RandomBlock next() {
-    const std::uint32_t block = block_++;
+  SCOLOPAX_HD RandomBlock next() { return at(block_++); }
+  /// Any block, in any order.
+  SCOLOPAX_HD RandomBlock at(std::uint32_t block) const {
     if (!number_.lowDiscrepancy || block >= kLowDiscrepancyBlocks)
       return pcg4d(pixel_, number_.sample, block, seed_);
     // Samples stay below 2^31, so no other draw has this counter.

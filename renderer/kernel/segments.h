@@ -56,7 +56,8 @@ class SegmentWalk {
     enterCell();
   }
 
-  /// Goes on to the next segment that may have extinction; false when there is none. A device's compiler
+  /// Goes on to the next segment that may have extinction; false when there is none: then the segment is one
+  /// where no channel is active. A device's compiler
   /// inlines all of it wherever this is called: once in a kernel for every kind of ray.
   SCOLOPAX_HD bool next() { return ++k_ < count_ || nextRun(); }
 
@@ -134,7 +135,11 @@ class SegmentWalk {
       run_.t[++count_] = end(found_);
       // Where the run begins anew its first point is sampled with the others.
     } while (count_ < (known_ != 0 || kRunSegments == 1 ? kRunSegments : kRunSegments - 1));
-    if (count_ == 0) return false;
+    if (count_ == 0) {
+      run_.active[0] = 0;
+      run_.t[0] = run_.t[1] = inside_.exit;
+      return false;
+    }
     sample();
     return true;
   }
