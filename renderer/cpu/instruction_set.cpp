@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/cpu/instruction_set.h"
 
+#include <cstdlib>
+#include <string_view>
+
 namespace scolopax {
 
 bool available(InstructionSet set) {
@@ -19,8 +22,14 @@ bool available(InstructionSet set) {
 }
 
 InstructionSet fastestInstructionSet() {
-  if (available(InstructionSet::avx512)) return InstructionSet::avx512;
-  return available(InstructionSet::avx2) ? InstructionSet::avx2 : InstructionSet::baseline;
+  static const InstructionSet fastest = [] {
+    const char* text = std::getenv("SCOLOPAX_INSTRUCTIONS");
+    const std::string_view most = text ? text : "";
+    if (most == "baseline") return InstructionSet::baseline;
+    if (most != "avx2" && available(InstructionSet::avx512)) return InstructionSet::avx512;
+    return available(InstructionSet::avx2) ? InstructionSet::avx2 : InstructionSet::baseline;
+  }();
+  return fastest;
 }
 
 }  // namespace scolopax
