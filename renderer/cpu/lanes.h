@@ -68,37 +68,17 @@ SCOLOPAX_SIMD Float exp2Of(Float x) {
   return where(x > floats(-126.0f), p * a * b);
 }
 
-/// kernel::detail::splitExponent of numbers above 0, normal.
-struct Exponent {
-  Float mantissa, exponent;
-};
-SCOLOPAX_SIMD Exponent splitExponent(Float x) {
+/// kernel::log2Of of numbers above 0, normal.
+SCOLOPAX_SIMD Float log2Of(Float x) {
   const Int bits = bitsOf(x);
   const Int exponent = rightSigned<23>(bits - ints(0x3f3504f3));
-  return {floatOf(bits - left<23>(exponent)), toFloat(exponent)};
-}
-/// kernel::detail::log1pReduced.
-SCOLOPAX_SIMD Float log1pReduced(Float f) {
+  const Float f = floatOf(bits - left<23>(exponent)) - floats(1.0f);
   const Float s = f / (floats(2.0f) + f), s2 = s * s;
   const Float series =
       s2 * (floats(0.333333333f) +
             s2 * (floats(0.2f) +
                   s2 * (floats(0.142857143f) + s2 * (floats(0.111111111f) + s2 * floats(0.0909090909f)))));
-  return f - s * (f - floats(2.0f) * series);
-}
-
-/// kernel::log2Of of numbers above 0, normal.
-SCOLOPAX_SIMD Float log2Of(Float x) {
-  const Exponent e = splitExponent(x);
-  return e.exponent + log1pReduced(e.mantissa - floats(1.0f)) * floats(1.44269504f);
-}
-
-/// kernel::opticalDepth.
-SCOLOPAX_SIMD Float opticalDepth(Float u) {
-  const Float one = floats(1.0f), w = one - u, lost = (one - w) - u;
-  const Exponent e = splitExponent(w);
-  const Float correction = lost * (floats(2.0f) - w), low = e.exponent * floats(1.42860682e-6f);
-  return negative(e.exponent * floats(0.693145752f) + (log1pReduced(e.mantissa - one) + (low + correction)));
+  return toFloat(exponent) + (f - s * (f - floats(2.0f) * series)) * floats(1.44269504f);
 }
 
 /// kernel::power of x in [0, 1].

@@ -3,7 +3,7 @@
 #pragma once
 #include "renderer/cpu/packet_march.h"
 #include "renderer/cpu/packet_sampler.h"
-#include "renderer/kernel/shade.h"
+#include "renderer/kernel/strata.h"
 #if defined(__x86_64__)
 
 namespace scolopax::SCOLOPAX_SIMD_SPACE {
@@ -39,6 +39,8 @@ struct LightQueue {
   std::int32_t lane[kLanes];
   float mass[kLanes];               ///< of the ray's light
   float t[kLanes], offset[kLanes];  ///< the place, and the jitter of its shadow rays
+  glm::vec3 radiance[kLanes];       ///< there, without lights
+  glm::vec3 emission[kLanes];       ///< of all of the stratum, without lights
   std::int32_t channels[kLanes];    ///< bit n: channel n is there
   struct Channel {
     float share[kLanes], color[3][kLanes];
@@ -54,7 +56,7 @@ class PacketLight {
                             PacketCost* cost)
       : scene_(scene), rays_(rays), channels_(channels), cost_(cost) {}
 
-  SCOLOPAX_SIMD_ONLY __attribute__((noinline)) void shine(LightQueue& queue, float (*colors)[kLanes]) {
+  SCOLOPAX_SIMD_ONLY __attribute__((noinline)) void shine(LightQueue& queue, glm::vec3* colors) {
     const Int lane = load(queue.lane);
     waiting_ = ints(queue.count) > laneNumbers();
     for (int axis = 0; axis < 3; ++axis) {
@@ -76,15 +78,20 @@ class PacketLight {
       const Vec light = lightOf(scene_.channels[n], color, lit) * load(channel.share);
       for (int c = 0; c < 3; ++c) sum[c] = select(lit, sum[c] + light[c], sum[c]);
     }
-    sum = sum * load(queue.mass);
     for (int i = 0; i < queue.count; ++i) {
       const int to = queue.lane[i];
-      for (int c = 0; c < 3; ++c) colors[c][to] += at(sum[c], i);
+      const glm::vec3 light(at(sum[0], i), at(sum[1], i), at(sum[2], i));
+      sums_[to].add({light, queue.radiance[i], queue.emission[i], queue.mass[i]}, colors[to]);
       addLane(spent_.fetches, i, to, &cost_->fetches);
       addLane(spent_.cellSteps, i, to, &cost_->cellSteps);
       addLane(spent_.truncated, i, to, &cost_->truncated);
     }
     queue.count = 0;
+  }
+
+  /// Of all that has been lit.
+  void finish(glm::vec3* colors) const {
+    for (int i = 0; i < kLanes; ++i) sums_[i].finish(colors[i]);
   }
 
  private:
@@ -247,7 +254,8 @@ class PacketLight {
   const Rays& rays_;
   std::uint32_t channels_;
   PacketCost* cost_;
-  Rays ray_;  // of the strata
+  kernel::StrataSum sums_[kLanes];  // of the rays
+  Rays ray_;                        // of the strata
   Float place_;
   Vec point_;
   Mask waiting_;

@@ -23,44 +23,46 @@ class PacketStrata {
         cost_(cost) {
     begin_ = mass_ = next_ = first_ = offset_ = shared_ = place_ = floats(0.0f);
     index_ = chain_ = kept_ = ints(0);
-    for (float(&row)[kLanes] : colors_) std::fill(std::begin(row), std::end(row), 0.0f);
+    radiance_ = emission_ = vectors(glm::vec3(0.0f));
+    std::fill(std::begin(colors_), std::end(colors_), glm::vec3(0.0f));
   }
 
-  /// Takes what a segment absorbs, [before, after) of the rays' light. `parts` are those of `channels`, whose
-  /// extinctions add up to `extinction`.
+  /// Takes a segment that absorbs [before, after) of the rays' light and without lights would send out
+  /// `emission` of it. `parts` are those of its channels and add up to `extinction`.
   SCOLOPAX_SIMD void absorb(Float before, Float after, const PacketSegment& segment, Float extinction,
-                            std::uint32_t channels, const Parts* parts) {
-    const Float zero = floats(0.0f);
+                            const Vec& emission, const Parts* parts) {
+    const Mask on = after > before;
+    if (!any(on)) return;
+    mass_ = select(on, after - begin_, mass_);
+    emission_ = select(on, emission_ + emission, emission_);
+    const Mask fresh = on & (next_ == floats(0.0f));
+    if (any(fresh)) draw(fresh);
+    const Mask beyond = on & (mass_ > stratum_), moves = without(on, beyond | (mass_ < next_));
+    Float place = select(beyond, shared_ * mass_, floats(-1.0f));
+    if (any(moves)) place = select(moves, largestRecord(moves), place);
+    const Mask here = on & (place >= before - begin_);
+    if (any(here)) keep(here, segment, extinction, parts);
     const Int reached = truncated(after * perLight_);
-    for (Mask on = after > before; any(on);) {
-      const Mask full = on & (reached > index_);
-      const Float end = select(full, toFloat(reached) * stratum_, after);
-      mass_ = select(on, end - begin_, mass_);
-      const Float earlier = maximum(before - begin_, zero);
-      const Mask absorbs = on & (mass_ > earlier), fresh = absorbs & (next_ == zero);
-      if (any(fresh)) draw(fresh);
-      const Mask sharing = absorbs & (reached > index_ + ints(1));
-      const Mask moves = without(absorbs, sharing | (mass_ < next_));
-      Float place = select(sharing, shared_ * mass_, floats(-1.0f));
-      if (any(moves)) place = select(moves, largestRecord(moves), place);
-      const Mask here = absorbs & (place >= earlier);
-      if (any(here))
-        keep(here, (place + begin_ - before) / (after - before), segment, extinction, channels, parts);
-      if (!any(full)) return;
-      hand(full & (mass_ > zero));
-      index_ = select(full, reached, index_);
-      begin_ = select(full, end, begin_);
-      next_ = select(full, zero, next_);
-      mass_ = select(full, zero, mass_);
-      on = full & (after > end);
-    }
+    const Mask full = on & (reached > index_);
+    if (!any(full)) return;
+    hand(full);
+    const Float zero = floats(0.0f);
+    index_ = select(full, reached, index_);
+    begin_ = select(full, after, begin_);
+    next_ = select(full, zero, next_);
+    emission_ = select(full, vectors(glm::vec3(0.0f)), emission_);
+    mass_ = select(full, zero, mass_);
   }
 
   /// Of all that was absorbed.
   SCOLOPAX_SIMD Vec finish() {
     hand(mass_ > floats(0.0f));
     if (queue_.count > 0) light_.shine(queue_, colors_);
-    return {{load(colors_[0]), load(colors_[1]), load(colors_[2])}};
+    light_.finish(colors_);
+    float rows[3][kLanes];
+    for (int i = 0; i < kLanes; ++i)
+      for (int c = 0; c < 3; ++c) rows[c][i] = colors_[i][c];
+    return {{load(rows[0]), load(rows[1]), load(rows[2])}};
   }
 
  private:
@@ -87,11 +89,11 @@ class PacketStrata {
     return record;
   }
 
-  SCOLOPAX_SIMD void keep(Mask which, Float part, const PacketSegment& segment, Float extinction,
-                          std::uint32_t channels, const Parts* parts) {
+  SCOLOPAX_SIMD void keep(Mask which, const PacketSegment& segment, Float extinction, const Parts* parts) {
     Float opacity = floats(0.0f), moment = opacity;
     kept_ = select(which, ints(0), kept_);
-    for (std::uint32_t left = channels; left != 0; left &= left - 1) {
+    radiance_ = select(which, vectors(glm::vec3(0.0f)), radiance_);
+    for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
       const int n = std::countr_zero(left);
       const Parts& own = parts[n];
       opacity = opacity + own.opacity;
@@ -104,22 +106,22 @@ class PacketStrata {
       channel.share = select(seen, own.opacity / extinction, channel.share);
       const Vec emission{{own.emission[0], own.emission[1], own.emission[2]}};
       channel.color = select(seen, emission * inverse, channel.color);
+      radiance_ = select(seen, radiance_ + channel.color * channel.share, radiance_);
     }
     const Float length = segment.end - segment.start;
-    const Float place =
-        segment.start + length * placeOfAbsorption(part, extinction * length, moment / opacity);
+    const Float centre = minimum(moment / opacity, floats(1.0f));
+    const Float place = segment.start + length * placeOfAbsorption(extinction * length, centre);
     place_ = select(which, place, place_);
   }
 
   /// kernel::placeOfAbsorption.
-  SCOLOPAX_SIMD static Float placeOfAbsorption(Float part, Float depth, Float centre) {
-    const Float one = floats(1.0f);
-    const Float passed = minimum(part * absorbed(depth), floats(0x1.fffffep-1f));
-    const Float share = minimum(opticalDepth(passed) / depth, one);
-    const Float slope = clamp(floats(6.0f) * centre - floats(3.0f), floats(-1.0f), one);
-    const Float rest = one - slope;
-    const Float below = rest + squareRoot(rest * rest + floats(4.0f) * slope * share);
-    return minimum(floats(2.0f) * share / maximum(below, floats(kernel::kLeastNormal)), one);
+  SCOLOPAX_SIMD static Float placeOfAbsorption(Float depth, Float centre) {
+    const Float one = floats(1.0f), two = floats(2.0f);
+    const Float thin = centre * (one - depth * floats(0.166666667f));
+    const Mask isThin = depth < floats(0.25f);
+    if (!any(without(everywhere(), isThin))) return thin;
+    const Float alpha = absorbed(depth);
+    return select(isThin, thin, centre * (two / depth - two * (one - alpha) / alpha));
   }
 
   /// These wait for light.
@@ -131,6 +133,10 @@ class PacketStrata {
       queue_.mass[slot] = at(mass_, i);
       queue_.t[slot] = at(place_, i);
       queue_.offset[slot] = at(offset_, i);
+      for (int c = 0; c < 3; ++c) {
+        queue_.radiance[slot][c] = at(radiance_[c], i);
+        queue_.emission[slot][c] = at(emission_[c], i);
+      }
       const auto kept = std::uint32_t(at(kept_, i));
       queue_.channels[slot] = std::int32_t(kept);
       for (std::uint32_t bits = kept; bits != 0; bits &= bits - 1) {
@@ -148,12 +154,13 @@ class PacketStrata {
   };
   PacketLight<Features> light_;
   LightQueue queue_;
-  float colors_[3][kLanes];
+  glm::vec3 colors_[kLanes];
   Float stratum_, perLight_;
   Int block_;
   const PacketSampler& sampler_;
   PacketCost* cost_;
   Float begin_, mass_, next_, first_, offset_, shared_, place_;
+  Vec radiance_, emission_;
   Int index_, chain_, kept_;
   Channel channels_[kernel::kMaxVisibleChannels];
 };

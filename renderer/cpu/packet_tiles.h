@@ -77,16 +77,18 @@ class Reflection {
 
   SCOLOPAX_SIMD Mask take(const PacketSegment& segment) {
     Float extinction = floats(0.0f);
+    Vec emission = vectors(glm::vec3(0.0f));
     for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
       const int n = std::countr_zero(left);
       parts_[n] =
           partsOf<Detail::moment>(scene_.channels[n], segment.from[n], segment.to[n], segment.of(scene_, n));
       extinction = extinction + parts_[n].opacity;
+      for (int c = 0; c < 3; ++c) emission[c] = emission[c] + parts_[n].emission[c];
     }
     if (!any(extinction > floats(0.0f))) return absorption.lets();
     const Float before = absorption.opacity;
-    absorption.pass(extinction, segment.end - segment.start);
-    strata_.absorb(before, absorption.opacity, segment, extinction, segment.channels, parts_);
+    const Float scale = absorption.pass(extinction, segment.end - segment.start);
+    strata_.absorb(before, absorption.opacity, segment, extinction, emission * scale, parts_);
     return absorption.lets();
   }
   SCOLOPAX_SIMD void finish() { color = strata_.finish(); }

@@ -51,7 +51,8 @@ SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval 
       opacity += absorbedHere;
       transmittance *= 1.0f - alpha;
       more = more && transmittance > kOpaqueTransmittance;
-      if constexpr (!Features::kAny) color += emission * (absorbedHere / extinction);
+      emission *= absorbedHere / extinction;
+      if constexpr (!Features::kAny) color += emission;
       if (!ended && opacity > end) {
         ended = true;
         const float pick = (end - before) / absorbedHere;
@@ -62,7 +63,7 @@ SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval 
       continue;
     }
     if constexpr (Features::kAny)
-      strata.absorb(before, opacity, !more, {walk.start(), length, extinction}, parts, color);
+      strata.absorb(before, opacity, !more, {walk.start(), length, extinction}, parts, emission, color);
   }
   return glm::vec4(color, minimum(opacity, 1.0f));
 }

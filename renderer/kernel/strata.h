@@ -38,15 +38,12 @@ struct AbsorbingSegment {
   float start, length, extinction;
 };
 
-/// Where in a segment, in [0,1], the first `part` of what it absorbs is absorbed. Its extinction is taken to
-/// be linear, with its centre at `centre` as far as that can be.
-SCOLOPAX_HD inline float placeOfAbsorption(float part, float depth, float centre) {
-  const float passed = minimum(part * absorbed(depth), 0x1.fffffep-1f);
-  const float share = minimum(opticalDepth(passed) / depth, 1.0f);
-  const float slope = clamp(6.0f * centre - 3.0f, -1.0f, 1.0f);
-  const float rest = 1.0f - slope;
-  const float below = rest + squareRoot(rest * rest + 4.0f * slope * share);
-  return minimum(2.0f * share / maximum(below, kLeastNormal), 1.0f);
+/// Mean place, in [0,1], of what a segment absorbs. `centre` is that of its extinction; the thicker the
+/// segment the further in front: in equal matter the mean is 1 / depth - 1 / (exp(depth) - 1).
+SCOLOPAX_HD inline float placeOfAbsorption(float depth, float centre) {
+  if (depth < 0.25f) return centre * (1.0f - depth * 0.166666667f);
+  const float alpha = absorbed(depth);
+  return centre * (2.0f / depth - 2.0f * (1.0f - alpha) / alpha);
 }
 
 /// The channels at the place where a stratum will be lit; apart from the rest as SegmentRun is.
@@ -55,16 +52,54 @@ struct StratumChannels {
   glm::vec3 color[kMaxVisibleChannels];
 };
 
-/// Lights the strata [j, j + 1) / K of a ray's light, front to back: each at one place that is uniform in
-/// what it absorbs, found with random numbers that depend on the sample and on j alone. Pictures of different
-/// steps so light nearly the same places.
+/// A stratum once its place is lit.
+struct LitStratum {
+  glm::vec3 light;     ///< of a unit of absorbed light at the place
+  glm::vec3 radiance;  ///< the same without lights
+  glm::vec3 emission;  ///< of the whole stratum, without lights
+  float mass;          ///< what it absorbs of the ray's light
+};
+
+/// Sums up a ray's lit strata. What light makes of a stratum's emission is taken to be what it made of a
+/// neighbour's, and the stratum's own place corrects that (a control variate, whose factor must not depend on
+/// the place that it corrects). So the noise is that of the light's changes, not of the emission's.
+class StrataSum {
+ public:
+  SCOLOPAX_HD void add(const LitStratum& lit, glm::vec3& color) {
+    glm::vec3 factor(1.0f);
+    for (int c = 0; c < 3; ++c)  // highlights may be brighter than anything that their matter sends out
+      if (lit.radiance[c] > kLeastNormal) factor[c] = minimum(lit.light[c] / lit.radiance[c], 2.0f);
+    if (count_ == 0) {
+      first_ = lit;  // waits for its neighbour
+    } else {
+      if (count_ == 1) color += corrected(first_, factor);
+      color += corrected(lit, factor_);
+    }
+    factor_ = factor;
+    count_ = count_ < 2 ? count_ + 1 : count_;
+  }
+  SCOLOPAX_HD void finish(glm::vec3& color) const {
+    if (count_ == 1) color += corrected(first_, glm::vec3(1.0f));
+  }
+
+ private:
+  SCOLOPAX_HD static glm::vec3 corrected(const LitStratum& lit, glm::vec3 factor) {
+    return lit.mass * (lit.light - factor * lit.radiance) + factor * lit.emission;
+  }
+  glm::vec3 factor_{1.0f};
+  LitStratum first_{};
+  int count_ = 0;
+};
+
+/// Lights the strata [j, j + 1) / K of a ray's light, front to back, their ends moved to the ends of
+/// segments: each at one place, in a segment that is drawn in proportion to what it absorbs, with random
+/// numbers that depend on the sample and on j alone. Pictures of different steps so light nearly the same
+/// places.
 ///
-/// How much the last stratum of a ray holds is known only at its end, and remembering all that may be lit is
-/// out of the question. So the places of stratum j are the records u1, u1 u2, u1 u2 u3, ... of a unit
-/// interval, u uniform: the largest that is at most m is uniform in [0, m), whatever m is (the records of a
-/// Poisson process are scale-free). As absorption passes a record, the place moves on to it.
-///
-/// Strata that end within one and the same segment share a place: light hardly varies there.
+/// How much a stratum holds is known only at its end, and remembering all that may be lit is out of the
+/// question. So the places of stratum j are the records u1, u1 u2, u1 u2 u3, ... of a unit interval, u
+/// uniform: the largest that is at most m is uniform in [0, m), whatever m is (the records of a Poisson
+/// process are scale-free). As absorption passes a record, the place moves on to it.
 template <class Blend, class Features>
 class Strata {
  public:
@@ -72,29 +107,28 @@ class Strata {
                      const Sampler& sampler, SampleCost* cost)
       : channels_(channels), scene_(scene), ray_(ray), only_(only), sampler_(sampler), cost_(cost) {}
 
-  /// Takes what a segment absorbs, [before, after) of the ray's light; `last` if the ray ends with it. Adds
-  /// the light of the strata that are complete to `color`.
+  /// Takes a segment that absorbs [before, after) of the ray's light and without lights would send out
+  /// `emission` of it; `last` if the ray ends with it. Adds the light of the strata that are complete to
+  /// `color`.
   SCOLOPAX_HD void absorb(float before, float after, bool last, const AbsorbingSegment& segment,
-                          const SegmentParts<Blend>& parts, glm::vec3& color) {
-    const int reached = int(after / scene_.stratum);
-    for (;;) {  // twice at most, for what is left of the segment; in one place, which is compiled once
-      const bool full = reached > index_;
-      const float end = full ? float(reached) * scene_.stratum : after;
-      const float mass = end - begin_, earlier = maximum(before - begin_, 0.0f);
-      if (mass > earlier) {
-        if (next_ == 0.0f) draw();
-        const float place = reached > index_ + 1 ? shared_ * mass
-                            : mass < next_       ? -1.0f
-                                                 : largestRecord(mass);
-        if (place >= earlier) keep((place + begin_ - before) / (after - before), segment, parts);
-      }
-      if (!full && !last) return;
-      if (mass > 0.0f) color += mass * light();
-      index_ = reached;
-      begin_ = end;
-      next_ = 0.0f;
-      if (!(after > end)) return;
+                          const SegmentParts<Blend>& parts, glm::vec3 emission, glm::vec3& color) {
+    const float mass = after - begin_;
+    if (after > before) {
+      emission_ += emission;
+      if (next_ == 0.0f) draw();
+      // Records lie below the ends of strata; the part of a segment beyond is drawn apart.
+      const float place = mass > scene_.stratum ? shared_ * mass : mass < next_ ? -1.0f : largestRecord(mass);
+      if (place >= before - begin_) keep(segment, parts);
     }
+    const int reached = int(after / scene_.stratum);
+    if (reached > index_ || last) {
+      if (mass > 0.0f) sum_.add({light(), radiance_, emission_, mass}, color);
+      index_ = reached;
+      begin_ = after;
+      next_ = 0.0f;
+      emission_ = glm::vec3(0.0f);
+    }
+    if (last) sum_.finish(color);
   }
 
  private:
@@ -122,9 +156,10 @@ class Strata {
     return record;
   }
 
-  SCOLOPAX_HD void keep(float part, const AbsorbingSegment& segment, const SegmentParts<Blend>& parts) {
+  SCOLOPAX_HD void keep(const AbsorbingSegment& segment, const SegmentParts<Blend>& parts) {
     float opacity = 0.0f, moment = 0.0f;
     kept_ = 0;
+    radiance_ = glm::vec3(0.0f);
     parts.visit([&](int n, const Part& own) {
       opacity += own.opacity;
       moment += own.moment;
@@ -132,9 +167,10 @@ class Strata {
       kept_ |= 1u << n;
       channels_.share[n] = own.opacity / segment.extinction;
       channels_.color[n] = own.emission * (1.0f / own.opacity);
+      radiance_ += channels_.share[n] * channels_.color[n];
     });
-    place_ = segment.start +
-             segment.length * placeOfAbsorption(part, segment.extinction * segment.length, moment / opacity);
+    place_ = segment.start + segment.length * placeOfAbsorption(segment.extinction * segment.length,
+                                                                minimum(moment / opacity, 1.0f));
   }
 
   /// Of a unit of absorbed light at the place that is kept.
@@ -165,6 +201,9 @@ class Strata {
   std::uint32_t chain_ = 0;
   float place_ = 0.0f;  // world units along the ray
   std::uint32_t kept_ = 0;
+  glm::vec3 radiance_{0.0f};  // there, without lights
+  glm::vec3 emission_{0.0f};  // of all of the stratum, without lights
+  StrataSum sum_;
 };
 
 }  // namespace scolopax::kernel
