@@ -15,6 +15,7 @@ class CellScalar {
   CellScalar(const std::array<double, 8>& corners, const glm::dvec3& begin, const glm::dvec3& end);
 
   double operator()(double u) const;
+  const std::array<double, 4>& coefficients() const { return b_; }
   /// Bounds over [0,1].
   double lower() const;
   double upper() const;

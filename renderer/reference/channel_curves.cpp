@@ -78,6 +78,8 @@ ChannelCurves::ChannelCurves(const ChannelAppearance& appearance)
       piece.colorEnd = piece.colorBegin;
     }
     visible_ = visible_ || piece.extinctionBegin > 0 || piece.extinctionEnd > 0;
+    for (const glm::dvec3& c : {piece.colorBegin, piece.colorEnd})
+      brightest_ = std::max({brightest_, c.x, c.y, c.z});
     pieces_.push_back(piece);
     breakpoints_.push_back(lo_ + std::pow(piece.begin, 1 / gamma_) * (hi_ - lo_));
   }

@@ -33,6 +33,8 @@ class ChannelCurves {
   ChannelSample sample(std::size_t piece, double position) const;
   /// False when no scalar whatever has an extinction above 0.
   bool visible() const { return visible_; }
+  /// Largest component of any colour.
+  double brightest() const { return brightest_; }
 
  private:
   struct Piece {
@@ -42,6 +44,7 @@ class ChannelCurves {
   };
   double lo_, hi_, gamma_;
   bool visible_ = false;
+  double brightest_ = 0;
   std::vector<Piece> pieces_;  // the last one is the single position 1
   std::vector<double> breakpoints_;
 };

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <string>
+#include <unordered_map>
 
 #include "renderer/core/error.h"
 #include "renderer/reference/gauss_rule.h"
@@ -14,7 +15,7 @@
 namespace scolopax::reference {
 namespace {
 
-constexpr double kMaxPieceDepth = 4;  // a piece of the ray thicker than this is bisected unseen
+constexpr double kShadowError = 0.02;  // of the tolerance, in what arrives from a light
 
 /// What blending makes of the channels at a point.
 struct Blended {
@@ -51,24 +52,9 @@ Blended blended(BlendMode mode, const Stretch& stretch, const ChannelSample* sam
   return result;
 }
 
-double largest(const glm::dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
-
 bool isFinite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 }  // namespace
-
-/// What a point of the ray does to the light on its way.
-struct Integrator::Medium {
-  double extinction = 0;   // per world unit
-  glm::dvec3 emission{0};  // extinction times radiance
-};
-
-/// Light that a piece of the ray adds as seen from its beginning, and how thick it is.
-struct Integrator::PieceLight {
-  glm::dvec3 color{0};
-  double opticalDepth = 0;
-  glm::dvec3 meanColor{0};  // without regard to what is in front of what
-};
 
 /// The ray so far, from the front.
 struct Integrator::Path {
@@ -91,11 +77,12 @@ Integrator::Integrator(const Volume& volume, const Scene& scene, double toleranc
       worldFromVoxel_(volume.grid().worldFromVoxel),
       voxelFromWorld_(glm::inverse(worldFromVoxel_)),
       voxelZero_(volume.grid().worldFromVoxel[3]),
-      lighting_(scene, voxelZero_) {
+      lighting_(scene, voxelZero_),
+      lightCuts_(lighting_, worldFromVoxel_, 1e-2 * tolerance) {
   if (scene.channels.size() != volume.channels().size())
     throw Error(ErrorCode::badInput, "reference: the scene has " + std::to_string(scene.channels.size()) +
                                          " channels, the volume " + std::to_string(volume.channels().size()));
-  // Jumps inside a piece need a floor that bisection reaches soon when every point costs a ray.
+  // Edges of shadows need a floor that bisection reaches soon when every point costs a ray.
   floor_ = lighting_.any() ? 1e-2 : 1e-9;
   opaqueDepth_ = lighting_.any() ? 5 - std::log(tolerance) : 27.7;
   const glm::dvec3 spacing = volume.grid().spacing();
@@ -107,6 +94,9 @@ Integrator::Integrator(const Volume& volume, const Scene& scene, double toleranc
       throw Error(ErrorCode::badInput, "reference: a weight must be finite and not negative");
     ChannelCurves curves(appearance);
     if (!curves.visible()) continue;
+    const double radiance = lighting_.brightest(appearance.material, curves.brightest());
+    brightest_ =
+        blend_ == BlendMode::mix ? brightest_ + appearance.weight * radiance : std::max(brightest_, radiance);
     channels_.push_back({ScalarField(volume.channels()[n], dims_), std::move(curves), appearance.weight,
                          appearance.gamma != 1, appearance.material,
                          std::abs(appearance.rangeHi - appearance.rangeLo)});
@@ -137,66 +127,53 @@ Integrator::Path Integrator::follow(const Ray& ray, Channels channels) const {
   Path path;
   forEachSmoothPart(cells, dims_, blend_, channels, [&](const Stretch& stretch, double begin, double end) {
     const auto medium = [&](double u) { return mediumAt(ray, channels, stretch, u); };
-    if (lighting_.any())
-      integrate<4, 2>(medium, stretch.length, begin, end, path);
-    else
-      integrate<8, 4>(medium, stretch.length, begin, end, path);
+    if (lighting_.any()) {
+      const std::vector<double> cuts = lightCuts_.of(stretch, begin, end, ray.direction);
+      for (std::size_t k = 0; k + 1 < cuts.size(); ++k) {
+        // A step away from the cuts, and every point once: it may cost rays.
+        const double step = 1e-9 * (cuts[k + 1] - cuts[k]);
+        std::unordered_map<double, Medium> known;
+        const auto inside = [&](double u) {
+          const auto [place, isNew] = known.try_emplace(u);
+          if (isNew) place->second = medium(std::clamp(u, cuts[k] + step, cuts[k + 1] - step));
+          return place->second;
+        };
+        integrate(roughPiece, inside, stretch.length, cuts[k], cuts[k + 1], path);
+      }
+    } else {
+      integrate(smoothPiece, medium, stretch.length, begin, end, path);
+    }
     return path.opticalDepth <= opaqueDepth_;
   });
-  if (path.opticalDepth > opaqueDepth_) path.error += std::exp(-path.opticalDepth);  // what is hidden
+  if (path.opticalDepth > opaqueDepth_)  // what is hidden
+    path.error += std::exp(-path.opticalDepth) * std::max(1.0, brightest_);
+  if (lighting_.shadows())
+    path.error -= kShadowError * tolerance_ * brightest_ * std::expm1(-path.opticalDepth);
   return path;
 }
 
 /// Adds the part [begin, end] of a stretch.
-template <int kFine, int kCoarse, class MediumAt>
-void Integrator::integrate(const MediumAt& medium, double length, double begin, double end,
-                           Path& path) const {
+void Integrator::integrate(const Rule& rule, const MediumAt& mediumAt, double stretchLength, double begin,
+                           double end, Path& path) const {
   if (path.opticalDepth > opaqueDepth_) return;
-  PieceLight fine = lightOf<kFine>(medium, length, begin, end);
-  if (fine.opticalDepth == 0) return;
-  const double alpha = -std::expm1(-fine.opticalDepth);
-  if (fine.opticalDepth <= kMaxPieceDepth) {
-    const PieceLight coarse = lightOf<kCoarse>(medium, length, begin, end);
-    const double error =
-        std::max(largest(fine.color - coarse.color), std::abs(fine.opticalDepth - coarse.opticalDepth));
-    if (error <= tolerance_ * alpha || error * std::exp(-path.opticalDepth) <= tolerance_ * floor_)
-      return path.add(fine, error);
-  }
   const double middle = 0.5 * (begin + end);
+  PieceEstimate piece = rule([&](double w) { return mediumAt(w == 0.5 ? middle : std::lerp(begin, end, w)); },
+                             (end - begin) * stretchLength);
+  if (piece.light.opticalDepth == 0) return;
+  const double alpha = -std::expm1(-piece.light.opticalDepth);
+  if (piece.light.opticalDepth <= kMaxPieceDepth &&
+      (piece.error <= tolerance_ * alpha ||
+       piece.error * std::exp(-path.opticalDepth) <= tolerance_ * floor_))
+    return path.add(piece.light, piece.error);
   if (middle <= begin || middle >= end) {  // no number in between: what is left is a surface
-    fine.color = fine.meanColor * alpha;
-    const PieceLight coarse = lightOf<kCoarse>(medium, length, begin, end);
-    return path.add(fine, alpha * largest(fine.meanColor - coarse.meanColor));
+    piece.light.color = piece.light.meanColor * alpha;
+    return path.add(piece.light, alpha * piece.meanError);
   }
-  integrate<kFine, kCoarse>(medium, length, begin, middle, path);
-  integrate<kFine, kCoarse>(medium, length, middle, end, path);
+  integrate(rule, mediumAt, stretchLength, begin, middle, path);
+  integrate(rule, mediumAt, stretchLength, middle, end, path);
 }
 
-template <int N, class MediumAt>
-Integrator::PieceLight Integrator::lightOf(const MediumAt& mediumAt, double stretchLength, double begin,
-                                           double end) {
-  static const GaussRule<N> rule;
-  const double length = (end - begin) * stretchLength;
-  std::array<Medium, N> medium;
-  PieceLight light;
-  for (std::size_t i = 0; i < N; ++i) {
-    medium[i] = mediumAt(begin + rule.node[i] * (end - begin));
-    light.opticalDepth += length * rule.weight[i] * medium[i].extinction;
-    light.meanColor += rule.weight[i] * medium[i].emission;
-  }
-  if (light.opticalDepth == 0) return light;
-  light.meanColor *= length / light.opticalDepth;
-  if (!(light.opticalDepth <= kMaxPieceDepth)) return light;  // will not be used
-  for (std::size_t i = 0; i < N; ++i) {
-    double depth = 0;
-    for (std::size_t j = 0; j < N; ++j) depth += rule.toNode[i][j] * medium[j].extinction;
-    light.color += length * rule.weight[i] * std::exp(-depth * length) * medium[i].emission;
-  }
-  return light;
-}
-
-Integrator::Medium Integrator::mediumAt(const Ray& ray, Channels channels, const Stretch& stretch,
-                                        double u) const {
+Medium Integrator::mediumAt(const Ray& ray, Channels channels, const Stretch& stretch, double u) const {
   ChannelSample samples[kMaxChannels];
   for (std::size_t n = 0; n < stretch.channels.size(); ++n) samples[n] = stretch.channels[n].at(u);
   const Blended blend = blended(blend_, stretch, samples);
@@ -229,18 +206,20 @@ Integrator::Medium Integrator::mediumAt(const Ray& ray, Channels channels, const
 double Integrator::transmittance(const glm::dvec3& pointVoxel, const glm::dvec3& direction, double distance,
                                  Channels channels) const {
   if (!(distance > 0)) return 1;
+  const RayCells cells = cutAtCells(pointVoxel, voxelFromWorld_ * direction, dims_, distance);
+  // Of kShadowError the darkness takes a third, and the cells of the way, or all of its depth, another each.
+  const double dark = -std::log(kShadowError / 3 * tolerance_);
+  const double allowed = kShadowError / 3 * tolerance_ / double(std::max<std::size_t>(cells.cuts.size(), 1));
   double depth = 0;
-  const double dark = 3 - std::log(tolerance_);  // no light that counts
-  forEachSmoothPart(cutAtCells(pointVoxel, voxelFromWorld_ * direction, dims_, distance), dims_, blend_,
-                    channels, [&](const Stretch& stretch, double begin, double end) {
-                      depth += opticalDepth(stretch, begin, end);
-                      return depth <= dark;
-                    });
+  forEachSmoothPart(cells, dims_, blend_, channels, [&](const Stretch& stretch, double begin, double end) {
+    depth += opticalDepth(stretch, begin, end, allowed * (end - begin));
+    return depth <= dark;
+  });
   return depth <= dark ? std::exp(-depth) : 0.0;
 }
 
 /// Of a part of a stretch.
-double Integrator::opticalDepth(const Stretch& stretch, double begin, double end) const {
+double Integrator::opticalDepth(const Stretch& stretch, double begin, double end, double allowed) const {
   const auto rule = [&]<int N>(const GaussRule<N>& gauss) {
     ChannelSample samples[kMaxChannels];
     double sum = 0;
@@ -257,11 +236,11 @@ double Integrator::opticalDepth(const Stretch& stretch, double begin, double end
   const auto bent = [](const ChannelInCell& channel) { return channel.channel->bent; };
   if (std::none_of(stretch.channels.begin(), stretch.channels.end(), bent))
     return coarse;  // of a cubic: exact
-  const double fine = rule(four), middle = 0.5 * (begin + end);
-  // A ray has some hundred parts, and a relative error counts at most depth x exp(-depth) times.
-  if (std::abs(fine - coarse) <= tolerance_ * std::max(1e-3, 1e-2 * fine) || middle <= begin || middle >= end)
+  const double fine = rule(four), middle = 0.5 * (begin + end), error = std::abs(fine - coarse);
+  // A relative error counts depth x exp(-depth) times, which is less than 1.
+  if (error <= allowed || error <= kShadowError / 3 * tolerance_ * fine || middle <= begin || middle >= end)
     return fine;
-  return opticalDepth(stretch, begin, middle) + opticalDepth(stretch, middle, end);
+  return opticalDepth(stretch, begin, middle, allowed / 2) + opticalDepth(stretch, middle, end, allowed / 2);
 }
 
 RayResult traceReference(const Volume& volume, const Scene& scene, const glm::dvec3& originWorld,

@@ -10,14 +10,19 @@
 
 #include "renderer/data/scene.h"
 #include "renderer/data/volume.h"
+#include "renderer/reference/light_cuts.h"
 #include "renderer/reference/lighting.h"
+#include "renderer/reference/piece_rules.h"
 #include "renderer/reference/stretch.h"
 
 namespace scolopax::reference {
 
 struct RayResult {
   glm::dvec4 rgba{0};  ///< linear, premultiplied; alpha = 1 - transmittance
-  double error = 0;    ///< estimated bound of the absolute error of each component
+  /// Estimated bound of the absolute error of each component: by how much rules differ in the pieces of the
+  /// ray, and what is cut off behind thick matter and in deep shadow. Missed can be shadows, and gaps of
+  /// light, narrower than a fifth of a piece, which is at most a voxel's.
+  double error = 0;
 };
 
 /// Light along rays: C = integral of T sigma L dt, T = exp(-integral of sigma dt), over t >= 0 inside the
@@ -30,8 +35,10 @@ struct RayResult {
 /// extinction passes from one channel to another. Without light, no feature is narrower than the pieces that
 /// are left, and each is bisected until two Gauss rules agree.
 ///
-/// With light, radiance is not smooth within the pieces, and costs a ray to every light: rules of lower
-/// order, a looser tolerance, and optical depths of shadow rays to a tenth of it.
+/// With shading it is cut as well where a normal flips, n.l or n.h passes zero or a fade saturates, and
+/// wherever a highlight would be narrower than a piece (LightCuts). Edges of shadows are left to bisection,
+/// by rules that see a jump wherever in a piece it lies (roughPiece). A point may cost a ray to every light:
+/// the tolerance is looser.
 class Integrator {
  public:
   static constexpr double kTolerance = 1e-7, kToleranceLit = 1e-4;
@@ -39,8 +46,8 @@ class Integrator {
   /// Keeps a reference to `volume`. Throws Error(badInput) for a scene that does not fit it.
   Integrator(const Volume& volume, const Scene& scene)
       : Integrator(volume, scene, scene.shading || scene.shadows ? kToleranceLit : kTolerance) {}
-  /// `tolerance` is relative to the alpha that a stretch of the ray adds, and so bounds the absolute error of
-  /// the whole; for lights whose intensities add up to about 1.
+  /// A piece may err, absolutely and however bright the light, by `tolerance` times the alpha that it adds;
+  /// or, so that bisection ends at jumps, by a hundredth of `tolerance` with light, 1e-9 of it without.
   Integrator(const Volume& volume, const Scene& scene, double tolerance);
 
   /// `direction` need not have length 1. Throws Error(badInput) when it is 0 or anything is not finite.
@@ -52,28 +59,27 @@ class Integrator {
   struct Ray {
     glm::dvec3 origin, direction;
   };
-  struct Medium;
-  struct PieceLight;
   struct Path;
   Path follow(const Ray& ray, Channels channels) const;
-  template <int kFine, int kCoarse, class MediumAt>
-  void integrate(const MediumAt& mediumAt, double length, double begin, double end, Path& path) const;
-  template <int N, class MediumAt>
-  static PieceLight lightOf(const MediumAt& mediumAt, double length, double begin, double end);
+  using Rule = PieceEstimate(const MediumAt&, double length);
+  void integrate(const Rule& rule, const MediumAt& mediumAt, double stretchLength, double begin, double end,
+                 Path& path) const;
   Medium mediumAt(const Ray& ray, Channels channels, const Stretch& stretch, double u) const;
   double transmittance(const glm::dvec3& pointVoxel, const glm::dvec3& direction, double distance,
                        Channels channels) const;
-  double opticalDepth(const Stretch& stretch, double begin, double end) const;
+  double opticalDepth(const Stretch& stretch, double begin, double end, double allowed) const;
 
   glm::ivec3 dims_;
   BlendMode blend_;
   double tolerance_;
-  double floor_;        // of the tolerance: absolute error that a piece may always have
-  double opaqueDepth_;  // what lies behind this optical depth is not looked at
+  double floor_;          // of the tolerance: absolute error that a piece may always have
+  double brightest_ = 0;  // no radiance is larger
+  double opaqueDepth_;    // what lies behind this optical depth is not looked at
   glm::dmat3 worldFromVoxel_, voxelFromWorld_;
   double smallestSpacing_;
   glm::dvec3 voxelZero_;  // world position of voxel (0,0,0)
   Lighting lighting_;
+  LightCuts lightCuts_;
   std::vector<ActiveChannel> channels_;
 };
 

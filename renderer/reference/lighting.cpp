@@ -83,7 +83,8 @@ glm::dvec3 Lighting::radiance(const Material& material, const glm::dvec3& color,
   const double g = shading_ ? std::min(1.0, steepness) : 0.0;
   const double s = 1 - (1 - g) * (1 - g);
   glm::dvec3 normal = unit(gradient);
-  if (glm::dot(normal, toViewer) < 0) normal = -normal;
+  // Of a normal across the view, but for rounding, neither side is the viewer's; one choice for all of a ray.
+  if (glm::dot(normal, toViewer) < -1e-12) normal = -normal;
   glm::dvec3 diffuse(0), specular(0);
   for (const ArrivingLight& light : lights) {
     const glm::dvec3 reaching = light.intensity * light.visibility;
@@ -93,6 +94,14 @@ glm::dvec3 Lighting::radiance(const Material& material, const glm::dvec3& color,
   }
   return color * ((1 - s) * unshaded + s * (material.ambient + material.diffuse * diffuse)) +
          s * material.specular * specular;
+}
+
+double Lighting::brightest(const Material& m, double color) const {
+  if (!any()) return color;
+  glm::dvec3 all(0);
+  for (const Light& light : lights_) all += light.color * light.intensity;
+  const double light = shading_ ? std::max({all.x, all.y, all.z}) : 0;
+  return color * std::max(1.0, m.ambient + m.diffuse * light) + m.specular * light;
 }
 
 }  // namespace scolopax::reference

@@ -27,6 +27,8 @@ class Lighting {
   bool any() const { return shading_ || shadows_; }
   bool shadows() const { return shadows_; }
   bool shading() const { return shading_; }
+  /// At least one.
+  const std::vector<Light>& lights() const { return lights_; }
 
   /// All lights at `point` on a ray that begins at `eye`, all of them visible.
   std::vector<ArrivingLight> arriving(const glm::dvec3& point, const glm::dvec3& eye) const;
@@ -35,6 +37,8 @@ class Lighting {
   glm::dvec3 radiance(const Material& material, const glm::dvec3& color, const glm::dvec3& gradient,
                       double steepness, const glm::dvec3& toViewer,
                       std::span<const ArrivingLight> lights) const;
+  /// No component of radiance is larger, where none of emission is larger than `color`.
+  double brightest(const Material& material, double color) const;
 
  private:
   bool shading_, shadows_;

@@ -14,6 +14,7 @@ class ScalarField {
   /// Keeps a pointer to `channel`, whose grid has `dims` voxels.
   ScalarField(const Channel& channel, const glm::ivec3& dims) : channel_(&channel), dims_(dims) {}
 
+  const glm::ivec3& dims() const { return dims_; }
   /// The eight voxels at the corners of the cell that begins at voxel `cell`, x fastest (where there is one
   /// layer only, twice the same); none when one of them is not finite.
   std::optional<std::array<double, 8>> corners(const glm::ivec3& cell) const;
