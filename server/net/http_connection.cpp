@@ -207,6 +207,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
       std::optional<Response> refused = authorize(request);
       if (refused) co_return co_await write(std::move(*refused), keepAlive_);
     }
+    if (!core_.options.knows || core_.options.knows(request)) core_.trust(this);
     if (boost::beast::websocket::is_upgrade(parser.get())) co_return co_await upgrade(parser, request);
 
     RouteMatch match = core_.router.find(request.method, request.path);
@@ -287,7 +288,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
   awaitable<Response> handle(const Route& route, Request& request) {
     if (route.kind == RouteKind::quick) {
-      co_return co_await runOn<Response>(core_.workers,
+      co_return co_await runOn<Response>(core_.workersFor(request.body.size()),
                                          [&] { return core_.guarded(route.handler, request); });
     }
     const SlowSlot slot(core_);
