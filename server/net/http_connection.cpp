@@ -97,7 +97,7 @@ class ClientWatch {
   }
   ClientWatch(const ClientWatch&) = delete;
   ClientWatch& operator=(const ClientWatch&) = delete;
-  std::shared_ptr<const std::atomic<bool>> gone() const { return {state_, &state_->gone}; }
+  std::stop_token gone() const { return state_->gone.get_token(); }
 
  private:
   struct State {
@@ -107,14 +107,16 @@ class ClientWatch {
       state->timer.async_wait([state](const error_code&) {
         if (!state->alive) return;
         pollfd asked{state->socket.native_handle(), POLLRDHUP, 0};
-        state->gone = poll(&asked, 1, 0) > 0;
-        if (!state->gone) wait(state);
+        if (poll(&asked, 1, 0) > 0)
+          state->gone.request_stop();
+        else
+          wait(state);
       });
     }
     tcp::socket& socket;
     asio::steady_timer timer;
     bool alive = true;
-    std::atomic<bool> gone{false};
+    std::stop_source gone;
   };
   std::shared_ptr<State> state_;
 };

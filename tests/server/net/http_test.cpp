@@ -461,8 +461,8 @@ TEST_F(HttpTest, TellsALongRequestThatItsClientHasGone) {
       "POST", "/long",
       [&](const Request& request) {
         ++running;
-        eventually([&] { return release || *request.gone; });
-        if (*request.gone) ++gone;
+        eventually([&] { return release || request.gone.stop_requested(); });
+        if (request.gone.stop_requested()) ++gone;
         return Response{};
       },
       RouteKind::slow);
