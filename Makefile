@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # make run     build everything, make the demo data if DATA names none, serve it on loopback
-# make test    build and run the tests; make check adds sanitizers, clang-tidy, fuzzing and four times the samples
-#              in the statistical tests
+# make test    build and run the tests; make check adds sanitizers, clang-tidy, fuzzing, hostile clients with large
+#              volumes and four times the samples in the statistical tests
 DATA ?=
 PORT ?= 8080
 JOBS ?= $(shell nproc)
@@ -33,15 +33,16 @@ web: deps
 test: test-deps web
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null
 	cmake --build --preset release -j $(JOBS)
-	$(CTEST) --test-dir build/release --output-on-failure
+	$(CTEST) --test-dir build/release -LE hostile --output-on-failure
 
 check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
+	$(CTEST) --test-dir build/release -L hostile --output-on-failure
 	SCOLOPAX_STATISTICS=4 $(CTEST) --test-dir build/release -L statistics --output-on-failure
 
 check-asan-ubsan: test-deps
 	cmake --preset asan-ubsan > /dev/null
 	cmake --build --preset asan-ubsan -j $(JOBS)
-	$(CTEST) --test-dir build/asan-ubsan -j $(JOBS) -LE 'web|statistics' --output-on-failure
+	$(CTEST) --test-dir build/asan-ubsan -j $(JOBS) -LE 'web|statistics|hostile' --output-on-failure
 	$(CTEST) --test-dir build/asan-ubsan -L hard --output-on-failure
 
 # The server's threads, with renderers that tests make up: those of the true ones are TBB's, which is not instrumented.

@@ -25,7 +25,7 @@ std::string Path::pointer() const {
   if (parent_ == nullptr) return "";
   std::string text = parent_->pointer() + '/';
   if (index_) return text + std::to_string(*index_);
-  for (const char c : key_) {
+  for (const char c : shortened(key_)) {
     if (c == '~')
       text += "~0";
     else if (c == '/')

@@ -6,8 +6,10 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <stop_token>
 #include <string_view>
 
+#include "renderer/core/memory_budget.h"
 #include "renderer/data/aov.h"
 #include "renderer/data/image.h"
 #include "renderer/data/scene.h"
@@ -45,13 +47,23 @@ class Renderer {
  public:
   virtual ~Renderer() = default;
   virtual std::string_view backendName() const = 0;
-  /// Takes a new scene and redoes what it makes stale. Throws Error(badInput) for a scene that does not fit.
-  virtual RebuildStats setScene(const Scene& scene) = 0;
-  /// Adds one sample to every pixel. Returns false, with the film unchanged, when `cancel` became true or the
-  /// budget of time was used up; both are looked at every few
-  /// pixels. The next call goes on where this one
-  /// stopped, unless a new scene came in between.
-  virtual bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget = kNoBudget) = 0;
+  /// Takes a new scene and redoes what it makes stale. Throws Error(badInput) for a scene that does not fit,
+  /// and Error(cancelled) once `stop` is requested, unless it is nearly done; both leave all as it was.
+  virtual RebuildStats setScene(const Scene& scene, std::stop_token stop = {}) = 0;
+  /// Whether setScene would keep the caller for longer than a few milliseconds.
+  virtual bool takesLong(const Scene& scene) const = 0;
+  /// Renders one sample of every pixel. Returns false when `cancel` became true or the budget of time was
+  /// used up; both are looked at every few pixels. The next call goes on where this one stopped, unless a new
+  /// scene came in between. The film is unchanged until addPixels.
+  virtual bool renderPixels(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget = kNoBudget) = 0;
+  /// Adds the sample to the film; once, after renderPixels has returned true.
+  virtual void addPixels() = 0;
+  /// Both of them.
+  bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget = kNoBudget) {
+    if (!renderPixels(cancel, budget)) return false;
+    addPixels();
+    return true;
+  }
   static constexpr std::chrono::nanoseconds kNoBudget = std::chrono::hours(24 * 365);
   virtual Choice choice() const = 0;
   /// Samples per pixel in the film.
@@ -72,6 +84,8 @@ class Renderer {
 };
 
 /// `threads` 0 means all. Same scene, seed and sample count give the same bits for any number of threads.
-std::unique_ptr<Renderer> makeCpuRenderer(std::shared_ptr<const Volume> volume, int threads);
+/// What it takes of memory is of `memory`, if that is given; setScene and recordAovs throw what it throws.
+std::unique_ptr<Renderer> makeCpuRenderer(std::shared_ptr<const Volume> volume, int threads,
+                                          std::shared_ptr<MemoryBudget> memory = nullptr);
 
 }  // namespace scolopax

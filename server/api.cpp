@@ -52,22 +52,6 @@ double qualityOf(std::string_view accept, std::string_view mediaType) {
   return quality;
 }
 
-int statusOf(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::badInput:
-    case ErrorCode::unsupported:
-      return 422;
-    case ErrorCode::notFound:
-      return 404;
-    case ErrorCode::tooLarge:
-      return 422;
-    case ErrorCode::io:
-    case ErrorCode::device:
-      return 500;
-  }
-  return 500;
-}
-
 /// Every handler runs in this: what it throws becomes a problem, and the cause of a 500 goes to the log
 /// alone.
 net::Handler guarded(const ApiContext& context, const net::Handler& handler) {
@@ -78,7 +62,7 @@ net::Handler guarded(const ApiContext& context, const net::Handler& handler) {
       return errorResponse(error);
     } catch (const Error& error) {
       const int status = statusOf(error.code());
-      if (status < 500) return errorResponse(ProtocolError(status, "", error.what()));
+      if (status < 500 || status == 503) return errorResponse(ProtocolError(status, "", error.what()));
       context.log(request.method + " " + request.path + ": " + error.what());
     } catch (const std::exception& error) {
       context.log(request.method + " " + request.path + ": " + error.what());
@@ -102,6 +86,25 @@ std::string regexOf(const std::string& path) {
 }
 
 }  // namespace
+
+int statusOf(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::badInput:
+    case ErrorCode::unsupported:
+      return 422;
+    case ErrorCode::notFound:
+      return 404;
+    case ErrorCode::tooLarge:
+      return 422;
+    case ErrorCode::busy:
+    case ErrorCode::cancelled:
+      return 503;
+    case ErrorCode::io:
+    case ErrorCode::device:
+      return 500;
+  }
+  return 500;
+}
 
 net::Response jsonResponse(int status, const json& body) {
   return {status, "application/json", body.dump(-1, ' ', false, json::error_handler_t::replace), {}};
@@ -160,6 +163,12 @@ const ImageType* acceptedImageType(const std::string* accept) {
     }
   }
   return best;
+}
+
+std::uint64_t imageMemory(std::uint64_t pixels, std::string_view format) {
+  if (format == "jpeg") return jpegMemory(pixels);
+  // 8 bits a component before and after; or floats, and two copies of what becomes of them.
+  return pixels * (format == "png" ? 4 * 3 : 3 * sizeof(glm::vec4)) + (1 << 20);
 }
 
 std::string imageBytes(const Image& image, glm::vec3 background, std::string_view format) {

@@ -5,10 +5,12 @@
 #include <atomic>
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
+#include <stop_token>
 #include <string>
 #include <vector>
 
 #include "protocol/problem.h"
+#include "renderer/core/error.h"
 #include "server/config.h"
 #include "server/metrics.h"
 #include "server/net/server.h"
@@ -26,9 +28,10 @@ struct ApiContext {
   StreamHub& streams;
   Metrics& metrics;
   MakeRenderer makeRenderer;
+  std::shared_ptr<MemoryBudget> memory;  ///< of makeRenderer's renderers too
   Log log;
   std::atomic<bool>& stopping;  ///< ends what waits
-  std::atomic<bool>& cutting;   ///< ends what renders, after the grace
+  std::stop_token cutting;      ///< ends what renders, after the grace
   std::function<nlohmann::json()> capabilities;
 };
 
@@ -65,6 +68,8 @@ void addApi(net::Server& server, ApiContext& context);
 // --- for the handlers
 // ------------------------------------------------------------------------------------------
 
+/// The HTTP status that tells of an error.
+int statusOf(ErrorCode code);
 net::Response jsonResponse(int status, const nlohmann::json& body);
 net::Response errorResponse(const protocol::ProtocolError& error);
 /// The body as JSON; throws ProtocolError, 415 unless Content-Type is application/json or `alsoType`.
@@ -82,6 +87,8 @@ inline constexpr ImageType kImageTypes[] = {
     {"jpeg", "image/jpeg"}, {"png", "image/png"}, {"exr", "image/x-exr"}};
 /// The type of image that an Accept header likes best, the first of equals; nullptr: none.
 const ImageType* acceptedImageType(const std::string* accept);
+/// Memory that imageBytes takes for so many pixels.
+std::uint64_t imageMemory(std::uint64_t pixels, std::string_view format);
 /// The bytes of a picture: jpeg at quality 95, 4:4:4; png; exr as float32 linear premultiplied RGBA.
 std::string imageBytes(const Image& image, glm::vec3 background, std::string_view format);
 

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // POST /render: scene in, picture out, nothing kept.
+#include <algorithm>
+#include <atomic>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <stop_token>
 
 #include "protocol/problem.h"
 #include "renderer/core/short_text.h"
+#include "renderer/core/thread_priority.h"
 #include "server/api.h"
 
 namespace scolopax::server {
@@ -12,8 +16,8 @@ namespace {
 
 using protocol::ProtocolError;
 
-/// How long a pass goes on before it is asked whether anybody still waits for the picture.
-constexpr std::chrono::nanoseconds kSlice = std::chrono::milliseconds(100);
+/// Seconds that a pass goes on before it is asked whether anybody still waits for the picture.
+constexpr double kSlice = 0.1;
 
 /// A place among the renders that may run at once.
 class RenderPlace {
@@ -30,6 +34,27 @@ class RenderPlace {
 
  private:
   std::atomic<int>& running_;
+};
+
+/// Whether a render is to end early: its client has gone, or the server stops.
+class Ending {
+ public:
+  Ending(const std::stop_token& gone, const std::stop_token& cutting)
+      : gone_(gone, Request{this}), cutting_(cutting, Request{this}) {}
+  std::stop_token token() const { return source_.get_token(); }
+  const std::atomic<bool>& flag() const { return flag_; }
+
+ private:
+  struct Request {
+    Ending* ending;
+    void operator()() const {
+      ending->flag_ = true;
+      ending->source_.request_stop();
+    }
+  };
+  std::stop_source source_;
+  std::atomic<bool> flag_{false};
+  std::stop_callback<Request> gone_, cutting_;
 };
 
 /// FNV-1a, 64 bits, of the resolved scene's canonical text: equal pictures have equal hashes.
@@ -53,23 +78,26 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
     throw ProtocolError(422, "/stop/seconds",
                         "expected at most " + shortText(limit) + ", found " + shortText(scene->stop.seconds));
   const RenderPlace place(running, context.config.maxRenders);
+  lowerThreadPriority();  // sessions are edited by somebody who looks on
 
   const auto begin = std::chrono::steady_clock::now();
   const auto seconds = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   };
   const auto renderer = context.makeRenderer(scene->dataset->volume);
-  const RebuildStats rebuild = renderer->setScene(scene->render);
+  const Ending ending(request.gone, context.cutting);
+  const RebuildStats rebuild = renderer->setScene(scene->render, ending.token());
   while (!stopMet(scene->stop, *renderer, seconds())) {
-    if (request.gone && *request.gone) throw ProtocolError(503, "", "the client has gone");
     // A rule of time may end a pass in the middle; the first sample is given more, up to the server's own
     // limit.
     const bool timed = scene->stop.seconds > 0 && renderer->samples() > 0;
     const double until = timed ? std::min(scene->stop.seconds, limit) : limit;
-    const auto budget = std::chrono::duration<double>(std::max(until - seconds(), 0.0));
-    const auto slice = std::min(std::chrono::duration_cast<std::chrono::nanoseconds>(budget), kSlice);
-    if (renderer->renderSample(context.cutting, slice)) continue;
-    if (context.cutting) throw ProtocolError(503, "", "the server is stopping");
+    // In this order: no duration but a short one becomes one of whole nanoseconds.
+    const auto budget = std::chrono::duration<double>(std::clamp(until - seconds(), 0.0, kSlice));
+    const auto slice = std::chrono::duration_cast<std::chrono::nanoseconds>(budget);
+    if (renderer->renderSample(ending.flag(), slice)) continue;
+    if (request.gone.stop_requested()) throw ProtocolError(503, "", "the client has gone");
+    if (context.cutting.stop_requested()) throw ProtocolError(503, "", "the server is stopping");
     if (seconds() < until) continue;
     if (timed && until < limit) break;
     // A picture that depends on the machine's speed is only for those who asked for it.
@@ -80,10 +108,15 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
   }
   const auto milliseconds = std::int64_t(seconds() * 1000);
   const std::string error = nlohmann::json(renderer->estimatedError()).dump();
+  const auto pixels = std::uint64_t(scene->render.width) * std::uint64_t(scene->render.height);
+  const auto memory = MemoryBudget::takeShared(
+      context.memory, MemoryUse::encodings, pixels * sizeof(glm::vec4) + imageMemory(pixels, type->format));
   net::Response response{200,
                          std::string(type->mediaType),
                          imageBytes(renderer->image(), scene->render.background, type->format),
                          {}};
+  memory->resize(response.body.size());
+  response.keep = memory;
   response.headers = {{"Scolopax-Samples", std::to_string(renderer->samples())},
                       {"Scolopax-Error", error},
                       {"Scolopax-Seed", std::to_string(scene->render.seed)},

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/problem.h"
+#include "renderer/core/thread_priority.h"
 #include "server/api.h"
 
 namespace scolopax::server {
@@ -110,18 +111,26 @@ net::Response frame(ApiContext& context, const net::Request& request) {
         422, "", "query parameter format: expected jpeg, png or exr, found \"" + std::string(format) + '"');
   const std::optional<Aov> aov = queryAov(request);
   const FrameQuery query{queryUnsigned(request, "after", 0), queryUnsigned(request, "minSamples", 1),
-                         aov.has_value(), request.gone.get()};
+                         aov.has_value(), request.gone};
   const auto found = session->waitForFrame(query, pollTimeout(context.config, request));
   if (!found && context.stopping) throw ProtocolError(503, "", "the server is stopping");
   if (!found) return {204, "", "", {}};
   net::Response response{200, std::string(type->mediaType), "", {}};
+  const std::uint64_t pixels = found->image->pixels.size();
+  const bool encoded = !aov && format == "jpeg";
+  const auto memory = MemoryBudget::takeShared(
+      context.memory, MemoryUse::encodings,
+      encoded ? found->jpeg->size() : (aov ? pixels * sizeof(glm::vec4) : 0) + imageMemory(pixels, format));
+  lowerThreadPriority();  // sessions are edited by somebody who looks on
   if (aov) {
     const AovValues& values = (*found->aovs)[std::size_t(*aov)];
     response.body = imageBytes(format == "exr" ? aovImage(values) : aovPicture(values), glm::vec3(0), format);
   } else {
-    response.body = format == "jpeg" ? std::string(found->jpeg->begin(), found->jpeg->end())
-                                     : imageBytes(*found->image, found->background, format);
+    response.body = encoded ? std::string(found->jpeg->begin(), found->jpeg->end())
+                            : imageBytes(*found->image, found->background, format);
   }
+  memory->resize(response.body.size());
+  response.keep = memory;
   response.headers = {{"Scolopax-Frame", std::to_string(found->info.number)},
                       {"Scolopax-Revision", std::to_string(found->info.revision)},
                       {"Scolopax-Samples", std::to_string(found->info.samples)},

@@ -77,6 +77,7 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
             {"imageWidth", kMaxSide},
             {"imageHeight", kMaxSide},
             {"imagePixels", config.maxPixels},
+            {"memoryBytes", config.maxMemoryBytes},
             {"sessions", config.maxSessions},
             {"clients", config.maxClients},
             {"renders", config.maxRenders},
@@ -91,9 +92,12 @@ struct Application::Impl {
   Config config;
   Log log;
   MakeRenderer makeRenderer;
-  std::atomic<bool> stopping{false}, cutting{false};
+  std::shared_ptr<MemoryBudget> memory;
+  std::atomic<bool> stopping{false};
+  std::stop_source cutting;
   const Now now = [] { return std::chrono::steady_clock::now(); };
   LoopThread renderThread, encodeThread;
+  BackgroundThreads background;
   Metrics metrics;
   std::shared_ptr<const DatasetStore> datasets;
   std::shared_ptr<const SceneResolver> sessionResolver;
@@ -107,10 +111,12 @@ struct Application::Impl {
   Authorizer authorizer;
   std::optional<net::Server> server;
 
-  Impl(Config given, std::vector<Dataset> loaded, MakeRenderer make, Log logLine)
+  Impl(Config given, std::vector<Dataset> loaded, MakeRenderer make, std::shared_ptr<MemoryBudget> budget,
+       Log logLine)
       : config(std::move(given)),
         log(std::move(logLine)),
         makeRenderer(std::move(make)),
+        memory(std::move(budget)),
         datasets(std::make_shared<const DatasetStore>(std::move(loaded))),
         sessionResolver(std::make_shared<const SceneResolver>(
             datasets, SceneResolver::Options{config.sessionSamples, config.maxPixels})),
@@ -118,23 +124,17 @@ struct Application::Impl {
         sessions(sessionResolver, {config.maxSessions, config.keepSession},
                  {now, [this] { renderThread.wake(); }, [this] { encodeThread.wake(); },
                   [this] { renderLoop.interrupt(); }}),
-        renderLoop(sessions, makeRenderer, {}, now, log,
+        renderLoop(sessions,
+                   {makeRenderer, {}, now, log, background, [this] { renderThread.wake(); }, memory},
                    [this](const PassResult& pass) { metrics.passEnded(pass); }),
-        encodeLoop(sessions, now, log),
+        encodeLoop(
+            sessions, now, log, background, [this] { encodeThread.wake(); }, memory),
         capabilities(capabilitiesJson(config, sessionResolver->lists())),
         streams(sessions, metrics,
                 {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities}),
-        context{config,
-                *datasets,
-                renderResolver,
-                sessions,
-                streams,
-                metrics,
-                makeRenderer,
-                log,
-                stopping,
-                cutting,
-                [this] { return capabilities; }},
+        context{config,  *datasets, renderResolver,      sessions,
+                streams, metrics,   makeRenderer,        memory,
+                log,     stopping,  cutting.get_token(), [this] { return capabilities; }},
         authorizer(config.token, isLoopback(config.host), config.allowedOrigins,
                    !config.certificateFile.empty()) {
     net::Options options;
@@ -147,6 +147,7 @@ struct Application::Impl {
     options.keyFile = config.keyFile;
     if (std::filesystem::is_directory(config.webRoot)) options.staticRoot = config.webRoot;
     options.authorize = [this](const net::Request& request) { return authorizer(request); };
+    options.knows = [this](const net::Request& request) { return authorizer.knows(request); };
     options.problem = [](int status, const std::string& detail) {
       return errorResponse(protocol::ProtocolError(status, "", detail));
     };
@@ -166,10 +167,11 @@ struct Application::Impl {
   }
 };
 
-Application::Application(Config config, std::vector<Dataset> datasets, MakeRenderer makeRenderer, Log log) {
+Application::Application(Config config, std::vector<Dataset> datasets, MakeRenderer makeRenderer,
+                         std::shared_ptr<MemoryBudget> memory, Log log) {
   if (config.token.empty()) config.token = createToken();
-  impl_ =
-      std::make_unique<Impl>(std::move(config), std::move(datasets), std::move(makeRenderer), std::move(log));
+  impl_ = std::make_unique<Impl>(std::move(config), std::move(datasets), std::move(makeRenderer),
+                                 std::move(memory), std::move(log));
 }
 
 Application::~Application() { stop(); }
@@ -196,7 +198,7 @@ void Application::stop() {
     std::unique_lock lock(mutex);
     std::condition_variable_any().wait_for(lock, stopped, impl_->config.stopGrace * 2 / 3,
                                            [] { return false; });
-    impl_->cutting = true;
+    impl_->cutting.request_stop();
   });
   impl_->sessions.closeAll("the server is stopping");
   impl_->server->stop(impl_->config.stopGrace);

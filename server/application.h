@@ -15,8 +15,10 @@ namespace scolopax::server {
 
 class Application {
  public:
-  /// An empty token in `config` is replaced by a new one.
-  Application(Config config, std::vector<Dataset> datasets, MakeRenderer makeRenderer, Log log);
+  /// An empty token in `config` is replaced by a new one. `memory` bounds the renderers' memory too, which
+  /// take of it.
+  Application(Config config, std::vector<Dataset> datasets, MakeRenderer makeRenderer,
+              std::shared_ptr<MemoryBudget> memory, Log log);
   ~Application();  ///< stops at once
 
   /// Throws net::NetError when the port cannot be had.

@@ -26,11 +26,6 @@ bool isTokenCharacter(char c) {
          std::string_view("-._~+/=").find(c) != std::string_view::npos;
 }
 
-std::string_view withoutPort(std::string_view host) {
-  if (!host.empty() && host.front() == '[') return host.substr(0, host.find(']') + 1);
-  return host.substr(0, host.rfind(':'));
-}
-
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
   while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
@@ -107,8 +102,8 @@ Authorizer::Authorizer(std::string token, bool loopback, std::vector<std::string
 bool Authorizer::isHostAllowed(const net::Request& request) const {
   const std::string* host = request.header("Host");
   if (!loopback_ || !host) return true;  // HTTP/1.0 without a Host is no browser
-  const std::string_view name = withoutPort(*host);
-  if (isLoopbackAddress(name) || name == "[::1]" || net::equalIgnoringCase(name, "localhost")) return true;
+  const auto authority = net::parseAuthority(*host);
+  if (authority && isLoopback(authority->host)) return true;
   return std::any_of(allowedOrigins_.begin(), allowedOrigins_.end(),
                      [&](const std::string& origin) { return net::sameOrigin(origin, *host); });
 }
@@ -158,6 +153,10 @@ net::Response Authorizer::cookieAndRedirect(const net::Request& request) const {
                       {"Cache-Control", "no-store"},
                       {"Referrer-Policy", "no-referrer"}};
   return response;
+}
+
+bool Authorizer::knows(const net::Request& request) const {
+  return hasBearer(request) || hasQueryToken(request) || hasCookie(request);
 }
 
 std::optional<net::Response> Authorizer::operator()(const net::Request& request) const {

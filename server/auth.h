@@ -41,6 +41,9 @@ class Authorizer {
   /// nullopt: go on. Otherwise 401, 403, 421, or the 303 that turns `GET /?token=` into a cookie.
   std::optional<net::Response> operator()(const net::Request& request) const;
 
+  /// Whether the request shows the token, in whatever way.
+  bool knows(const net::Request& request) const;
+
   const std::string& cookieName() const { return cookieName_; }
 
  private:

@@ -19,10 +19,11 @@ struct Config {
   std::vector<std::string> allowedOrigins;  ///< other than the server's own
 
   std::size_t maxSessions = 32;
-  std::size_t maxClients = 64;           ///< streams at once
-  std::uint64_t maxPixels = 16'777'216;  ///< of one picture
-  double maxRenderSeconds = 60;          ///< of one POST /render
-  int maxRenders = 2;                    ///< POST /render at once
+  std::size_t maxClients = 64;                            ///< streams at once
+  std::uint64_t maxPixels = 16'777'216;                   ///< of one picture
+  std::uint64_t maxMemoryBytes = std::uint64_t{4} << 30;  ///< of all that requests make the server take
+  double maxRenderSeconds = 60;                           ///< of one POST /render
+  int maxRenders = 2;                                     ///< POST /render at once
   std::size_t maxBodyBytes = std::size_t{1} << 20;
   std::size_t maxMessageBytes = std::size_t{1} << 20;
   std::size_t maxJsonDepth = 32;

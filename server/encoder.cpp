@@ -26,6 +26,12 @@ tjhandle threadCompressor() {
 
 }  // namespace
 
+std::uint64_t jpegMemory(std::uint64_t pixels) {
+  // The library's bound is 6 bytes a pixel of a picture whose sides are rounded up, and what is made of it is
+  // copied.
+  return pixels * (3 + 6 + 2) + (1 << 16);
+}
+
 std::vector<std::uint8_t> encodeJpeg(const Image8& image, int quality, ChromaSampling sampling) {
   if (image.width < 1 || image.height < 1 ||
       image.rgb.size() != std::size_t(image.width) * std::size_t(image.height) * 3)
@@ -44,8 +50,7 @@ std::vector<std::uint8_t> encodeJpeg(const Image8& image, int quality, ChromaSam
   if (tjCompress2(handle, image.rgb.data(), image.width, 0, image.height, TJPF_RGB, &begin, &size,
                   subsampling, quality, TJFLAG_NOREALLOC) != 0)
     throw Error(ErrorCode::io, std::string("JPEG encoder: ") + tjGetErrorStr2(handle));
-  bytes.resize(size);
-  return bytes;
+  return {bytes.begin(), bytes.begin() + std::ptrdiff_t(size)};  // the bound is many times as large
 }
 
 }  // namespace scolopax::server

@@ -36,8 +36,15 @@ struct Metrics::Impl {
   Counter& cancelled = counter("scolopax_passes_cancelled_total", "Sample passes ended early by an edit");
   Counter& renderSeconds = counter("scolopax_render_seconds_total", "Time spent in sample passes");
   Counter& rebuildSeconds = counter("scolopax_rebuild_seconds_total", "Time spent taking over edited scenes");
+  Counter& built = counter("scolopax_builds_total", "Scenes built off the render thread");
+  Counter& abandoned = counter("scolopax_builds_abandoned_total", "Of which given up before their end");
   Gauge& sessions = gauge("scolopax_sessions", "Sessions");
   Gauge& clients = gauge("scolopax_clients", "Open streams");
+  Gauge& memoryLimit = gauge("scolopax_memory_limit_bytes", "What requests may take of memory");
+  prometheus::Family<Gauge>& memory = prometheus::BuildGauge()
+                                          .Name("scolopax_memory_bytes")
+                                          .Help("What they take, by use")
+                                          .Register(registry);
 };
 
 Metrics::Metrics() : impl_(std::make_unique<Impl>()) {}
@@ -54,6 +61,8 @@ void Metrics::passEnded(const PassResult& pass) {
     impl_->renderSeconds.Increment(pass.renderSeconds);
   }
   if (pass.cancelled) impl_->cancelled.Increment();
+  if (pass.built || pass.abandoned) impl_->built.Increment();
+  if (pass.abandoned) impl_->abandoned.Increment();
   impl_->rebuildSeconds.Increment(pass.rebuildSeconds);
 }
 
@@ -64,6 +73,12 @@ void Metrics::framesSent(std::uint64_t sent, std::uint64_t replaced) {
 
 void Metrics::setSessions(std::size_t count) { impl_->sessions.Set(double(count)); }
 void Metrics::setClients(std::size_t count) { impl_->clients.Set(double(count)); }
+
+void Metrics::setMemory(const MemoryBudget& memory) {
+  impl_->memoryLimit.Set(double(memory.limit()));
+  for (std::size_t i = 0; i < std::size(kMemoryUses); ++i)
+    impl_->memory.Add({{"use", std::string(kMemoryUses[i])}}).Set(double(memory.used(MemoryUse(i))));
+}
 
 std::string Metrics::text() const {
   return prometheus::TextSerializer().Serialize(impl_->registry.Collect());

@@ -70,14 +70,75 @@ bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
                          (stop.error > 0 && samples >= 16 && renderer.estimatedError() <= stop.error));
 }
 
-ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, MakeRenderer makeRenderer,
-                                     Options options, Now now, Log log, const std::atomic<bool>& interrupted)
-    : session_(std::move(session)),
-      makeRenderer_(std::move(makeRenderer)),
-      options_(options),
-      now_(std::move(now)),
-      log_(std::move(log)),
-      interrupted_(interrupted) {}
+/// A scene on its way into the renderer.
+struct ProgressiveRender::Taking {
+  RenderRequest request;
+  TimePoint begin;
+  double divisor = 1;
+  Scene scene;
+  bool record = false;  ///< from this scene on, AOVs are recorded
+  bool inBackground = false;
+  std::shared_ptr<Renderer> renderer;
+  RebuildStats stats;
+
+  /// Whether what takes long of it is of no use to the scene of `other`.
+  bool uselessFor(const RenderRequest& other) const {
+    return other.scene->dataset->volume != request.scene->dataset->volume ||
+           other.scene->render.macrocell != scene.macrocell;
+  }
+};
+
+/// A picture on its way out of the film.
+struct ProgressiveRender::Showing {
+  RenderedFrame frame;
+  bool interactive = false;              ///< made while edits arrive
+  bool aovs = false;                     ///< made with them
+  std::shared_ptr<const Image> reduced;  ///< to be mixed in; null: nothing is
+  double sampleError = 0;
+  double share = 0;  ///< of the new picture in the mixture
+
+  void make(const Renderer& renderer, std::uint64_t pixels, const std::shared_ptr<MemoryBudget>& memory) {
+    FrameInfo& info = frame.info;
+    const auto take = [&](std::size_t pixelBytes) {
+      return MemoryBudget::take(memory, MemoryUse::pictures, pixels * pixelBytes);
+    };
+    // Mixing makes another one of the reduced picture.
+    auto imageMemory = take(sizeof(glm::vec4) * (reduced ? 2 : 1));
+    auto aovMemory = take(aovs ? std::size(kAovs) * sizeof(float) : 0);
+    info.error = float(renderer.estimatedError());
+    Image picture = renderer.image();
+    if (reduced) {
+      const double error = info.samples > 1 ? double(info.error) : sampleError;
+      share = mixIn(enlarged(*reduced, picture.width, picture.height), error, &picture);
+      info.mixed = true;
+    }
+    imageMemory.resize(pixels * sizeof(glm::vec4));
+    frame.image = withShare(std::move(imageMemory), std::move(picture));
+    if (!aovs) return;
+    std::vector<AovValues> values;
+    for (std::size_t i = 0; i < std::size(kAovs); ++i) values.push_back(renderer.aov(Aov(i)));
+    frame.aovs = withShare(std::move(aovMemory), std::move(values));
+  }
+};
+
+ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, const RenderContext& context,
+                                     const std::atomic<bool>& interrupted)
+    : session_(std::move(session)), context_(context), interrupted_(interrupted) {}
+
+ProgressiveRender::~ProgressiveRender() {
+  if (job_) job_->cancel();
+  dropRenderer();
+}
+
+/// Memory of large films takes its time to be given back.
+void ProgressiveRender::dropRenderer() {
+  scene_.reset();
+  volume_.reset();
+  recording_ = unfinished_ = false;
+  if (!renderer_) return;
+  context_.background.start([last = std::move(renderer_)](const std::stop_token&) {}, [] {});
+  renderer_.reset();
+}
 
 bool ProgressiveRender::sceneStale(const RenderRequest& request) const {
   // Back to full resolution when edits have stopped, in steps; a film that already has it goes on.
@@ -90,13 +151,13 @@ bool ProgressiveRender::sceneStale(const RenderRequest& request) const {
 /// of one that follows an abandoned pass. However fast edits come, pictures are shown between them.
 bool ProgressiveRender::keepsPass(const RenderRequest& request) const {
   return unfinished_ && shown_.revision != revision_ && ((request.interactive && small_) || abandoned_) &&
-         now_() - passBegan_ < options_.shield;
+         context_.now() - passBegan_ < context_.policy.shield;
 }
 
 /// Whether the first picture of an edit turns out to cost much more than the passes before it.
 bool ProgressiveRender::lateForEdit(const RenderRequest& request) const {
   return unfinished_ && small_ && firstOfEdit(request) && divisor_ < kMostDivisor &&
-         passSeconds_ >= std::chrono::duration<double>(options_.tooLate).count();
+         passSeconds_ >= std::chrono::duration<double>(context_.policy.tooLate).count();
 }
 
 /// Whether somebody waits for the first picture that has an edit in it.
@@ -120,11 +181,14 @@ bool ProgressiveRender::showDue(const RenderRequest& request) const {
                   [&](std::uint32_t wanted) { return shown_.samples < wanted && wanted <= samples; }))
     return true;
   return std::has_single_bit(samples) ||
-         now_() - shownAt_ >= (request.interactive ? options_.interactiveInterval : options_.stillInterval);
+         context_.now() - shownAt_ >=
+             (request.interactive ? context_.policy.interactiveInterval : context_.policy.stillInterval);
 }
 
 ProgressiveRender::Work ProgressiveRender::work() const {
+  if (job_ && !job_->done()) return Work::none;
   const RenderRequest request = session_->request();
+  if (job_) return firstOfEdit(request) ? Work::urgent : Work::still;
   if (!request.wanted || !(sceneStale(request) || !finished(request) || showDue(request))) return Work::none;
   return firstOfEdit(request) ? Work::urgent : request.interactive ? Work::refine : Work::still;
 }
@@ -135,6 +199,7 @@ bool ProgressiveRender::edited() const {
 }
 
 std::optional<TimePoint> ProgressiveRender::dueAt() const {
+  if (job_) return std::nullopt;  // whose end wakes the loop
   const RenderRequest request = session_->request();
   if (!request.wanted) return std::nullopt;
   // Also when the end has just passed, between work() and here: then it is due at once.
@@ -153,14 +218,14 @@ double ProgressiveRender::wantedDivisor(const RenderRequest& request, int edited
       std::uint64_t(request.scene->render.width) * std::uint64_t(request.scene->render.height);
   if (!request.interactive) {
     const bool reducedShown = shown_.revision == request.revision && shown_.reduced;
-    double seconds = std::chrono::duration<double>(options_.frameTarget).count(), divisor = 1;
-    do divisor = divisorForTarget(pixels, *known, seconds *= options_.restFactor);
+    double seconds = std::chrono::duration<double>(context_.policy.frameTarget).count(), divisor = 1;
+    do divisor = divisorForTarget(pixels, *known, seconds *= context_.policy.restFactor);
     while (divisor > 1 && reducedShown && divisor >= divisor_);
     return divisor;
   }
   // All that are edited together have two targets a round, so that the picture stays sharp when they are few.
   const auto target =
-      std::max(2 * options_.frameTarget / std::max(2, 1 + editedOthers), options_.leastTarget);
+      std::max(2 * context_.policy.frameTarget / std::max(2, 1 + editedOthers), context_.policy.leastTarget);
   return divisorForTarget(pixels, *known, std::chrono::duration<double>(target).count(), interactiveDivisor_);
 }
 
@@ -168,6 +233,8 @@ std::uint64_t ProgressiveRender::filmSize() const {
   const Scene scene = atDivisor(scene_->render, divisor_);
   return std::uint64_t(scene.width) * std::uint64_t(scene.height);
 }
+
+bool ProgressiveRender::largeFilm() const { return filmSize() >= kLargePicture; }
 
 /// A pass that is given up has cost as much as it had until then; how much was missing is not known: say
 /// half.
@@ -177,59 +244,107 @@ void ProgressiveRender::learnFromUnfinished() {
   known = std::max(known.value_or(0), 2 * passSeconds_ / double(filmSize()));
 }
 
+void ProgressiveRender::perform(bool inBackground, Background::Work work, Next next, PassResult& result) {
+  if (!inBackground) {
+    work({});
+    (this->*next)(result);
+    return;
+  }
+  next_ = next;
+  job_ = context_.background.start(std::move(work), context_.wake);
+  if (job_->done()) collect(result);
+}
+
+void ProgressiveRender::collect(PassResult& result) {
+  const auto job = std::exchange(job_, nullptr);
+  try {
+    job->rethrow();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::cancelled) throw;
+    taking_.reset();
+    result.abandoned = true;
+    return;
+  }
+  (this->*next_)(result);
+}
+
+void ProgressiveRender::supervise() {
+  if (!job_ || job_->done()) return;
+  const RenderRequest request = session_->request();
+  if (!request.wanted || (taking_ && taking_->uselessFor(request))) job_->cancel();
+}
+
 void ProgressiveRender::takeScene(const RenderRequest& request, const Others& others, PassResult& result) {
-  const TimePoint begin = now_();
   if (small_) learnFromUnfinished();
-  if (!renderer_ || volume_ != request.scene->dataset->volume) {
-    renderer_.reset();
-    volume_ = request.scene->dataset->volume;
-    renderer_ = makeRenderer_(volume_);
-    recording_ = false;
+  const auto volume = request.scene->dataset->volume;
+  if (volume_ != volume) {
+    dropRenderer();
     secondsPerPixel_[false].reset();
     secondsPerPixel_[true].reset();
     interactiveDivisor_ = 0;
   }
-  const double divisor = wantedDivisor(request, others.edited);
-  const Scene scene = drawnScene(*request.scene, divisor, request.interactive);
-  // What is recorded of AOVs takes up to twice as much again, with all channels there may be.
-  const auto pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height) * (request.aovs ? 3 : 1);
-  if (pixels > filmPixels_ && others.filmPixels + pixels > options_.filmPixels)
-    throw Error(ErrorCode::tooLarge, "image: all sessions together may have " +
-                                         std::to_string(options_.filmPixels) + " pixels, " +
-                                         std::to_string(others.filmPixels) + " of them are taken");
-  RebuildStats stats = renderer_->setScene(scene);
-  if (request.aovs && !recording_) {
-    renderer_->recordAovs();
-    recording_ = stats.filmReset = true;
-    shown_ = {};  // the frames so far do not count: they hold no AOVs
-  }
-  filmPixels_ = pixels;
+  volume_ = volume;
   abandoned_ = unfinished_;
   unfinished_ = false;
-  if (stats.filmReset) filmSeconds_ = 0;
+  taking_ = std::make_shared<Taking>();
+  taking_->request = request;
+  taking_->begin = context_.now();
+  taking_->divisor = wantedDivisor(request, others.edited);
+  taking_->scene = drawnScene(*request.scene, taking_->divisor, request.interactive);
+  taking_->record = request.aovs && !recording_;
+  taking_->renderer = renderer_;
+  taking_->inBackground = !renderer_ || renderer_->takesLong(taking_->scene);
+  const auto build = [taking = taking_, volume, make = context_.makeRenderer](const std::stop_token& stop) {
+    if (!taking->renderer) taking->renderer = make(volume);
+    taking->stats = taking->renderer->setScene(taking->scene, stop);
+    if (taking->record) taking->renderer->recordAovs();
+  };
+  perform(taking_->inBackground, build, &ProgressiveRender::sceneTaken, result);
+}
+
+void ProgressiveRender::sceneTaken(PassResult& result) {
+  const auto taking = std::exchange(taking_, nullptr);
+  const RenderRequest& request = taking->request;
+  renderer_ = taking->renderer;
+  if (taking->record) {
+    recording_ = true;
+    shown_ = {};  // the frames so far do not count: they hold no AOVs
+  }
+  if (taking->stats.filmReset || taking->record) filmSeconds_ = 0;
   if (request.interactive || revision_ != request.revision) reduced_.reset();
   scene_ = request.scene;
   revision_ = request.revision;
-  divisor_ = divisor;
+  divisor_ = taking->divisor;
   small_ = request.interactive;
   restShown_ = false;
-  if (small_ && (secondsPerPixel_[false] || secondsPerPixel_[true])) interactiveDivisor_ = divisor;
-  result.rebuildSeconds = secondsBetween(begin, now_());
+  if (small_ && (secondsPerPixel_[false] || secondsPerPixel_[true])) interactiveDivisor_ = divisor_;
+  result.built = taking->inBackground;
+  result.rebuildSeconds = secondsBetween(taking->begin, context_.now());
   rebuildUs_ = microseconds(result.rebuildSeconds);
 }
 
 void ProgressiveRender::addSample(bool urgent, bool othersUrgent, PassResult& result) {
-  const TimePoint begin = now_();
+  const TimePoint begin = context_.now();
   if (!unfinished_) passBegan_ = begin, passSeconds_ = 0;
   // The turn between two urgent ones is short, and its own: however fast edits come, it gets on.
   const bool whole = urgent || othersUrgent;
-  const auto slice = urgent ? options_.tooLate : othersUrgent ? options_.politeSlice : options_.slice;
-  result.rendered = renderer_->renderSample(whole ? kNever : interrupted_, slice);
-  result.cancelled = !result.rendered && !whole && interrupted_;
-  passSeconds_ += secondsBetween(begin, now_());
-  unfinished_ = !result.rendered;
-  if (!result.rendered) return;
+  const RenderPolicy& policy = context_.policy;
+  const auto slice = urgent ? policy.tooLate : othersUrgent ? policy.politeSlice : policy.slice;
+  const bool complete = renderer_->renderPixels(whole ? kNever : interrupted_, slice);
+  result.cancelled = !complete && !whole && interrupted_;
+  passSeconds_ += secondsBetween(begin, context_.now());
+  unfinished_ = !complete;
+  if (!complete) return;
+  const auto add = [renderer = renderer_, estimate = scene_->stop.error > 0](const std::stop_token&) {
+    renderer->addPixels();
+    if (estimate) renderer->estimatedError();  // so that it is known when it is asked for
+  };
+  perform(largeFilm(), add, &ProgressiveRender::sampleAdded, result);
+}
+
+void ProgressiveRender::sampleAdded(PassResult& result) {
   abandoned_ = false;
+  result.rendered = true;
   result.renderSeconds = passSeconds_;
   result.pixels = filmSize();
   filmSeconds_ += result.renderSeconds;
@@ -239,69 +354,76 @@ void ProgressiveRender::addSample(bool urgent, bool othersUrgent, PassResult& re
   known = known ? 0.5 * (*known + perPixel) : perPixel;
 }
 
-/// Mixes the reduced picture that is on screen into the one that takes its place; whether there was one.
-bool ProgressiveRender::mix(Image* image) {
-  if (!reduced_) return false;
-  const double error = renderer_->samples() > 1 ? renderer_->estimatedError() : sampleError_;
-  const double share = mixIn(enlarged(*reduced_, image->width, image->height), error, image);
-  if (share > 0.98) reduced_.reset();
-  return true;
-}
-
-void ProgressiveRender::show(const RenderRequest& request) {
-  FrameInfo info;
+void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
+  showing_ = std::make_shared<Showing>();
+  FrameInfo& info = showing_->frame.info;
   info.revision = revision_;
   info.samples = renderer_->samples();
   info.method = renderer_->choice().method;
-  info.error = float(renderer_->estimatedError());
   info.rebuildUs = rebuildUs_;
   info.renderUs = renderUs_;
   info.reduced = divisor_ != 1;
   info.interactive = request.interactive || info.reduced;
   info.final = !info.interactive && finished(request);
-  Image picture = renderer_->image();
-  if (!request.interactive && !info.final && request.pollSamples.empty()) info.mixed = mix(&picture);
-  auto image = std::make_shared<const Image>(std::move(picture));
+  showing_->frame.background = scene_->render.background;
+  showing_->interactive = request.interactive;
+  showing_->aovs = recording_ && !request.interactive;
+  // The reduced picture that is on screen, into the one that takes its place.
+  if (!request.interactive && !info.final && request.pollSamples.empty()) showing_->reduced = reduced_;
+  showing_->sampleError = sampleError_;
+  const auto make = [showing = showing_, renderer = renderer_, pixels = filmSize(), memory = context_.memory](
+                        const std::stop_token&) { showing->make(*renderer, pixels, memory); };
+  perform(largeFilm(), make, &ProgressiveRender::pictureMade, result);
+}
+
+void ProgressiveRender::pictureMade(PassResult&) {
+  const auto showing = std::exchange(showing_, nullptr);
+  const FrameInfo& info = showing->frame.info;
+  if (info.mixed && showing->share > 0.98) reduced_.reset();
   if (info.reduced) {
-    reduced_ = image;
-    if (request.interactive) sampleError_ = info.samples > 1 ? info.error * std::sqrt(info.samples) : 0;
+    reduced_ = showing->frame.image;
+    if (showing->interactive)
+      sampleError_ = info.samples > 1 ? double(info.error) * std::sqrt(info.samples) : 0;
   }
-  restShown_ = !request.interactive;
-  RenderedFrame frame{info, std::move(image), scene_->render.background, {}};
-  if (recording_ && !request.interactive) {
-    std::vector<AovValues> aovs;
-    for (std::size_t i = 0; i < std::size(kAovs); ++i) aovs.push_back(renderer_->aov(Aov(i)));
-    frame.aovs = std::make_shared<const std::vector<AovValues>>(std::move(aovs));
-  }
-  session_->submit(std::move(frame));
+  restShown_ = !showing->interactive;
   shown_ = info;
-  shownAt_ = now_();
+  shownAt_ = context_.now();
+  session_->submit(std::move(showing->frame));
+}
+
+void ProgressiveRender::turn(const RenderRequest& request, const Others& others, PassResult& result) {
+  if (job_) collect(result);
+  if (!request.wanted || job_) return;
+  if ((sceneStale(request) && !keepsPass(request)) || lateForEdit(request))
+    takeScene(request, others, result);
+  if (job_ || !scene_) return;
+  if (!finished(request)) addSample(firstOfEdit(request), others.urgent, result);
+  if (!job_ && !unfinished_ && showDue(request)) show(request, result);
 }
 
 PassResult ProgressiveRender::run(const Others& others) {
   PassResult result;
   const RenderRequest request = session_->request();
-  if (!request.wanted) return result;
   try {
-    if ((sceneStale(request) && !keepsPass(request)) || lateForEdit(request))
-      takeScene(request, others, result);
-    if (!finished(request)) addSample(firstOfEdit(request), others.urgent, result);
-    if (!unfinished_ && showDue(request)) show(request);
+    turn(request, others, result);
     return result;
   } catch (const Error& error) {
-    session_->fail(request.revision, error.what());
+    fail(request, error);
   } catch (const std::bad_alloc&) {
-    session_->fail(request.revision, "not enough memory to render this scene");
+    fail(request, Error(ErrorCode::tooLarge, "not enough memory to render this scene"));
   } catch (const std::exception& error) {
-    log_(std::string("session ") + session_->id() + ": the renderer failed: " + error.what());
-    session_->fail(request.revision, "the renderer failed");  // the cause is not for a client
+    context_.log(std::string("session ") + session_->id() + ": the renderer failed: " + error.what());
+    fail(request, Error(ErrorCode::unsupported, "the renderer failed"));  // the cause is not for a client
   }
-  // What an error has left behind is not worth keeping.
-  scene_.reset();
-  renderer_.reset();
-  filmPixels_ = 0;
-  unfinished_ = false;
   return result;
+}
+
+void ProgressiveRender::fail(const RenderRequest& request, const Error& error) {
+  session_->fail(taking_ ? taking_->request.revision : request.revision, error);
+  // What an error has left behind is not worth keeping.
+  taking_.reset();
+  showing_.reset();
+  dropRenderer();
 }
 
 }  // namespace scolopax::server

@@ -5,6 +5,7 @@
 #include <exception>
 #include <utility>
 
+#include "renderer/core/error.h"
 #include "server/encoder.h"
 
 namespace scolopax::server {
@@ -15,15 +16,6 @@ void keepEarlier(std::optional<TimePoint>& a, const std::optional<TimePoint>& b)
 }
 
 }  // namespace
-
-RenderLoop::RenderLoop(SessionStore& store, MakeRenderer makeRenderer, ProgressiveRender::Options options,
-                       Now now, Log log, OnPass onPass)
-    : store_(store),
-      makeRenderer_(std::move(makeRenderer)),
-      options_(options),
-      now_(std::move(now)),
-      log_(std::move(log)),
-      onPass_(std::move(onPass)) {}
 
 void RenderLoop::followStore() {
   const auto sessions = store_.all();
@@ -36,8 +28,7 @@ void RenderLoop::followStore() {
   });
   for (const auto& session : sessions)
     if (!known(session))
-      renders_.push_back(
-          std::make_unique<ProgressiveRender>(session, makeRenderer_, options_, now_, log_, interrupted_));
+      renders_.push_back(std::make_unique<ProgressiveRender>(session, context_, interrupted_));
 }
 
 RenderLoop::Renders::iterator RenderLoop::nextTurn() {
@@ -61,6 +52,7 @@ RenderLoop::Renders::iterator RenderLoop::nextTurn() {
 std::optional<TimePoint> RenderLoop::step() {
   std::optional<TimePoint> next = store_.expire();
   followStore();
+  for (const auto& render : renders_) render->supervise();
   interrupted_ = false;  // an edit from here on interrupts the pass; those before are seen by nextTurn()
   const auto turn = nextTurn();
   if (turn != renders_.end()) {
@@ -70,17 +62,17 @@ std::optional<TimePoint> RenderLoop::step() {
     others.urgent = othersUrgent_;
     for (const auto& render : renders_) {
       if (render == renders_.back()) continue;
-      others.filmPixels += render->filmPixels();
       others.edited += render->edited();
     }
     onPass_(renders_.back()->run(others));
-    return now_();
+    return context_.now();
   }
   for (const auto& render : renders_) keepEarlier(next, render->dueAt());
   return next;
 }
 
-EncodedFrame encodeFrame(const RenderedFrame& rendered, const Now& now) {
+EncodedFrame encodeFrame(const RenderedFrame& rendered, const Now& now,
+                         const std::shared_ptr<MemoryBudget>& memory) {
   const TimePoint begin = now();
   const Image& image = *rendered.image;
   // A picture that will be enlarged has few bytes, and its compression would show enlarged as well.
@@ -91,24 +83,46 @@ EncodedFrame encodeFrame(const RenderedFrame& rendered, const Now& now) {
   frame.height = image.height;
   frame.background = rendered.background;
   frame.aovs = rendered.aovs;
-  frame.jpeg = std::make_shared<const std::vector<unsigned char>>(
-      encodeJpeg(toSrgb8(image, rendered.background), quality, ChromaSampling::full444));
+  auto share = MemoryBudget::take(memory, MemoryUse::encodings, jpegMemory(image.pixels.size()));
+  auto jpeg = encodeJpeg(toSrgb8(image, rendered.background), quality, ChromaSampling::full444);
+  share.resize(jpeg.size());
+  frame.jpeg = withShare(std::move(share), std::move(jpeg));
   frame.image = rendered.image;
   frame.info.encodeUs =
       std::uint32_t(std::chrono::duration_cast<std::chrono::microseconds>(now() - begin).count());
   return frame;
 }
 
+namespace {
+void encodeAndPublish(Session& session, const RenderedFrame& rendered, const Now& now, const Log& log,
+                      const std::shared_ptr<MemoryBudget>& memory) {
+  const std::uint32_t revision = rendered.info.revision;
+  try {
+    session.publish(encodeFrame(rendered, now, memory));
+  } catch (const Error& error) {
+    session.fail(revision, error);
+  } catch (const std::exception& error) {
+    log("session " + session.id() + ": encoding failed: " + error.what());
+    session.fail(revision, Error(ErrorCode::unsupported, "the picture could not be encoded"));
+  }
+}
+}  // namespace
+
 std::optional<TimePoint> EncodeLoop::step() {
   std::optional<TimePoint> next;
+  std::erase_if(jobs_, [](const auto& item) { return item.second->done(); });
   for (const auto& session : store_.all()) {
-    if (const auto rendered = session->takeRendered()) {
-      try {
-        session->publish(encodeFrame(*rendered, now_));
-      } catch (const std::exception& error) {
-        log_("session " + session->id() + ": encoding failed: " + error.what());
-        session->fail(rendered->info.revision, "the picture could not be encoded");
-      }
+    const bool busy = jobs_.contains(session.get());
+    if (auto rendered = session->takeRendered(busy ? kLargePicture - 1 : ~std::uint64_t(0))) {
+      const bool large = rendered->image->pixels.size() >= kLargePicture;
+      Background::Work work = [session, rendered = std::move(*rendered), now = now_, log = log_,
+                               memory = memory_](const std::stop_token&) {
+        encodeAndPublish(*session, rendered, now, log, memory);
+      };
+      if (large)
+        jobs_[session.get()] = background_.start(std::move(work), wake_);
+      else
+        work({});
     }
     keepEarlier(next, session->deliver());
   }

@@ -14,6 +14,8 @@
 #include "renderer/data/colormap.h"
 #include "renderer/data/defaults.h"
 #include "renderer/data/image.h"
+#include "renderer/data/macrocell_grid.h"
+#include "renderer/data/render_plan.h"
 
 namespace scolopax::server {
 namespace {
@@ -59,6 +61,16 @@ std::vector<ColorKnot> knotsOf(const protocol::Colormap& colormap) {
   return knots;
 }
 
+/// What the renderer would refuse later is refused with the patch.
+template <class Check>
+void refuseAt(const std::string& pointer, Check&& check) {
+  try {
+    check();
+  } catch (const Error& error) {
+    throw ProtocolError(422, pointer, error.what());
+  }
+}
+
 void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume) {
   const auto channels = volume.channels();
   scene.channels.resize(channels.size());
@@ -100,11 +112,7 @@ void resolveCamera(protocol::Scene& scene, Scene& render, const Grid& grid) {
   if (!wire.up) wire.up = arrayOf(framing.up);
   render.camera = {vectorOf(*wire.eye), vectorOf(*wire.target), vectorOf(*wire.up), wire.fovY,
                    wire.orthoHeight};
-  try {
-    makeCameraRays(render.camera, grid, 1, 1);
-  } catch (const Error& error) {
-    throw ProtocolError(422, "/camera", error.what());
-  }
+  refuseAt("/camera", [&] { makeCameraRays(render.camera, grid, 1, 1); });
 }
 
 void resolveLights(const protocol::Scene& scene, Scene& render) {
@@ -118,8 +126,20 @@ void resolveLights(const protocol::Scene& scene, Scene& render) {
       throw ProtocolError(422, "/lights/" + std::to_string(i) + "/direction",
                           "expected a direction that is not 0");
     if (light.type == LightType::point) light.vector = vectorOf(wire.position);
+    refuseAt("/lights/" + std::to_string(i), [&] { checkLight(light); });
     render.lights.push_back(light);
   }
+}
+
+/// Small macrocells of a large volume cost much and bring little. Those of the default size are taken always.
+void checkMacrocell(int size, const Volume& volume, std::size_t mostIntervals) {
+  const auto tooMany = [&](int one) { return intervalCount(volume, one) > mostIntervals; };
+  int least = size;
+  while (least < Scene().macrocell && tooMany(least)) ++least;
+  if (least == size) return;
+  throw ProtocolError(
+      422, "/integrator/macrocell",
+      "expected at least " + std::to_string(least) + " for this data set, found " + std::to_string(size));
 }
 
 /// What of the resolved scene decides the picture at a sample count.
@@ -191,6 +211,7 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
   if (render.method == Method::automatic && scene.stop.error.value_or(0) > 0)
     render.targetError = *scene.stop.error;
   render.macrocell = int(scene.integrator.macrocell);
+  checkMacrocell(render.macrocell, volume, options_.maxIntervals);
   render.step = scene.integrator.step;
   render.sampling = valueOf<Sampling>(kSamplings, scene.integrator.sampling);
   render.seed = scene.integrator.seed;
@@ -198,6 +219,7 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
   render.height = int(scene.image.height);
   render.background = glm::vec3(linearOf(scene.image.background));
   render.filter = valueOf<PixelFilter>(kPixelFilters, scene.image.filter);
+  refuseAt("", [&] { checkScene(render, volume); });
   if (!scene.stop.samples && !scene.stop.seconds && !scene.stop.error)
     scene.stop.samples = options_.defaultSamples;
   result->stop = {scene.stop.samples.value_or(0), scene.stop.seconds.value_or(0),

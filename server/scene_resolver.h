@@ -38,6 +38,7 @@ class SceneResolver {
   struct Options {
     std::uint32_t defaultSamples = 64;     ///< when the scene has no stop rule
     std::uint64_t maxPixels = 16'777'216;  ///< width x height
+    std::size_t maxIntervals = 1 << 25;    ///< macrocells x channels, where the size is not the default
   };
   SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options);
 

@@ -98,7 +98,10 @@ void Session::setView(ViewerId id, bool visible, double maxFps) {
   const auto viewer = viewers_.find(id);
   if (viewer == viewers_.end()) return;
   viewer->second.visible = visible;
-  viewer->second.maxFps = maxFps;
+  // Within an hour: a smaller rate than that overflows a duration.
+  const auto seconds = maxFps > 0 ? std::min(1 / maxFps, 3600.0) : 0.0;
+  viewer->second.period =
+      std::chrono::duration_cast<TimePoint::duration>(std::chrono::duration<double>(seconds));
   hooks_.wakeRender();
   hooks_.wakeEncoder();
 }
@@ -110,7 +113,6 @@ std::size_t Session::viewerCount() const {
 
 std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& query,
                                                           std::chrono::milliseconds timeout) {
-  const auto deadline = std::chrono::steady_clock::now() + timeout;
   std::unique_lock lock(mutex_);
   if (pollSamples_.size() >= kMaxPolls)
     throw protocol::ProtocolError(429, "",
@@ -122,8 +124,8 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
     ++revision_;
     for (auto& [id, viewer] : viewers_) viewer.sink->sceneChanged(revision_, nlohmann::json::object());
   }
+  if (failure_ && failure_->code() == ErrorCode::busy) failedRevision_ = 0;
   const std::uint32_t revision = revision_;
-  const auto isGone = [&] { return query.gone && *query.gone; };
   const auto fits = [&] {
     return frame_ && frame_->info.number > query.after && frame_->info.revision >= revision &&
            !frame_->info.interactive && !frame_->info.mixed && (frame_->aovs || !query.aovs) &&
@@ -131,16 +133,14 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
   };
   const auto poll = pollSamples_.insert(query.minSamples);
   hooks_.wakeRender();
-  const auto answered = [&] { return closed_ || fits() || failedRevision_ == revision_ || isGone(); };
-  // In slices: nobody notifies of a client that goes.
-  for (auto now = deadline - timeout; !answered() && now < deadline; now = std::chrono::steady_clock::now())
-    frameCame_.wait_until(lock, std::min(deadline, now + std::chrono::milliseconds(100)), answered);
+  frameCame_.wait_for(lock, query.gone, timeout,
+                      [&] { return closed_ || fits() || failedRevision_ == revision_; });
   pollSamples_.erase(poll);
   lastUsed_ = hooks_.now();
   hooks_.wakeRender();
   if (closed_) return nullptr;
   if (fits()) return frame_;
-  if (failedRevision_ == revision_) throw protocol::ProtocolError(422, "", failure_);
+  if (failedRevision_ == revision_) throw Error(*failure_);
   return nullptr;
 }
 
@@ -187,21 +187,23 @@ void Session::submit(RenderedFrame frame) {
   hooks_.wakeEncoder();
 }
 
-void Session::fail(std::uint32_t revision, const std::string& message) {
+void Session::fail(std::uint32_t revision, const Error& error) {
   const std::lock_guard lock(mutex_);
   failedRevision_ = revision;
-  failure_ = message;
-  for (auto& [id, viewer] : viewers_) viewer.sink->renderFailed(message);
+  failure_ = error;
+  for (auto& [id, viewer] : viewers_) viewer.sink->renderFailed(error);
   frameCame_.notify_all();
 }
 
-std::optional<RenderedFrame> Session::takeRendered() {
+std::optional<RenderedFrame> Session::takeRendered(std::uint64_t mostPixels) {
   const std::lock_guard lock(mutex_);
+  if (rendered_ && rendered_->image->pixels.size() > mostPixels) return std::nullopt;
   return std::exchange(rendered_, std::nullopt);
 }
 
 void Session::publish(EncodedFrame frame) {
   const std::lock_guard lock(mutex_);
+  if (frame_ && frame.info.revision < frame_->info.revision) return;
   frame.info.number = ++frameNumber_;
   frame_ = std::make_shared<const EncodedFrame>(std::move(frame));
   frameCame_.notify_all();
@@ -214,9 +216,8 @@ std::optional<TimePoint> Session::deliver() {
   const TimePoint now = hooks_.now();
   for (auto& [id, viewer] : viewers_) {
     if (!viewer.visible || viewer.lastNumber == frame_->info.number) continue;
-    if (viewer.maxFps > 0 && viewer.lastNumber > 0) {
-      const auto turn = viewer.lastOffer + std::chrono::duration_cast<TimePoint::duration>(
-                                               std::chrono::duration<double>(1 / viewer.maxFps));
+    if (viewer.lastNumber > 0) {
+      const auto turn = viewer.lastOffer + viewer.period;
       if (now < turn) {
         next = next ? std::min(*next, turn) : turn;
         continue;

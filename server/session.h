@@ -7,23 +7,28 @@
 //  sessions.
 //  2. All that they share is in Session, behind its one mutex; each public function locks it once.
 //  3. The mutex is never held while rendering or encoding: both work on snapshots (shared_ptr to const).
-//  4. The renderer and its film belong to the render thread alone (ProgressiveRender); no lock guards them.
-//  5. Only the encoder thread offers frames to viewers, so an older frame can never replace a newer one.
+//  4. The renderer and its film belong to the render thread (ProgressiveRender) or, while there is one, to
+//  the
+//     background job that it began; no lock guards them.
+//  5. Only the encoder thread offers frames to viewers, and a frame of an older scene is not published,
+//  whoever
+//     encoded it, so that none can replace a newer one.
 //  6. Viewers are called with the mutex held, so that they see edits in order: a ViewerSink only queues, it
 //     neither blocks nor calls back.
 //  7. An edit interrupts the running pass after it has changed the scene; RenderLoop takes the interruption
 //     back before it looks at any scene, so no edit is lost between the two.
 //  8. Waking a loop takes the loop's own, innermost mutex. The store's mutex is never held with a session's.
 #pragma once
-#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <set>
+#include <stop_token>
 #include <string>
 
+#include "renderer/core/error.h"
 #include "server/frame.h"
 #include "server/scene_resolver.h"
 
@@ -38,8 +43,8 @@ class ViewerSink {
   virtual void offerFrame(const EncodedFrame& frame, std::uint32_t patch) = 0;
   /// Another client edited the scene: `patch` turns the resolved scene before into that of `revision`.
   virtual void sceneChanged(std::uint32_t revision, const nlohmann::json& patch) = 0;
-  /// The scene cannot be rendered.
-  virtual void renderFailed(const std::string& message) = 0;
+  /// The scene cannot be rendered, or not now.
+  virtual void renderFailed(const Error& error) = 0;
   /// The session has ended.
   virtual void sessionClosed(const std::string& reason) = 0;
 };
@@ -59,7 +64,7 @@ struct FrameQuery {
   std::uint32_t minSamples = 1;  ///< with so many samples at least, or the final one
   bool aovs =
       false;  ///< that holds AOVs; the first such query makes a revision, from which they are recorded
-  const std::atomic<bool>* gone = nullptr;  ///< nobody waits any more
+  std::stop_token gone = {};  ///< nobody waits any more
 };
 
 /// What the render thread should do for a session; a snapshot.
@@ -115,8 +120,8 @@ class Session {
   std::size_t viewerCount() const;
 
   /// Waits for a full-resolution frame of the scene as it is now or newer; nullptr when none came in time or
-  /// the session was closed. Throws ProtocolError: 422 when the scene cannot be rendered, 429 when too many
-  /// wait already.
+  /// the session was closed. Throws ProtocolError(429) when too many wait already, and the Error with which
+  /// the scene could not be rendered.
   std::shared_ptr<const EncodedFrame> waitForFrame(const FrameQuery& query,
                                                    std::chrono::milliseconds timeout);
   std::shared_ptr<const EncodedFrame> latestFrame() const;
@@ -130,12 +135,15 @@ class Session {
   RenderRequest request() const;
   /// Takes the one waiting place of the encoder, replacing what is there.
   void submit(RenderedFrame frame);
-  /// Nothing is rendered until the next edit.
-  void fail(std::uint32_t revision, const std::string& message);
+  /// Nothing is rendered until the next edit; what failed because others held the memory, until it is asked
+  /// for again.
+  void fail(std::uint32_t revision, const Error& error);
 
   // --- encoder thread
   // ----------------------------------------------------------------------------------------
-  std::optional<RenderedFrame> takeRendered();
+  /// The picture that waits, unless it has more pixels.
+  std::optional<RenderedFrame> takeRendered(std::uint64_t mostPixels);
+  /// From any thread. A frame that shows an older scene than the latest has come too late.
   void publish(EncodedFrame frame);
   /// Offers the latest frame to every viewer that has not had it and may have it now; returns when the next
   /// viewer's turn comes.
@@ -145,7 +153,7 @@ class Session {
   struct Viewer {
     std::shared_ptr<ViewerSink> sink;
     bool visible = true;
-    double maxFps = 0;
+    TimePoint::duration period{0};  ///< between two offers, at least
     TimePoint lastOffer;
     std::uint32_t lastNumber = 0;
     std::uint32_t containedPatch = 0;
@@ -163,14 +171,14 @@ class Session {
   const SessionHooks hooks_;
 
   mutable std::mutex mutex_;
-  std::condition_variable frameCame_;  ///< a frame, a failure, an edit or the end
+  std::condition_variable_any frameCame_;  ///< a frame, a failure, an edit or the end
   std::shared_ptr<const ResolvedScene> scene_;
   std::uint32_t revision_ = 1;
   std::optional<TimePoint> lastEdit_;  ///< that changed the picture
   TimePoint lastUsed_;
   bool closed_ = false;
   std::uint32_t failedRevision_ = 0;
-  std::string failure_;
+  std::optional<Error> failure_;
   std::map<ViewerId, Viewer> viewers_;
   ViewerId nextViewer_ = 1;
   std::multiset<std::uint32_t> pollSamples_;  ///< one per waiting script

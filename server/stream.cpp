@@ -11,6 +11,7 @@
 #include "protocol/frame_header.h"
 #include "protocol/messages.h"
 #include "protocol/problem.h"
+#include "server/api.h"
 
 namespace scolopax::server {
 
@@ -81,8 +82,8 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   void sceneChanged(std::uint32_t revision, const nlohmann::json& patch) override {
     sendText(protocol::sceneText(revision, patch));
   }
-  void renderFailed(const std::string& message) override {
-    sendText(protocol::errorText(ProtocolError(422, "", message)));
+  void renderFailed(const Error& error) override {
+    sendText(protocol::errorText(ProtocolError(statusOf(error.code()), "", error.what())));
   }
   void sessionClosed(const std::string& reason) override {
     if (const auto socket = socket_.lock()) socket->close(1001, reason);

@@ -12,8 +12,10 @@ enum class ErrorCode {
   unsupported,  ///< valid, but not something this program does
   notFound,
   tooLarge,  ///< beyond a stated limit or the memory there is
+  busy,      ///< beyond a limit at this time: others hold what is missing
   io,        ///< reading or writing failed
   device,    ///< a GPU or its driver failed
+  cancelled  ///< given up: nobody wants the result any more
 };
 
 /// `what()` is one line a user can act on: file or field, what was expected, what was found.

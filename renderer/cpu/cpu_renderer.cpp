@@ -33,22 +33,27 @@ TileFunction chooseKernel(Scene scene, const kernel::SceneView& view, bool recor
 
 class CpuRenderer final : public Renderer {
  public:
-  CpuRenderer(std::shared_ptr<const Volume> volume, int threads)
-      : plan_(std::move(volume)), arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
+  CpuRenderer(std::shared_ptr<const Volume> volume, int threads, const std::shared_ptr<MemoryBudget>& memory)
+      : memory_(MemoryBudget::take(memory, MemoryUse::films)),
+        plan_(std::move(volume), memory),
+        arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
 
   std::string_view backendName() const override { return "cpu"; }
 
-  RebuildStats setScene(const Scene& scene) override {
+  RebuildStats setScene(const Scene& scene, std::stop_token stop) override {
     // Memory first: when there is none, plan and film stay as they were.
     Film resized;
     const bool newSize = scene.width != film_.width() || scene.height != film_.height();
     checkImageSize(scene);
+    const std::size_t bytes = filmBytes(std::size_t(scene.width) * std::size_t(scene.height), scene);
+    memory_.resize(std::max<std::uint64_t>(memory_.bytes(), bytes));
     if (newSize) resized.reset(scene.width, scene.height);
     RebuildStats stats;
-    arena_.execute([&] { stats = take(scene); });
-    if (newSize)
+    arena_.execute([&] { stats = take(scene, stop); });
+    if (newSize) {
       film_ = std::move(resized);
-    else if (stats.filmReset)
+      memory_.resize(bytes);
+    } else if (stats.filmReset)
       film_.reset(scene.width, scene.height);
     if (stats.filmReset) {
       resetRecords();
@@ -57,12 +62,19 @@ class CpuRenderer final : public Renderer {
     }
     return stats;
   }
+  bool takesLong(const Scene& scene) const override {
+    const auto pixels = std::size_t(scene.width) * std::size_t(scene.height);
+    // Memory of a large film takes its time to be given back, and records to be emptied.
+    const bool largeFilm = std::max(pixels, film_.pixelCount()) >= kLargeFilm &&
+                           (pixels != film_.pixelCount() || recording_ || counting_);
+    return largeFilm || scene.method == Method::automatic || plan_.takesLong(scene);
+  }
   Choice choice() const override {
     const Scene& scene = plan_.scene();
     return {scene.method, hasStep(scene.method) ? scene.step : 0};
   }
 
-  bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
+  bool renderPixels(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
     kernel::SceneView scene = plan_.view();
     scene.sampleBatch = sampleBatchFor(fastestInstructionSet());
     const Pass pass{scene,
@@ -79,25 +91,34 @@ class CpuRenderer final : public Renderer {
     arena_.execute([&] {
       tbb::parallel_for(0, tilesX * tilesY, [&](int i) { renderTileAt(pass, i % tilesX, i / tilesX); });
       complete = std::find(done_.begin(), done_.end(), 0) == done_.end();
-      if (!complete) return;
+    });
+    return complete;
+  }
+  void addPixels() override {
+    arena_.execute([&] {
       film_.add();
+      noise_.reset();
       if (recording_) first_.add(plan_.visibleChannels());
       if (counting_) addCosts();
       std::fill(done_.begin(), done_.end(), std::uint8_t(0));
     });
-    return complete;
   }
 
   std::uint32_t samples() const override { return film_.samples(); }
   double estimatedError() const override {
-    const double noise = film_.estimatedError();
+    if (!noise_) arena_.execute([&] { noise_ = film_.estimatedError(); });
+    const double noise = *noise_;
     if (!hasStep(plan_.scene().method)) return noise;
     // A film of few samples may be one of many that edits make, and is not worth the thumbnails.
     if (!bias_ && film_.samples() < kSamplesWorthBias) return noise;
     if (!bias_) arena_.execute([&] { bias_ = estimateBias(plan_); });
     return std::hypot(noise, *bias_);
   }
-  Image image() const override { return film_.image(); }
+  Image image() const override {
+    Image image;
+    arena_.execute([&] { image = film_.image(); });
+    return image;
+  }
 
   void countCosts() override {
     counting_ = true;
@@ -107,6 +128,7 @@ class CpuRenderer final : public Renderer {
 
   void recordAovs() override {
     counting_ = recording_ = true;
+    if (film_.pixelCount() > 0) memory_.resize(filmBytes(film_.pixelCount(), plan_.scene()));
     if (film_.pixelCount() > 0) film_.reset(film_.width(), film_.height());
     resetRecords();
   }
@@ -138,17 +160,17 @@ class CpuRenderer final : public Renderer {
 
  private:
   /// Updates the plan; what is left to us of the scene is chosen.
-  RebuildStats take(const Scene& scene) {
+  RebuildStats take(const Scene& scene, const std::stop_token& stop) {
     Scene chosen = scene;
     chosen.targetError = 0;  // makes no picture of its own
     if (scene.method != Method::automatic) {
       target_ = 0;  // what was chosen is not of this scene, even if it says the same
-      return plan_.update(chosen);
+      return plan_.update(chosen, stop);
     }
     // The choice before, if there was one: when nothing else is new either, the film goes on.
     chosen.method = automatic_.method;
     chosen.step = automatic_.step;
-    RebuildStats stats = plan_.update(chosen);
+    RebuildStats stats = plan_.update(chosen, stop);
     if (!stats.filmReset && scene.targetError == target_) return stats;
     // Half of the error is left to noise; light, with which this is not tried, may add to the bias.
     const double margin = scene.shading || scene.shadows ? 1.5 : 1;
@@ -167,9 +189,18 @@ class CpuRenderer final : public Renderer {
     return stats;
   }
 
+  /// Of a film of this size, and of all that is kept of its pixels.
+  std::size_t filmBytes(std::size_t pixels, const Scene& scene) const {
+    const std::size_t counted = counting_ ? sizeof(kernel::SampleCost) : 0;
+    const std::size_t recorded =
+        recording_ ? sizeof(std::uint64_t) + FirstCollisions::pixelBytes(scene.channels.size()) : 0;
+    return pixels * (Film::kPixelBytes + sizeof(std::uint8_t) + counted + recorded);
+  }
+
   void resetRecords() {
     const std::size_t pixels = film_.pixelCount();
     stats_ = {};
+    noise_.reset();
     try {
       done_.assign(pixels, 0);
       if (counting_) cost_.assign(pixels, {});
@@ -196,6 +227,7 @@ class CpuRenderer final : public Renderer {
     }
   }
 
+  MemoryBudget::Share memory_;  // of the film and what is recorded
   RenderPlan plan_;
   Film film_;
   std::vector<std::uint8_t> done_;  // pixels that a pass has behind it
@@ -205,17 +237,20 @@ class CpuRenderer final : public Renderer {
   std::vector<std::uint64_t> fetches_;  // one per pixel while recording
   FirstCollisions first_;
   static constexpr std::uint32_t kSamplesWorthBias = 16;
+  static constexpr std::size_t kLargeFilm = 1 << 20;
   Choice automatic_{Method::raymarch, 1};
   double automaticBias_ = 0;
-  double target_ = 0;                   // for which it was made
-  mutable std::optional<double> bias_;  // of the film, once somebody has asked for its error
+  double target_ = 0;                    // for which it was made
+  mutable std::optional<double> noise_;  // of the film as it stands, once somebody has asked for its error
+  mutable std::optional<double> bias_;   // of the film, once somebody has asked for its error
   mutable tbb::task_arena arena_;
 };
 
 }  // namespace
 
-std::unique_ptr<Renderer> makeCpuRenderer(std::shared_ptr<const Volume> volume, int threads) {
-  return std::make_unique<CpuRenderer>(std::move(volume), threads);
+std::unique_ptr<Renderer> makeCpuRenderer(std::shared_ptr<const Volume> volume, int threads,
+                                          std::shared_ptr<MemoryBudget> memory) {
+  return std::make_unique<CpuRenderer>(std::move(volume), threads, memory);
 }
 
 }  // namespace scolopax

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/data/aov.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -76,11 +79,13 @@ void FirstCollisions::reset(std::size_t pixels, std::size_t channels) {
 }
 
 void FirstCollisions::add(std::span<const int> volumeChannels) {
-  for (std::size_t i = 0; i < pass_.size(); ++i) {
-    if (pass_[i].channel < 0) continue;
-    depthSum_[i] += double(pass_[i].depth);
-    ++hits_[i * channels_ + std::size_t(volumeChannels[std::size_t(pass_[i].channel)])];
-  }
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pass_.size(), 1 << 14), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      if (pass_[i].channel < 0) continue;
+      depthSum_[i] += double(pass_[i].depth);
+      ++hits_[i * channels_ + std::size_t(volumeChannels[std::size_t(pass_[i].channel)])];
+    }
+  });
 }
 
 std::vector<float> FirstCollisions::depth() const {

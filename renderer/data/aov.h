@@ -32,6 +32,10 @@ class FirstCollisions {
  public:
   /// `channels`: of the volume.
   void reset(std::size_t pixels, std::size_t channels);
+  /// Of memory, for each pixel.
+  static std::size_t pixelBytes(std::size_t channels) {
+    return sizeof(kernel::FirstCollision) + sizeof(double) + channels * sizeof(std::uint32_t);
+  }
   /// Where a launcher puts one pass; committed by add(), otherwise lost.
   kernel::FirstCollision* pass() { return pass_.data(); }
   /// `volumeChannels`: of the visible ones, as a pass counts them.

@@ -3,9 +3,11 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <new>
 
@@ -26,10 +28,10 @@ void Film::reset(int width, int height) {
   samples_ = 0;
   try {
     pass_.resize(count);
-    sum_.assign(count, glm::dvec4(0));
-    squares_.assign(count, 0);
-    replicate_.assign(count, glm::dvec3(0));
-    replicateSquares_.assign(count, 0);
+    sum_.resize(count);
+    squares_.resize(count);
+    replicate_.resize(count);
+    replicateSquares_.resize(count);
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::tooLarge,
                 "image: no memory for " + std::to_string(width) + "x" + std::to_string(height));
@@ -37,11 +39,17 @@ void Film::reset(int width, int height) {
 }
 
 void Film::add() {
+  const bool first = samples_ == 0;
   const bool replicateEnds = (samples_ + 1) % kernel::kReplicateSamples == 0;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pass_.size(), 1 << 14),
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       for (std::size_t i = range.begin(); i < range.end(); ++i) {
                         const glm::dvec4 v(pass_[i]);
+                        if (first) {
+                          sum_[i] = glm::dvec4(0);
+                          squares_[i] = replicateSquares_[i] = 0;
+                          replicate_[i] = glm::dvec3(0);
+                        }
                         sum_[i] += v;
                         squares_[i] += squaredLength(glm::dvec3(v));
                         replicate_[i] += glm::dvec3(v);
@@ -54,9 +62,12 @@ void Film::add() {
 }
 
 Image Film::image() const {
-  Image image{width_, height_, std::vector<glm::vec4>(sum_.size(), glm::vec4(0))};
-  const double scale = samples_ > 0 ? 1.0 / samples_ : 0.0;
-  for (std::size_t i = 0; i < sum_.size(); ++i) image.pixels[i] = glm::vec4(sum_[i] * scale);
+  Image image{width_, height_, std::vector<glm::vec4>(sum_.size())};
+  if (samples_ == 0) return image;
+  const double scale = 1.0 / samples_;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sum_.size(), 1 << 14), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) image.pixels[i] = glm::vec4(sum_[i] * scale);
+  });
   return image;
 }
 
@@ -66,12 +77,17 @@ double Film::estimatedError() const {
   const bool enough = replicates >= kEnoughReplicates;
   // Parts of a pixel's sum that are independent of each other, and their number.
   const double n = enough ? replicates : samples_;
-  double deviations = 0;  // squared, of the parts, over pixels and components
-  for (std::size_t i = 0; i < sum_.size(); ++i) {
-    const glm::dvec3 whole = glm::dvec3(sum_[i]) - (enough ? replicate_[i] : glm::dvec3(0));
-    const double squares = enough ? replicateSquares_[i] : squares_[i];
-    deviations += std::max(0.0, squares - squaredLength(whole) / n);
-  }
+  const auto add = [&](const tbb::blocked_range<std::size_t>& range, double sum) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      const glm::dvec3 whole = glm::dvec3(sum_[i]) - (enough ? replicate_[i] : glm::dvec3(0));
+      const double squares = enough ? replicateSquares_[i] : squares_[i];
+      sum += std::max(0.0, squares - squaredLength(whole) / n);
+    }
+    return sum;
+  };
+  // Squared, of the parts, over pixels and components; the same bits for any number of threads.
+  const double deviations = tbb::parallel_deterministic_reduce(
+      tbb::blocked_range<std::size_t>(0, sum_.size(), 1 << 14), 0.0, add, std::plus<>());
   const double samplesPerPart = enough ? kernel::kReplicateSamples : 1;
   // A replicate that has only begun counts for nothing: its samples are not yet spread as well.
   const double varianceOfMeans = deviations / (n - 1) / (samplesPerPart * samplesPerPart * n);

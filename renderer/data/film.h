@@ -4,20 +4,24 @@
 #pragma once
 #include <cstdint>
 #include <glm/vec4.hpp>
-#include <vector>
 
+#include "renderer/core/raw_vector.h"
 #include "renderer/data/image.h"
 
 namespace scolopax {
 
 class Film {
  public:
-  /// Empties the film and sets its size. Throws Error(tooLarge) when the memory cannot be had.
+  /// Empties the film and sets its size. Takes no time: the first sample fills the memory. Throws
+  /// Error(tooLarge) when it cannot be had.
   void reset(int width, int height);
   /// Where a launcher puts one sample of every pixel, width x height; committed by add(), otherwise lost.
   glm::vec4* pass() { return pass_.data(); }
   /// Adds the pass to every pixel.
   void add();
+  /// Of memory, for each pixel.
+  static constexpr std::size_t kPixelBytes =
+      sizeof(glm::vec4) + sizeof(glm::dvec4) + sizeof(glm::dvec3) + 2 * sizeof(double);
   int width() const { return width_; }
   int height() const { return height_; }
   std::size_t pixelCount() const { return sum_.size(); }
@@ -34,12 +38,13 @@ class Film {
  private:
   int width_ = 0, height_ = 0;
   std::uint32_t samples_ = 0;
-  std::vector<glm::vec4> pass_;
-  std::vector<glm::dvec4> sum_;
-  std::vector<double> squares_;  // sum of r^2 + g^2 + b^2
+  RawVector<glm::vec4> pass_;
+  // Undefined as long as there is no sample.
+  RawVector<glm::dvec4> sum_;
+  RawVector<double> squares_;  // sum of r^2 + g^2 + b^2
   // The same over whole replicates of kernel::kReplicateSamples samples.
-  std::vector<glm::dvec3> replicate_;  // sum over the one that has begun
-  std::vector<double> replicateSquares_;
+  RawVector<glm::dvec3> replicate_;  // sum over the one that has begun
+  RawVector<double> replicateSquares_;
 };
 
 }  // namespace scolopax

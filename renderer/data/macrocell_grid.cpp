@@ -7,10 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <mutex>
 #include <type_traits>
 
+#include "renderer/core/error.h"
 #include "renderer/data/value_levels.h"
 
 namespace scolopax {
@@ -29,9 +28,19 @@ ValueInterval widen(ValueInterval v) {
   return v;
 }
 
+/// Cells lie between voxel centres: their support is size + 1 voxels an edge.
+glm::ivec3 cellsOf(glm::ivec3 dims, int size) {
+  return glm::max(glm::ivec3(1), (dims - 1 + size - 1) / size);
+}
+
+void checkWanted(const std::stop_token& stop) {
+  if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "the macrocells are not wanted any more");
+}
+
 /// Calls visit(cell, interval) for every macrocell, from many threads. lo > hi where no voxel is finite.
 template <class T, class Visit>
-void measure(const StridedVoxels<T>& voxels, glm::ivec3 dims, const MacrocellGrid& grid, Visit&& visit) {
+void measure(const StridedVoxels<T>& voxels, glm::ivec3 dims, const MacrocellGrid& grid,
+             const std::stop_token& stop, Visit&& visit) {
   constexpr bool kFloat = std::is_same_v<T, float>;
   constexpr T kMost = kFloat ? std::numeric_limits<T>::infinity() : std::numeric_limits<T>::max();
   constexpr T kLeast = kFloat ? -std::numeric_limits<T>::infinity() : std::numeric_limits<T>::lowest();
@@ -39,6 +48,7 @@ void measure(const StridedVoxels<T>& voxels, glm::ivec3 dims, const MacrocellGri
   tbb::parallel_for(0, grid.cells.z, [&](int z) {
     std::vector<T> least(rowLength), most(rowLength);
     for (int y = 0; y < grid.cells.y; ++y) {
+      checkWanted(stop);
       // All rows of voxels of a row of macrocells into one: a long loop that vectorises.
       std::fill(least.begin(), least.end(), kMost);
       std::fill(most.begin(), most.end(), kLeast);
@@ -67,12 +77,16 @@ void measure(const StridedVoxels<T>& voxels, glm::ivec3 dims, const MacrocellGri
 
 }  // namespace
 
-MacrocellGrid buildMacrocells(const Volume& volume, int size) {
+std::size_t intervalCount(const Volume& volume, int size) {
+  const glm::ivec3 cells = cellsOf(volume.grid().dims, size);
+  return std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z) * volume.channels().size();
+}
+
+MacrocellGrid buildMacrocells(const Volume& volume, int size, const std::stop_token& stop) {
   const glm::ivec3 dims = volume.grid().dims;
   MacrocellGrid grid;
   grid.size = size;
-  // Cells lie between voxel centres: their support is size + 1 voxels an edge.
-  for (int axis = 0; axis < 3; ++axis) grid.cells[axis] = std::max(1, (dims[axis] - 1 + size - 1) / size);
+  grid.cells = cellsOf(dims, size);
   const std::size_t channels = volume.channels().size();
   grid.intervals.resize(grid.cellCount() * channels);
   for (std::size_t n = 0; n < channels; ++n) {
@@ -83,16 +97,18 @@ MacrocellGrid buildMacrocells(const Volume& volume, int size) {
       ValueLevels levels;
       if constexpr (std::is_same_v<T, std::uint8_t>) {
         for (int i = 0; i < kernel::kMaxLevels; ++i) levels.values.push_back(float(i));
-        measure(voxels, dims, grid, [&](std::size_t cell, ValueInterval v) {
+        measure(voxels, dims, grid, stop, [&](std::size_t cell, ValueInterval v) {
           grid.intervals[cell * channels + n] = {std::uint8_t(v.lo), std::uint8_t(v.hi)};
         });
       } else {
         std::vector<ValueInterval> measured(grid.cellCount());
-        measure(voxels, dims, grid, [&](std::size_t cell, ValueInterval v) {
+        measure(voxels, dims, grid, stop, [&](std::size_t cell, ValueInterval v) {
           measured[cell] = std::is_same_v<T, float> ? widen(v) : v;
         });
+        checkWanted(stop);
         levels.values = chooseLevels(measured);
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, measured.size(), 4096), [&](const auto& range) {
+          checkWanted(stop);
           for (std::size_t cell = range.begin(); cell < range.end(); ++cell)
             grid.intervals[cell * channels + n] = encode(levels, measured[cell]);
         });
@@ -114,22 +130,6 @@ MacrocellGrid buildMacrocells(const Volume& volume, int size) {
         }
       });
   });
-  return grid;
-}
-
-std::shared_ptr<const MacrocellGrid> sharedMacrocells(const std::shared_ptr<const Volume>& volume, int size) {
-  struct Entry {
-    std::weak_ptr<const Volume> volume;  // tells a new volume at an old address from the old one
-    std::weak_ptr<const MacrocellGrid> grid;
-  };
-  static std::mutex mutex;
-  static std::map<std::pair<const Volume*, int>, Entry> entries;
-  std::lock_guard lock(mutex);
-  std::erase_if(entries, [](const auto& item) { return item.second.grid.expired(); });
-  Entry& entry = entries[{volume.get(), size}];
-  if (auto grid = entry.grid.lock(); grid && entry.volume.lock() == volume) return grid;
-  auto grid = std::make_shared<const MacrocellGrid>(buildMacrocells(*volume, size));
-  entry = {volume, grid};
   return grid;
 }
 

@@ -3,7 +3,7 @@
 // Volume once; majorant_grid and the kernels read it.
 #pragma once
 #include <glm/common.hpp>
-#include <memory>
+#include <stop_token>
 #include <vector>
 
 #include "renderer/data/volume.h"
@@ -58,6 +58,7 @@ struct MacrocellGrid {
   std::vector<kernel::LevelInterval> blocks;     ///< the same of blocks of cells (CellBlocks): what is in any
 
   std::size_t cellCount() const { return std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z); }
+  std::size_t sizeBytes() const { return (intervals.size() + blocks.size()) * sizeof(kernel::LevelInterval); }
   ValueInterval interval(std::size_t cell, std::size_t channel) const {
     return levels[channel].decode(intervals[cell * levels.size() + channel]);
   }
@@ -68,9 +69,10 @@ struct MacrocellGrid {
 /// where a channel's intervals have no more than kMaxLevels ends; else one half of the levels divides the
 /// range evenly, so that no interval grows by more than 1/127 of it at an end, and the other half follows the
 /// values' density.
-MacrocellGrid buildMacrocells(const Volume& volume, int size);
+/// Throws Error(cancelled) once `stop` is requested.
+MacrocellGrid buildMacrocells(const Volume& volume, int size, const std::stop_token& stop = {});
 
-/// The same, shared among everybody who asks for this volume and size while somebody holds it.
-std::shared_ptr<const MacrocellGrid> sharedMacrocells(const std::shared_ptr<const Volume>& volume, int size);
+/// Intervals of all channels in a grid of this size.
+std::size_t intervalCount(const Volume& volume, int size);
 
 }  // namespace scolopax

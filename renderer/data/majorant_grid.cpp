@@ -91,6 +91,12 @@ BoundTable buildBounds(const ValueLevels& levels, const TransferFunction& transf
   return table;
 }
 
+std::size_t MajorantGrid::sizeBytes(const MacrocellGrid& macrocells) {
+  const bool active = macrocells.levels.size() > kFewColumns;
+  return macrocells.cellCount() * (sizeof(TotalCode) + (active ? sizeof(std::uint32_t) : 0)) +
+         CellBlocks(macrocells.cells).count();
+}
+
 std::size_t MajorantGrid::update(std::shared_ptr<const MacrocellGrid> macrocells,
                                  std::vector<BoundTable> tables, bool sums) {
   const bool newCells = macrocells != macrocells_, all = newCells || sums != sums_;

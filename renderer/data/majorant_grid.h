@@ -21,6 +21,8 @@ class MajorantGrid {
   /// cells the total was worked out again. Nothing has changed when this throws.
   std::size_t update(std::shared_ptr<const MacrocellGrid> macrocells, std::vector<kernel::BoundTable> tables,
                      bool sums);
+  /// Memory that it takes for these macrocells, without theirs.
+  static std::size_t sizeBytes(const MacrocellGrid& macrocells);
   /// Valid until the next update.
   kernel::MajorantView view() const;
 

@@ -9,6 +9,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
+#include "renderer/data/shared_macrocells.h"
 
 namespace scolopax {
 namespace {
@@ -31,8 +32,21 @@ bool samePicture(Scene a, const Scene& b) {
 /// Whether the bound of all channels together is the sum of theirs.
 bool sumsExtinction(BlendMode blend) { return blend != BlendMode::max && blend != BlendMode::mix; }
 
-void check(const Scene& scene, const Volume& volume) {
-  const auto fail = [](const std::string& what) { throw Error(ErrorCode::badInput, what); };
+[[noreturn]] void fail(const std::string& what) { throw Error(ErrorCode::badInput, what); }
+
+}  // namespace
+
+void checkLight(const Light& light) {
+  const double length = glm::length(light.vector);
+  if (light.type != LightType::headlight && !std::isfinite(length))
+    fail("lights: the length of position and direction must be finite");
+  if (light.type == LightType::directional && !(length > 0)) fail("lights: the direction must not be zero");
+  for (const double value : {light.intensity, light.color.x, light.color.y, light.color.z})
+    if (!(value >= 0 && std::isfinite(value)))
+      fail("lights: colour and intensity must be finite and not negative");
+}
+
+void checkScene(const Scene& scene, const Volume& volume) {
   if (scene.channels.size() != volume.channels().size())
     fail("scene: expected " + std::to_string(volume.channels().size()) + " channels, found " +
          std::to_string(scene.channels.size()));
@@ -40,22 +54,12 @@ void check(const Scene& scene, const Volume& volume) {
   if (scene.lights.size() > std::size_t(kernel::kMaxLights))
     fail("lights: at most " + std::to_string(kernel::kMaxLights) + " are possible, found " +
          std::to_string(scene.lights.size()));
-  for (const Light& light : scene.lights) {
-    const double length = glm::length(light.vector);
-    if (light.type != LightType::headlight && !std::isfinite(length))
-      fail("lights: position and direction must be finite");
-    if (light.type == LightType::directional && !(length > 0)) fail("lights: the direction must not be zero");
-    for (const double value : {light.intensity, light.color.x, light.color.y, light.color.z})
-      if (!(value >= 0 && std::isfinite(value)))
-        fail("lights: colour and intensity must be finite and not negative");
-  }
+  for (const Light& light : scene.lights) checkLight(light);
   if (!(scene.step >= 0.01 && scene.step <= 100))
     fail("integrator.step: expected 0.01 to 100, found " + shortText(scene.step));
   if (scene.macrocell < 1 || scene.macrocell > 64)
     fail("integrator.macrocell: expected 1 to 64, found " + std::to_string(scene.macrocell));
 }
-
-}  // namespace
 
 namespace {
 static_assert(int(LightType::directional) == int(kernel::LightKind::directional) &&
@@ -113,16 +117,25 @@ void checkImageSize(const Scene& scene) {
                                          std::to_string(scene.width) + "x" + std::to_string(scene.height));
 }
 
-RebuildStats RenderPlan::update(const Scene& scene) {
+bool RenderPlan::takesLong(const Scene& scene) const {
+  // An edit may change the totals of all cells.
+  constexpr std::size_t kManyIntervals = 4 << 20;
+  return !macrocells_ || macrocells_->size != scene.macrocell ||
+         macrocells_->intervals.size() > kManyIntervals;
+}
+
+RebuildStats RenderPlan::update(const Scene& scene, const std::stop_token& stop) {
   const auto start = std::chrono::steady_clock::now();
-  check(scene, *volume_);
+  checkScene(scene, *volume_);
   RebuildStats stats;
   stats.filmReset = !scene_ || !samePicture(*scene_, scene);
   const auto rays = makeCameraRays(scene.camera, volume_->grid(), scene.width, scene.height);
 
   // Everything that can throw comes first and into new objects; the plan is replaced at the end.
   const bool newCells = !macrocells_ || macrocells_->size != scene.macrocell;
-  const auto macrocells = newCells ? sharedMacrocells(volume_, scene.macrocell) : macrocells_;
+  const auto macrocells = newCells ? sharedMacrocells(volume_, scene.macrocell, stop, memory_) : macrocells_;
+  auto majorantMemory = MemoryBudget::take(memory_, MemoryUse::grids);
+  if (newCells) majorantMemory.resize(MajorantGrid::sizeBytes(*macrocells));
   if (newCells) stats.macrocellChannels = int(volume_->channels().size());
   std::vector<std::optional<ChannelPlan>> plans = channels_;
   plans.resize(scene.channels.size());
@@ -153,6 +166,7 @@ RebuildStats RenderPlan::update(const Scene& scene) {
 
   scene_ = std::move(next);
   macrocells_ = macrocells;
+  if (newCells) majorantMemory_ = std::move(majorantMemory);
   channels_ = std::move(plans);
   channelViews_ = std::move(views);
   visibleChannels_ = std::move(visible);

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "renderer/data/majorant_grid.h"
@@ -14,12 +15,20 @@ namespace scolopax {
 
 /// Throws Error(badInput) when a side is not in 1..kMaxImageSide.
 void checkImageSize(const Scene& scene);
+/// Throws Error(badInput) for a light whose numbers cannot be worked with.
+void checkLight(const Light& light);
+/// Throws Error(badInput) when update() would refuse the scene for anything but its camera and curves.
+void checkScene(const Scene& scene, const Volume& volume);
 
 class RenderPlan {
  public:
-  explicit RenderPlan(std::shared_ptr<const Volume> volume) : volume_(std::move(volume)) {}
-  /// Redoes what the new scene makes stale. The plan is unchanged when this throws Error(badInput).
-  RebuildStats update(const Scene& scene);
+  explicit RenderPlan(std::shared_ptr<const Volume> volume, std::shared_ptr<MemoryBudget> memory = nullptr)
+      : volume_(std::move(volume)), memory_(std::move(memory)) {}
+  /// Redoes what the new scene makes stale. The plan is unchanged when this throws, Error(badInput) or, once
+  /// `stop` is requested, Error(cancelled). Macrocells and what is kept of each are of the budget of memory.
+  RebuildStats update(const Scene& scene, const std::stop_token& stop = {});
+  /// Whether that takes longer than a few milliseconds.
+  bool takesLong(const Scene& scene) const;
   const Scene& scene() const { return *scene_; }
   const Grid& grid() const { return volume_->grid(); }
   /// Valid until the next update.
@@ -33,9 +42,11 @@ class RenderPlan {
     std::optional<kernel::BoundTable> bounds;  // none as long as the channel has never been seen so
   };
   std::shared_ptr<const Volume> volume_;
+  const std::shared_ptr<MemoryBudget> memory_;
   std::optional<Scene> scene_;
   std::shared_ptr<const MacrocellGrid> macrocells_;
   std::vector<std::optional<ChannelPlan>> channels_;
+  MemoryBudget::Share majorantMemory_;
   MajorantGrid majorants_;
   std::vector<kernel::ChannelView> channelViews_;
   std::vector<int> visibleChannels_;

@@ -14,7 +14,7 @@
 #include <memory>
 
 #include "renderer/core/error.h"
-#include "renderer/data/macrocell_grid.h"
+#include "renderer/data/shared_macrocells.h"
 #include "renderer/io/image_file.h"
 #include "renderer/io/output_file.h"
 #include "renderer/metrics/flip.h"

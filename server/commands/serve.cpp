@@ -35,6 +35,7 @@ struct ServeOptions {
   std::string configFile;
   std::string logLevel = "info";
   double keepSeconds = 300;
+  std::uint64_t maxMemoryMebibytes = io::defaultMemoryLimitBytes() / 2 >> 20;
 };
 
 /// The built page: where the build left it, or beside the folder of the program; empty when there is none.
@@ -85,6 +86,7 @@ void serve(ServeOptions options) {
 
   if (!options.tokenFile.empty()) options.config.token = readTokenFile(options.tokenFile);
   options.config.keepSession = std::chrono::milliseconds((long long)(options.keepSeconds * 1000));
+  options.config.maxMemoryBytes = options.maxMemoryMebibytes << 20;
   options.config.webRoot = findWebRoot();
   const server::Config& config = options.config;
   if (config.certificateFile.empty() != config.keyFile.empty())
@@ -102,10 +104,13 @@ void serve(ServeOptions options) {
               dataset.volume->channels().size());
   }
   const int threads = options.config.threads;
+  const auto memory = std::make_shared<MemoryBudget>(options.config.maxMemoryBytes);
   server::Application application(
       options.config, std::move(datasets),
-      [threads](std::shared_ptr<const Volume> volume) { return makeCpuRenderer(std::move(volume), threads); },
-      warn);
+      [threads, memory](std::shared_ptr<const Volume> volume) {
+        return makeCpuRenderer(std::move(volume), threads, memory);
+      },
+      memory, warn);
   catchSignals();
   application.start();
   std::printf("Scolopax is ready: %s\n", application.url().c_str());
@@ -157,6 +162,10 @@ CLI::App* addServeCommand(CLI::App& root) {
   limit("max-sessions", config.maxSessions, "Sessions at once")->check(CLI::PositiveNumber);
   limit("max-clients", config.maxClients, "Streams at once")->check(CLI::PositiveNumber);
   limit("max-image", config.maxPixels, "Pixels of one picture")->check(CLI::PositiveNumber);
+  limit(
+      "max-memory", options->maxMemoryMebibytes,
+      "MiB of memory beside the volumes: films, pictures, encodings, macrocells; a quarter of the machine's")
+      ->check(CLI::Range(std::uint64_t(64), std::uint64_t(1) << 32));
   limit("max-render-seconds", config.maxRenderSeconds, "Seconds of one POST /render")
       ->check(CLI::PositiveNumber);
   limit("max-renders", config.maxRenders, "POST /render at once")->check(CLI::PositiveNumber);

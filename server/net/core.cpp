@@ -5,11 +5,16 @@
 
 namespace scolopax::net {
 
+namespace {
+constexpr std::size_t kBulkThreads = 2;
+}  // namespace
+
 Core::Core(Options given)
     : options(std::move(given)),
       files(options.staticRoot),
       tls(loadTls(options.certificateFile, options.keyFile)),
       workers(static_cast<std::size_t>(std::max(1, options.workers))),
+      bulkWorkers(kBulkThreads),
       slowWorkers(static_cast<std::size_t>(std::max(1, options.longRequests))) {}
 
 Response Core::problem(int status, const std::string& detail) const {
@@ -38,7 +43,7 @@ void Core::enter(const std::shared_ptr<Connection>& connection) {
   bool cut = false;
   {
     const std::lock_guard lock(mutex_);
-    connections_.emplace(connection.get(), connection);
+    connections_.emplace(connection.get(), Entry{connection, arrivals_++});
     stop = stopping_;
     cut = cutting_;
   }
@@ -53,6 +58,37 @@ void Core::leave(Connection* connection) {
   left_.notify_all();
 }
 
+void Core::trust(Connection* connection) {
+  const std::lock_guard lock(mutex_);
+  const auto found = connections_.find(connection);
+  if (found != connections_.end()) found->second.stranger = false;
+}
+
+bool Core::makeRoom() {
+  std::shared_ptr<Connection> oldest;
+  std::size_t taken = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    std::size_t strangers = 0;
+    Entry* first = nullptr;
+    for (auto& [key, entry] : connections_) {
+      if (entry.leaving) continue;
+      ++taken;
+      if (!entry.stranger) continue;
+      ++strangers;
+      if (!first || entry.arrival < first->arrival) first = &entry;
+    }
+    const std::size_t most = options.maxConnections;
+    if (first && (taken >= most || strangers >= std::max<std::size_t>(most / 2, 1))) {
+      first->leaving = true;
+      oldest = first->connection.lock();
+      --taken;
+    }
+  }
+  if (oldest) oldest->cut();
+  return taken < options.maxConnections;
+}
+
 std::size_t Core::connectionCount() const {
   const std::lock_guard lock(mutex_);
   return connections_.size();
@@ -60,8 +96,8 @@ std::size_t Core::connectionCount() const {
 
 std::vector<std::shared_ptr<Connection>> Core::connections() const {
   std::vector<std::shared_ptr<Connection>> alive;
-  for (const auto& [key, weak] : connections_) {
-    if (auto connection = weak.lock()) alive.push_back(std::move(connection));
+  for (const auto& [key, entry] : connections_) {
+    if (auto connection = entry.connection.lock()) alive.push_back(std::move(connection));
   }
   return alive;
 }

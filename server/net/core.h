@@ -44,6 +44,11 @@ class Core {
 
   /// From here until leave() the server waits for this connection when it stops.
   void enter(const std::shared_ptr<Connection>& connection);
+  /// The connection is no stranger's any more: it is never cut to make room.
+  void trust(Connection* connection);
+  /// Whether there is a place for one more connection. Strangers have half of the places at most: when they
+  /// have them all, or all are taken, the one that came first is cut.
+  bool makeRoom();
   /// The last thing that a connection does with its core.
   void leave(Connection* connection);
   std::size_t connectionCount() const;
@@ -61,16 +66,29 @@ class Core {
   UpgradeHandler upgradeHandler;
   /// Shared with WebSocket handles, which may outlive the server.
   std::shared_ptr<asio::io_context> io = std::make_shared<asio::io_context>();
+  /// Bytes; shared as well.
+  std::shared_ptr<std::atomic<std::size_t>> unsentTexts = std::make_shared<std::atomic<std::size_t>>(0);
   asio::thread_pool workers;
+  asio::thread_pool bulkWorkers;
+  /// For ordinary work on so many bytes: who sends much waits with his like.
+  asio::thread_pool& workersFor(std::size_t bytes) { return bytes > kBulkBytes ? bulkWorkers : workers; }
   asio::thread_pool slowWorkers;
   std::atomic<int> slowRunning{0};
 
  private:
+  struct Entry {
+    std::weak_ptr<Connection> connection;
+    std::uint64_t arrival;  ///< counts those who enter
+    bool stranger = true;
+    bool leaving = false;  ///< was cut to make room
+  };
+  static constexpr std::size_t kBulkBytes = 64 << 10;
   std::vector<std::shared_ptr<Connection>> connections() const;
 
   mutable std::mutex mutex_;
   std::condition_variable left_;
-  std::map<Connection*, std::weak_ptr<Connection>> connections_;
+  std::map<Connection*, Entry> connections_;
+  std::uint64_t arrivals_ = 0;
   std::atomic<bool> stopping_{false};
   bool cutting_ = false;
 };

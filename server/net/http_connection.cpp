@@ -97,7 +97,7 @@ class ClientWatch {
   }
   ClientWatch(const ClientWatch&) = delete;
   ClientWatch& operator=(const ClientWatch&) = delete;
-  std::shared_ptr<const std::atomic<bool>> gone() const { return {state_, &state_->gone}; }
+  std::stop_token gone() const { return state_->gone.get_token(); }
 
  private:
   struct State {
@@ -107,14 +107,16 @@ class ClientWatch {
       state->timer.async_wait([state](const error_code&) {
         if (!state->alive) return;
         pollfd asked{state->socket.native_handle(), POLLRDHUP, 0};
-        state->gone = poll(&asked, 1, 0) > 0;
-        if (!state->gone) wait(state);
+        if (poll(&asked, 1, 0) > 0)
+          state->gone.request_stop();
+        else
+          wait(state);
       });
     }
     tcp::socket& socket;
     asio::steady_timer timer;
     bool alive = true;
-    std::atomic<bool> gone{false};
+    std::stop_source gone;
   };
   std::shared_ptr<State> state_;
 };
@@ -207,6 +209,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
       std::optional<Response> refused = authorize(request);
       if (refused) co_return co_await write(std::move(*refused), keepAlive_);
     }
+    if (!core_.options.knows || core_.options.knows(request)) core_.trust(this);
     if (boost::beast::websocket::is_upgrade(parser.get())) co_return co_await upgrade(parser, request);
 
     RouteMatch match = core_.router.find(request.method, request.path);
@@ -287,7 +290,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
   awaitable<Response> handle(const Route& route, Request& request) {
     if (route.kind == RouteKind::quick) {
-      co_return co_await runOn<Response>(core_.workers,
+      co_return co_await runOn<Response>(core_.workersFor(request.body.size()),
                                          [&] { return core_.guarded(route.handler, request); });
     }
     const SlowSlot slot(core_);

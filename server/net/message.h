@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // One HTTP request as handlers see it, already checked and decoded, and the response they return.
 #pragma once
-#include <atomic>
 #include <functional>
 #include <map>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -28,8 +28,8 @@ struct Request {
   std::string body;                  ///< whole and within the limit; empty in authorize and upgrades
   std::vector<std::string> matches;  ///< regex groups of the route; [0] is the whole path
   std::string remoteAddress;         ///< numeric, without the port
-  /// For RouteKind::slow: becomes true when the client has closed without waiting for the answer. Else null.
-  std::shared_ptr<const std::atomic<bool>> gone;
+  /// For RouteKind::slow: requested when the client has closed without waiting for the answer.
+  std::stop_token gone;
 
   /// First header (query value) of that name, or nullptr.
   const std::string* header(std::string_view name) const;
@@ -41,7 +41,8 @@ struct Response {
   std::string contentType;  ///< empty: no Content-Type
   std::string body;
   std::vector<std::pair<std::string, std::string>>
-      headers;  ///< further ones; lengths are the server's business
+      headers;                            ///< further ones; lengths are the server's business
+  std::shared_ptr<const void> keep = {};  ///< what lives until the answer has been sent
 };
 
 /// Runs on a worker thread. What it throws becomes a 500 that says nothing about the cause, and a log line.

@@ -8,9 +8,28 @@ namespace scolopax::net {
 
 bool Outbox::pushText(std::string text) {
   if (closing()) return true;
-  if (texts_.size() >= textLimit_) return false;
+  if (!hasRoomFor(text.size())) return false;
+  unsent_ += text.size();
+  *unsentByAll_ += text.size();
   texts_.push_back(std::move(text));
   return true;
+}
+
+bool Outbox::hasRoomFor(std::size_t bytes) const {
+  if (texts_.size() >= limits_.count) return false;
+  if (texts_.empty()) return true;  // a single one may be as large as it is
+  const std::size_t mine = unsent_ + bytes;
+  return mine <= limits_.fairBytes || (mine <= limits_.bytes && *unsentByAll_ + bytes <= limits_.bytesOfAll);
+}
+
+void Outbox::release(std::size_t bytes) {
+  unsent_ -= bytes;
+  *unsentByAll_ -= bytes;
+}
+
+void Outbox::dropTexts() {
+  texts_.clear();
+  release(unsent_ - sending_);
 }
 
 void Outbox::offer(Frame frame) {
@@ -33,8 +52,8 @@ void Outbox::acknowledge(std::uint32_t number) {
   stats_.unacknowledged = static_cast<int>(unacknowledged_.size());
 }
 
-void Outbox::close(CloseMessage message, bool dropTexts) {
-  if (dropTexts) texts_.clear();
+void Outbox::close(CloseMessage message, bool withoutTexts) {
+  if (withoutTexts) dropTexts();
   if (closing()) return;
   close_ = std::move(message);
   pending_.reset();
@@ -42,7 +61,8 @@ void Outbox::close(CloseMessage message, bool dropTexts) {
 }
 
 void Outbox::clear() {
-  texts_.clear();
+  dropTexts();
+  release(std::exchange(sending_, 0));
   pending_.reset();
   close_.reset();
   closeSent_ = true;
@@ -50,7 +70,9 @@ void Outbox::clear() {
 }
 
 std::optional<Outbox::Item> Outbox::next() {
+  release(std::exchange(sending_, 0));
   if (!texts_.empty()) {
+    sending_ = texts_.front().size();
     Item item = std::move(texts_.front());
     texts_.pop_front();
     ++stats_.textsSent;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What one WebSocket client is still to be sent. Latest frame wins is decided here, away from any socket.
 #pragma once
+#include <atomic>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -19,18 +21,26 @@ struct CloseMessage {
 /// Not thread-safe. One consumer calls next() whenever the socket is free for another write.
 class Outbox {
  public:
-  explicit Outbox(std::size_t textLimit) : textLimit_(textLimit) {}
+  /// Bytes of texts that all clients of a server have not been sent yet.
+  using UnsentBytes = std::shared_ptr<std::atomic<std::size_t>>;
+  explicit Outbox(const TextLimits& limits,
+                  UnsentBytes unsentByAll = std::make_shared<std::atomic<std::size_t>>(0))
+      : limits_(limits), unsentByAll_(std::move(unsentByAll)) {}
+  ~Outbox() { clear(); }
+  Outbox(const Outbox&) = delete;
+  Outbox& operator=(const Outbox&) = delete;
 
-  /// False when the queue is full: the text is dropped, and the caller closes the connection.
+  /// False when it would go beyond a limit: the text is dropped, and the caller closes the connection.
   bool pushText(std::string text);
   void offer(Frame frame);
   void withdraw();
   void acknowledge(std::uint32_t number);
-  /// The first one counts. Frames no longer go out, texts still do, unless `dropTexts`.
-  void close(CloseMessage message, bool dropTexts);
+  /// The first one counts. Frames no longer go out, texts still do, unless it is `withoutTexts`.
+  void close(CloseMessage message, bool withoutTexts);
 
   using Item = std::variant<std::string, Frame, CloseMessage>;
-  /// Texts first, then a frame if the window is open, the close message last of all; nullopt: nothing now.
+  /// What it gave before counts as sent. Texts first, then a frame if the window is open, the close message
+  /// last of all; nullopt: nothing now.
   std::optional<Item> next();
 
   /// The connection has ended: nothing is kept that could not be sent.
@@ -40,8 +50,15 @@ class Outbox {
   const WebSocketStats& stats() const { return stats_; }
 
  private:
-  std::size_t textLimit_;
+  bool hasRoomFor(std::size_t bytes) const;
+  void dropTexts();
+  void release(std::size_t bytes);
+
+  const TextLimits limits_;
+  const UnsentBytes unsentByAll_;
   std::deque<std::string> texts_;
+  std::size_t unsent_ = 0;                    ///< bytes of texts_, and of the text that is being sent
+  std::size_t sending_ = 0;                   ///< of the latter
   std::optional<Frame> pending_;              ///< the one waiting place
   std::deque<std::uint32_t> unacknowledged_;  ///< in the order sent, at most kFrameWindow
   std::optional<CloseMessage> close_;

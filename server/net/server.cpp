@@ -68,10 +68,10 @@ struct Server::Impl {
         co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, error));
         continue;
       }
-      const std::size_t count = core.connectionCount();
-      if (count >= core.options.maxConnections + kRefusedAtOnce) continue;
+      const bool full = !core.makeRoom();
+      if (core.connectionCount() >= core.options.maxConnections + kRefusedAtOnce) continue;
       socket.set_option(tcp::no_delay(true), error);
-      serveHttp(core, std::move(socket), count >= core.options.maxConnections);
+      serveHttp(core, std::move(socket), full);
     }
   }
 
@@ -120,6 +120,7 @@ void Server::stop(std::chrono::milliseconds grace) {
   // Without io->stop(): what is left to run are cancelled timers, and running them is what frees them.
   for (std::thread& thread : impl_->threads) thread.join();
   impl_->core.workers.join();
+  impl_->core.bulkWorkers.join();
   impl_->core.slowWorkers.join();
 }
 

@@ -27,13 +27,14 @@ struct Options {
   std::string host = "127.0.0.1";  ///< name or address; the first that it resolves to is bound
   std::uint16_t port = 8080;       ///< 0: any free one
 
-  std::size_t headerLimit = 16 << 10;   ///< bytes of a request's head; beyond: 431
-  std::size_t bodyLimit = 4 << 20;      ///< bytes of a request's body; beyond: 413
-  std::size_t messageLimit = 1 << 20;   ///< bytes of a WebSocket message; beyond: closed with 1009
-  std::size_t controlQueueLimit = 256;  ///< texts that wait for one client; beyond: closed with 1008
-  std::size_t maxConnections = 512;     ///< beyond: 503
-  int workers = 4;                      ///< threads for ordinary handlers and WebSocket events
-  int longRequests = 16;                ///< RouteKind::slow requests at once; beyond: 503
+  std::size_t headerLimit = 16 << 10;  ///< bytes of a request's head; beyond: 431
+  std::size_t bodyLimit = 4 << 20;     ///< bytes of a request's body; beyond: 413
+  std::size_t messageLimit = 1 << 20;  ///< bytes of a WebSocket message; beyond: closed with 1009
+  TextLimits unsentTexts;
+  /// Beyond: 503. Half of them at most may be strangers', who have shown no token yet.
+  std::size_t maxConnections = 512;
+  int workers = 4;        ///< threads for ordinary handlers and WebSocket events
+  int longRequests = 16;  ///< RouteKind::slow requests at once; beyond: 503
 
   std::chrono::milliseconds headTimeout{5'000};   ///< from the first byte of a head to its end
   std::chrono::milliseconds idleTimeout{30'000};  ///< between the requests of a kept connection
@@ -49,6 +50,8 @@ struct Options {
   /// Called first for every request and upgrade, on an I/O thread, before the body is read: must be quick and
   /// thread-safe. A Response refuses.
   std::function<std::optional<Response>(const Request&)> authorize;
+  /// Whether a request that `authorize` let pass comes from somebody known; not set: each does.
+  std::function<bool(const Request&)> knows;
   /// Formats the server's own refusals (404, 405, 413, ...).
   std::function<Response(int status, const std::string& detail)> problem;
   /// Last touch on every response, e.g. security headers.

@@ -2,6 +2,7 @@
 #include "server/net/url.h"
 
 #include <algorithm>
+#include <charconv>
 
 namespace scolopax::net {
 namespace {
@@ -81,10 +82,33 @@ bool equalIgnoringCase(std::string_view a, std::string_view b) {
   return a.size() == b.size() && !less(a, b) && !less(b, a);
 }
 
+std::optional<Authority> parseAuthority(std::string_view text) {
+  const bool bracketed = text.starts_with('[');
+  const std::size_t end = bracketed ? text.find(']') + 1 : std::min(text.find(':'), text.size());
+  const std::string_view host = text.substr(0, end);
+  const std::string_view name = bracketed && end > 2 ? host.substr(1, end - 2) : bracketed ? "" : host;
+  const auto isAddress = [](char c) { return hexDigit(c) >= 0 || c == ':' || c == '.'; };
+  if (name.empty() || !std::all_of(name.begin(), name.end(),
+                                   [&](char c) { return bracketed ? isAddress(c) : isUnreserved(c); }))
+    return std::nullopt;
+  const std::string_view rest = text.substr(end);
+  if (rest.empty()) return Authority{host, std::nullopt};
+  std::uint16_t port = 0;
+  const char* const last = rest.data() + rest.size();
+  const auto [stop, error] = std::from_chars(rest.data() + 1, last, port);
+  if (rest.front() != ':' || error != std::errc() || stop != last) return std::nullopt;
+  return Authority{host, port};
+}
+
 bool sameOrigin(std::string_view origin, std::string_view host) {
-  const std::size_t scheme = origin.find("://");
-  return scheme != std::string_view::npos && !host.empty() &&
-         equalIgnoringCase(origin.substr(scheme + 3), host);
+  const std::size_t mark = std::min(origin.find("://"), origin.size());
+  const std::string_view scheme = origin.substr(0, mark);
+  const bool secure = equalIgnoringCase(scheme, "https");
+  if ((!secure && !equalIgnoringCase(scheme, "http")) || mark == origin.size()) return false;
+  const auto from = parseAuthority(origin.substr(mark + 3)), to = parseAuthority(host);
+  const std::uint16_t usual = secure ? 443 : 80;
+  return from && to && equalIgnoringCase(from->host, to->host) &&
+         from->port.value_or(usual) == to->port.value_or(usual);
 }
 
 bool originAllowed(const Request& request, const std::vector<std::string>& allowed) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Request targets and origins: decoding and comparing, nothing else.
 #pragma once
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,8 +23,16 @@ struct Target {
 /// Origin form alone ("/path?query"); nullopt for anything else or for bad encoding.
 std::optional<Target> parseTarget(std::string_view target);
 
-/// Whether an Origin header names the host that the request was sent to. The scheme is ignored: a proxy in
-/// front may speak TLS. False for "null".
+/// What a Host header holds, and an origin after its scheme.
+struct Authority {
+  std::string_view host;  ///< a name or IPv4 address, or "[...]" with an IPv6 address
+  std::optional<std::uint16_t> port;
+};
+/// nullopt for anything but a host and maybe a port (RFC 3986, 3.2.2): no user, no path, nothing behind "]".
+std::optional<Authority> parseAuthority(std::string_view text);
+
+/// Whether an Origin header names the host that the request was sent to, by http or by https, whichever: a
+/// proxy in front may speak TLS. False for "null" and other schemes.
 bool sameOrigin(std::string_view origin, std::string_view host);
 /// The rule for upgrades: no Origin (not a browser), the own one, or one of `allowed`.
 bool originAllowed(const Request& request, const std::vector<std::string>& allowed);

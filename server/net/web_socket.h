@@ -22,6 +22,14 @@ struct Frame {
   std::shared_ptr<const std::vector<unsigned char>> payload;  ///< may be null
 };
 
+/// What may wait to be read by clients, as text. One that wants more is closed with 1008.
+struct TextLimits {
+  std::size_t count = 256;            ///< texts for one client
+  std::size_t bytes = 4 << 20;        ///< of the texts for one client, unless there is but one
+  std::size_t bytesOfAll = 64 << 20;  ///< of those for all clients together
+  std::size_t fairBytes = 256 << 10;  ///< for one client, even when all together have more than they may
+};
+
 struct WebSocketStats {
   std::uint64_t framesSent = 0;
   std::uint64_t framesReplaced = 0;  ///< offered, but a newer one came before the client could take it
@@ -38,7 +46,7 @@ inline constexpr int kFrameWindow = 2;
 class WebSocket {
  public:
   virtual ~WebSocket() = default;
-  /// Queued in order; when Options::controlQueueLimit texts wait, the connection is closed with 1008.
+  /// Queued in order; beyond Options::unsentTexts the connection is closed with 1008.
   virtual void sendText(std::string text) = 0;
   /// Takes the one waiting place, replacing a frame that is still there.
   virtual void offerFrame(Frame frame) = 0;

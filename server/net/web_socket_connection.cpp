@@ -41,7 +41,7 @@ class WebSocketConnection : public PreparedWebSocket,
                             public std::enable_shared_from_this<WebSocketConnection> {
  public:
   explicit WebSocketConnection(Core& core)
-      : io_(core.io), core_(core), outbox_(core.options.controlQueueLimit) {}
+      : io_(core.io), core_(core), outbox_(core.options.unsentTexts, core.unsentTexts) {}
 
   // The handle, from any thread.
 
@@ -147,7 +147,8 @@ class WebSocketConnection : public PreparedWebSocket,
     }
     std::string text = beast::buffers_to_string(buffer_.data());
     buffer_.consume(buffer_.size());
-    asio::post(core_.workers, [self = shared_from_this(), text = std::move(text)]() mutable {
+    asio::thread_pool& workers = core_.workersFor(text.size());
+    asio::post(workers, [self = shared_from_this(), text = std::move(text)]() mutable {
       self->deliver(std::move(text));
       asio::post(*self->strand_, [self] { self->read(); });
     });
@@ -272,6 +273,7 @@ class WebSocketConnection : public PreparedWebSocket,
 std::shared_ptr<PreparedWebSocket> prepareWebSocket(Core& core) {
   auto connection = std::make_shared<WebSocketConnection>(core);
   core.enter(connection);
+  core.trust(connection.get());
   return connection;
 }
 

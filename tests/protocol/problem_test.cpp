@@ -24,5 +24,17 @@ TEST(ProblemJson, ReplacesBytesThatAreNotUtf8) {
   EXPECT_EQ(json::parse(problemJson(400, "a\xff"))["detail"], "a\xef\xbf\xbd");
 }
 
+TEST(ProblemJson, EchoesNoMoreThanALineOfWhatItWasSent) {
+  EXPECT_EQ(shortened("short"), "short");
+  EXPECT_EQ(shortened("12345678", 8), "12345678");
+  EXPECT_EQ(shortened("123456789", 8), "12345...");
+  EXPECT_EQ(shortened("1234\xC3\xBC"
+                      "6789",
+                      8),
+            "1234...");  // not in the middle of a character
+  const std::string key(1 << 20, 'k');
+  EXPECT_LT(problemJson(ProtocolError(422, "/" + key, key)).size(), 2000u);
+}
+
 }  // namespace
 }  // namespace scolopax::protocol

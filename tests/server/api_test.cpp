@@ -28,7 +28,7 @@ struct Api {
   SceneResolver resolver{datasets, {64, 1000}};
   StreamHub streams{workshop.store, metrics, {}};
   std::atomic<bool> stopping{false};
-  std::atomic<bool> cutting{false};
+  std::stop_source cutting;
   ApiContext context{config,
                      *datasets,
                      resolver,
@@ -38,9 +38,10 @@ struct Api {
                      [this](const std::shared_ptr<const Volume>&) {
                        return std::make_unique<FakeRenderer>(workshop.control);
                      },
+                     nullptr,
                      [](const std::string&) {},
                      stopping,
-                     cutting,
+                     cutting.get_token(),
                      [] {
                        return json{{"backend", "fake"}};
                      }};
@@ -165,7 +166,7 @@ TEST(Api, RefusesOneRenderTooManyWith503) {
 
 TEST(Api, EndsARenderWhenTheServerStops) {
   Api api;
-  api.workshop.control->duringPass = [&] { api.stopping = api.cutting = true; };
+  api.workshop.control->duringPass = [&] { api.stopping = true, api.cutting.request_stop(); };
   EXPECT_EQ(api.errorOf("POST", "/api/v1/render", kSmallRender).first, 503);
   EXPECT_EQ(api.errorOf("GET", "/readyz").first, 503);
   EXPECT_EQ(api.call("GET", "/healthz").status, 200);

@@ -133,7 +133,8 @@ TEST_F(AuthorizerTest, TakesTheCookieForReading) {
 TEST_F(AuthorizerTest, TakesTheCookieForWritingFromTheOwnPageOnly) {
   for (const char* method : {"POST", "PUT", "PATCH", "DELETE", "OPTIONS"}) {
     EXPECT_EQ(status(withCookie(method, "/api/v1/sessions")), 403) << "no Origin";
-    for (const char* origin : {"http://evil.example", "null", "http://127.0.0.1:8081", "http://127.0.0.1"}) {
+    for (const char* origin : {"http://evil.example", "null", "http://127.0.0.1:8081", "http://127.0.0.1",
+                               "ftp://127.0.0.1:8080", "http://127.0.0.1:8080/"}) {
       Request asked = withCookie(method, "/api/v1/sessions");
       asked.headers.emplace("Origin", origin);
       EXPECT_EQ(status(asked), 403) << origin;
@@ -144,6 +145,15 @@ TEST_F(AuthorizerTest, TakesTheCookieForWritingFromTheOwnPageOnly) {
       EXPECT_EQ(status(asked), 0) << origin;
     }
   }
+}
+
+TEST_F(AuthorizerTest, KnowsThoseWhoShowTheTokenAndNotThoseForWhomADoorIsOpen) {
+  EXPECT_TRUE(authorizer_.knows(withCookie("GET", "/")));
+  Request open = request("GET", "/healthz");
+  EXPECT_EQ(status(open), 0);
+  EXPECT_FALSE(authorizer_.knows(open));
+  open.headers.emplace("Authorization", "Bearer " + kToken);
+  EXPECT_TRUE(authorizer_.knows(open));
 }
 
 TEST_F(AuthorizerTest, RefusesForeignHostNamesOnLoopback) {
@@ -160,7 +170,8 @@ TEST_F(AuthorizerTest, RefusesForeignHostNamesOnLoopback) {
     EXPECT_EQ(statusFor(authorizer_, host), 0) << host;
   }
   for (const char* host : {"evil.example", "evil.example:8080", "127.evil.example", "localhost.evil.example",
-                           "[::2]", "", "127.0.0.1@evil.example"}) {
+                           "[::2]", "", "127.0.0.1@evil.example", "[::1].evil.example",
+                           "localhost:80@evil.example", "127.0.0.1:80:90", "localhost:"}) {
     EXPECT_EQ(statusFor(authorizer_, host), 421) << host;
     EXPECT_EQ(statusFor(Authorizer(kToken, false), host), 0) << host;
   }

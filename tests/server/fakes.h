@@ -40,6 +40,33 @@ struct FakeControl {
   std::vector<std::uint32_t> passes;       ///< the seed of the scene of each pass that was not cancelled
   std::vector<std::pair<int, int>> sizes;  ///< of each such pass
   int renderersMade = 0;
+  bool takesLong = false;                         ///< of every scene, not only of a renderer's first
+  std::function<void(std::stop_token)> building;  ///< called in setScene
+  std::shared_ptr<MemoryBudget> memory;           ///< of which films take a byte a pixel
+};
+
+/// Begins no job before it is told to, or each at once.
+class FakeBackground : public Background {
+ public:
+  bool atOnce = true;
+  std::vector<std::function<void()>> waiting;
+
+  std::shared_ptr<Job> start(Work work, std::function<void()> ended) override {
+    auto job = std::make_shared<Job>(std::move(work));
+    const auto run = [job, ended = std::move(ended)] {
+      job->run();
+      ended();
+    };
+    if (atOnce)
+      run();
+    else
+      waiting.push_back(run);
+    return job;
+  }
+  /// Ends those that wait.
+  void finish() {
+    for (const auto& run : std::exchange(waiting, {})) run();
+  }
 };
 
 /// Its picture tells which scenes its samples were of: red is the seed when it was one scene, else -1.
@@ -47,8 +74,11 @@ class FakeRenderer : public Renderer {
  public:
   explicit FakeRenderer(std::shared_ptr<FakeControl> control) : control_(std::move(control)) {}
   std::string_view backendName() const override { return "fake"; }
-  RebuildStats setScene(const Scene& scene) override {
+  RebuildStats setScene(const Scene& scene, std::stop_token stop) override {
+    if (control_->building) control_->building(stop);
+    if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "stopped");
     if (!control_->failure.empty()) throw Error(ErrorCode::badInput, control_->failure);
+    film_.resize(std::uint64_t(scene.width) * std::uint64_t(scene.height));
     RebuildStats stats;
     stats.filmReset = samples_ == 0 || scene.seed != scene_.seed || scene.width != scene_.width ||
                       scene.height != scene_.height;
@@ -56,7 +86,8 @@ class FakeRenderer : public Renderer {
     scene_ = scene;
     return stats;
   }
-  bool renderSample(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
+  bool takesLong(const Scene&) const override { return control_->takesLong; }
+  bool renderPixels(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
     if (control_->incompletePasses > 0) {
       if (control_->clock)
         control_->clock->advance(std::chrono::duration_cast<std::chrono::microseconds>(budget));
@@ -70,11 +101,11 @@ class FakeRenderer : public Renderer {
     if (const auto during = control_->duringPass) during();
     if (cancel) return false;
     seen_ = samples_ == 0 || seen_ == double(scene_.seed) ? double(scene_.seed) : -1;
-    ++samples_;
     control_->passes.push_back(scene_.seed);
     control_->sizes.emplace_back(scene_.width, scene_.height);
     return true;
   }
+  void addPixels() override { ++samples_; }
   Choice choice() const override { return {scene_.method, scene_.step}; }
   std::uint32_t samples() const override { return samples_; }
   double estimatedError() const override { return control_->error(samples_); }
@@ -91,6 +122,7 @@ class FakeRenderer : public Renderer {
 
  private:
   const std::shared_ptr<FakeControl> control_;
+  MemoryBudget::Share film_ = MemoryBudget::take(control_->memory, MemoryUse::films);
   Scene scene_;
   std::uint32_t samples_ = 0;
   double seen_ = 0;
@@ -135,7 +167,7 @@ struct FakeViewer : ViewerSink {
   void sceneChanged(std::uint32_t revision, const nlohmann::json& patch) override {
     scenes.emplace_back(revision, patch);
   }
-  void renderFailed(const std::string& message) override { failures.push_back(message); }
+  void renderFailed(const Error& error) override { failures.emplace_back(error.what()); }
   void sessionClosed(const std::string& reason) override { closed = reason; }
 };
 
@@ -149,19 +181,26 @@ struct Workshop {
   std::shared_ptr<const SceneResolver> resolver =
       std::make_shared<const SceneResolver>(smallStore(), SceneResolver::Options{4096, 16'777'216});
   SessionStore store;
+  FakeBackground background;
+  PassResult last;  ///< of the render loop's last turn
   RenderLoop render;
   EncodeLoop encode;
 
-  explicit Workshop(SessionStore::Options options = {}, ProgressiveRender::Options policy = {})
+  explicit Workshop(SessionStore::Options options = {})
       : store(resolver, options, hooks),
-        render(
-            store,
-            [this](const std::shared_ptr<const Volume>&) {
-              ++control->renderersMade;
-              return std::make_unique<FakeRenderer>(control);
-            },
-            policy, clock.now(), [](const std::string&) {}, [](const PassResult&) {}),
-        encode(store, clock.now(), [](const std::string&) {}) {
+        render(store,
+               {[this](const std::shared_ptr<const Volume>&) {
+                  ++control->renderersMade;
+                  return std::make_unique<FakeRenderer>(control);
+                },
+                {},
+                clock.now(),
+                [](const std::string&) {},
+                background,
+                [this] { ++renderWakes; }},
+               [this](const PassResult& pass) { last = pass; }),
+        encode(
+            store, clock.now(), [](const std::string&) {}, background, [this] { ++encoderWakes; }) {
     control->clock = &clock;
   }
 

@@ -122,6 +122,35 @@ TEST(SceneResolver, NamesTheFieldThatIsWrong) {
   EXPECT_EQ(errorOf(nullptr).first, 422);
 }
 
+TEST(SceneResolver, BoundsTheNumberOfMacrocellsButTakesTheDefaultSizeAlways) {
+  // Two channels of 3 x 2 x 1, 2 x 1 x 1 and 1 cells.
+  const auto bounded = [](std::size_t most, int size) {
+    const SceneResolver resolver(testing::smallStore(), {64, 1'000'000, most});
+    try {
+      resolver.replace({{"integrator", {{"macrocell", size}}}});
+    } catch (const ProtocolError& error) {
+      EXPECT_EQ(error.pointer, "/integrator/macrocell");
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(bounded(12, 1), "");
+  EXPECT_EQ(bounded(11, 1), "expected at least 2 for this data set, found 1");
+  EXPECT_EQ(bounded(3, 2), "expected at least 3 for this data set, found 2");
+  EXPECT_EQ(bounded(0, 1), "expected at least 4 for this data set, found 1");
+  EXPECT_EQ(bounded(0, 4), "");
+}
+
+TEST(SceneResolver, RefusesWhatTheRendererWouldRefuseLater) {
+  using Expected = std::pair<int, std::string>;
+  const json far = {1e308, 1e308, 1e308};
+  EXPECT_EQ(errorOf({{"lights", {{{"type", "headlight"}}, {{"type", "point"}, {"position", far}}}}}),
+            Expected(422, "/lights/1"));
+  EXPECT_EQ(errorOf({{"lights", {{{"direction", far}}}}}), Expected(422, "/lights/0"));
+  EXPECT_EQ(errorOf({{"camera", {{"eye", far}, {"target", {-1e308, -1e308, -1e308}}}}}),
+            Expected(422, "/camera"));
+}
+
 TEST(SceneResolver, ChecksAPatchAgainstTheDatasetThatItNames) {
   const auto resolve = resolver();
   const auto base = resolve.replace(json::object());

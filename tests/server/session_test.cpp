@@ -149,6 +149,19 @@ TEST(Session, HonoursAViewersFrameRateAndStillShowsTheLastFrame) {
   EXPECT_TRUE(viewer->frames[1].info.final);
 }
 
+TEST(Session, TakesTheSmallestRateForOneFrameAnHour) {
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->setView(session->addViewer(viewer), true, 1e-300);
+  for (int i = 0; i < 10; ++i) {
+    workshop.step();
+    workshop.clock.advance(1s);
+  }
+  EXPECT_EQ(viewer->frames.size(), 1u);
+  EXPECT_EQ(session->deliver(), workshop.hooks.now() - 10s + 1h);
+}
+
 TEST(Session, GivesAScriptTheFrameItWaitsFor) {
   Workshop workshop;
   const auto session = workshop.store.create(json::object());
@@ -169,9 +182,10 @@ TEST(Session, GivesAScriptTheFrameItWaitsFor) {
 TEST(Session, StopsWaitingForAScriptThatHasGone) {
   Workshop workshop;
   const auto session = workshop.store.create(json::object());
-  const std::atomic<bool> gone{true};
+  std::stop_source gone;
+  gone.request_stop();
   const auto begin = std::chrono::steady_clock::now();
-  EXPECT_EQ(session->waitForFrame({0, 1, false, &gone}, 60s), nullptr);
+  EXPECT_EQ(session->waitForFrame({0, 1, false, gone.get_token()}, 60s), nullptr);
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 30s);
   EXPECT_FALSE(session->request().wanted);
 }
@@ -223,7 +237,7 @@ TEST(Session, TellsViewersAndScriptsThatASceneCannotBeRendered) {
   workshop.control->failure = "macrocell: expected more memory";
   workshop.steps(3);
   EXPECT_EQ(viewer->failures, std::vector<std::string>{"macrocell: expected more memory"});
-  EXPECT_THROW(session->waitForFrame({}, 0ms), ProtocolError);
+  EXPECT_THROW(session->waitForFrame({}, 0ms), Error);
   // The next edit is another chance.
   workshop.control->failure.clear();
   session->patch(seedPatch(1), {});

@@ -29,14 +29,17 @@ struct RunningServer {
   SessionStore store{std::make_shared<const SceneResolver>(testing::smallStore(), SceneResolver::Options{}),
                      {1000, 5min},
                      hooks};
+  BackgroundThreads background;
   RenderLoop render{
       store,
-      [this](const std::shared_ptr<const Volume>&) { return std::make_unique<FakeRenderer>(control); },
-      {},
-      now,
-      [](const std::string&) {},
+      {[this](const std::shared_ptr<const Volume>&) { return std::make_unique<FakeRenderer>(control); },
+       {},
+       now,
+       [](const std::string&) {},
+       background,
+       [this] { renderThread.wake(); }},
       [](const PassResult&) {}};
-  EncodeLoop encode{store, now, [](const std::string&) {}};
+  EncodeLoop encode{store, now, [](const std::string&) {}, background, [this] { encodeThread.wake(); }};
 
   RunningServer() {
     renderThread.start([this] { return render.step(); });

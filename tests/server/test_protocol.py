@@ -107,7 +107,7 @@ class Description(unittest.TestCase):
         self.assertEqual(told["imageFormats"], list(PICTURES))
         self.assertEqual((told["limits"]["sessions"], told["limits"]["messageBytes"]), (4, 65536))
         self.assertEqual(set(told["limits"]), set(
-            "bodyBytes messageBytes imageWidth imageHeight imagePixels renders waitingPolls sessions clients "
+            "bodyBytes messageBytes imageWidth imageHeight imagePixels memoryBytes renders waitingPolls sessions clients "
             "renderSeconds sceneDepth".split()))
 
     def test_the_schema_is_the_file_beside_the_document(self):

@@ -205,6 +205,77 @@ TEST(CpuRenderer, KeepsPlanAndFilmWhenASceneIsRefused) {
   EXPECT_TRUE(sameBits(renderer->image(), render(volume, good, 2, 2)));
 }
 
+TEST(CpuRenderer, KeepsPlanAndFilmWhenASceneIsNotWantedAnyMore) {
+  const auto volume = orbitals();
+  Scene scene = orbitalScene(*volume);
+  const auto renderer = makeCpuRenderer(volume, 0);
+  renderer->setScene(scene);
+  for (int i = 0; i < 3; ++i) renderer->renderSample(kNever);
+  const Image before = renderer->image();
+  std::stop_source stop;
+  stop.request_stop();
+  Scene other = scene;
+  other.macrocell = 2;
+  other.width += 1;
+  try {
+    renderer->setScene(other, stop.get_token());
+    FAIL() << "took what nobody wants";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::cancelled);
+  }
+  EXPECT_TRUE(sameBits(before, renderer->image()));
+  EXPECT_FALSE(renderer->setScene(scene).filmReset);
+}
+
+TEST(CpuRenderer, TakesItsMemoryFromTheBudgetAndRefusesWhatIsNotThere) {
+  const auto volume = orbitals();
+  Scene scene = orbitalScene(*volume);
+  scene.width = scene.height = 64;
+  const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(16) << 20);
+  {
+    const auto renderer = makeCpuRenderer(volume, 0, memory);
+    renderer->setScene(scene);
+    EXPECT_EQ(memory->used(MemoryUse::films), 64u * 64u * (16 + 32 + 24 + 16 + 1));
+    EXPECT_GT(memory->used(MemoryUse::grids), 0u);
+    renderer->renderSample(kNever);
+    const Image before = renderer->image();
+    Scene large = scene;
+    large.width = large.height = 2048;
+    EXPECT_THROW(renderer->setScene(large), Error);
+    EXPECT_TRUE(sameBits(before, renderer->image()));
+    const auto plain = memory->used(MemoryUse::films);
+    renderer->recordAovs();
+    EXPECT_EQ(memory->used(MemoryUse::films),
+              plain + 64u * 64u * (16 + 8 + 8 + 8 + 4 * volume->channels().size()));
+    const auto grids = memory->used(MemoryUse::grids);
+    const auto second = makeCpuRenderer(volume, 0, memory);
+    second->setScene(scene);
+    EXPECT_LT(memory->used(MemoryUse::grids), 2 * grids);  // the macrocells are shared
+  }
+  EXPECT_EQ(memory->used(MemoryUse::films), 0u);
+  EXPECT_EQ(memory->used(MemoryUse::grids), 0u);
+}
+
+TEST(CpuRenderer, TellsWhichScenesTakeLong) {
+  const auto volume = orbitals();
+  Scene scene = orbitalScene(*volume);
+  scene.method = Method::superposed;
+  const auto renderer = makeCpuRenderer(volume, 0);
+  EXPECT_TRUE(renderer->takesLong(scene));
+  renderer->setScene(scene);
+  EXPECT_FALSE(renderer->takesLong(scene));
+  const auto with = [&](auto change) {
+    Scene other = scene;
+    change(other);
+    return renderer->takesLong(other);
+  };
+  EXPECT_FALSE(with([](Scene& s) { s.channels[0].density *= 2; }));
+  EXPECT_FALSE(with([](Scene& s) { s.width *= 2; }));
+  EXPECT_TRUE(with([](Scene& s) { s.macrocell = 2; }));
+  EXPECT_TRUE(with([](Scene& s) { s.method = Method::automatic; }));
+  EXPECT_TRUE(with([](Scene& s) { s.width = s.height = 1024; }));
+}
+
 TEST(CpuRenderer, SpendsNothingOnChannelsThatCannotBeSeen) {
   const auto volume = orbitals();
   const auto fetchesOf = [&](const Scene& scene) {

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <random>
 
-#include "tests/support/volumes.h"
+#include "renderer/core/error.h"
+#include "renderer/data/shared_macrocells.h"
+#include "tests/support/orbitals.h"
 
 namespace scolopax {
 namespace {
@@ -125,6 +127,28 @@ TEST(MacrocellGrid, GrowsNoIntervalByMoreThanAPartOfTheRangeAndFrequentValuesByN
   EXPECT_EQ(empty, 39u * 32 * 32);
   // The other half of the levels follows the values' density: even ones alone would double most.
   EXPECT_LT(doubled, (index - empty) / 50);
+}
+
+TEST(MacrocellGrid, IsNotMeasuredToTheEndWhenNobodyWantsIt) {
+  const auto volume = orbitals();
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THROW(buildMacrocells(*volume, 4, stop.get_token()), Error);
+  EXPECT_THROW(sharedMacrocells(volume, 4, stop.get_token()), Error);
+}
+
+TEST(MacrocellGrid, IsSharedByVolumeAndSizeWhileItIsHeld) {
+  const auto volume = orbitals(), other = orbitals();
+  const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(16) << 20);
+  {
+    const auto grid = sharedMacrocells(volume, 4, {}, memory);
+    EXPECT_EQ(grid->intervals.size(), intervalCount(*volume, 4));
+    EXPECT_EQ(memory->used(MemoryUse::grids), grid->sizeBytes());
+    EXPECT_EQ(sharedMacrocells(volume, 4, {}, memory), grid);
+    EXPECT_NE(sharedMacrocells(volume, 5, {}, memory), grid);
+    EXPECT_NE(sharedMacrocells(other, 4, {}, memory), grid);
+  }
+  EXPECT_EQ(memory->used(MemoryUse::grids), 0u);
 }
 
 }  // namespace

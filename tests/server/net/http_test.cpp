@@ -341,6 +341,32 @@ TEST_F(HttpTest, RefusesConnectionsOverTheLimitAndRecovers) {
       eventually([&] { return TestClient(port()).request("GET /hello/you HTTP/1.1").status == 200; }));
 }
 
+TEST_F(HttpTest, KeepsPlacesForThoseWhoAreKnownAndCutsTheOldestOfTheOthers) {
+  Options options = quickOptions();
+  options.maxConnections = 8;
+  options.headTimeout = options.idleTimeout = milliseconds(600'000);
+  options.knows = [](const Request& request) { return request.header("X-Known") != nullptr; };
+  start(options);
+  TestClient known(port()), idle(port());
+  EXPECT_EQ(known.request("GET /hello/you HTTP/1.1\r\nX-Known: 1").status, 200);
+  EXPECT_EQ(idle.request("GET /hello/you HTTP/1.1").status, 200);
+  std::vector<std::unique_ptr<TestClient>> strangers;
+  for (int i = 0; i < 20; ++i) {
+    strangers.push_back(std::make_unique<TestClient>(port()));
+    strangers.back()->send("GET /hello/you HTTP/1.1\r\n");
+  }
+  EXPECT_TRUE(idle.ended());
+  EXPECT_TRUE(strangers.front()->ended());
+  EXPECT_EQ(known.request("GET /hello/you HTTP/1.1").status, 200);
+  std::vector<std::unique_ptr<TestClient>> more;
+  for (int i = 0; i < 7; ++i) {
+    more.push_back(std::make_unique<TestClient>(port()));
+    EXPECT_EQ(more.back()->request("GET /hello/you HTTP/1.1\r\nX-Known: 1").status, 200);
+  }
+  EXPECT_EQ(TestClient(port()).request("GET /hello/you HTTP/1.1\r\nX-Known: 1").status, 503);
+  EXPECT_TRUE(strangers.back()->ended());
+}
+
 TEST_F(HttpTest, SurvivesClientsThatComeAndGoAbruptly) {
   start();
   for (int i = 0; i < 200; ++i) {
@@ -435,8 +461,8 @@ TEST_F(HttpTest, TellsALongRequestThatItsClientHasGone) {
       "POST", "/long",
       [&](const Request& request) {
         ++running;
-        eventually([&] { return release || *request.gone; });
-        if (*request.gone) ++gone;
+        eventually([&] { return release || request.gone.stop_requested(); });
+        if (request.gone.stop_requested()) ++gone;
         return Response{};
       },
       RouteKind::slow);

@@ -14,8 +14,10 @@ std::uint32_t nextFrame(Outbox& outbox) {
   return item ? std::get<Frame>(*item).number : 0;
 }
 
+TextLimits texts(std::size_t count) { return {count, 100, 1000, 10}; }
+
 TEST(Outbox, SendsAtMostTwoUnacknowledgedFrames) {
-  Outbox outbox(4);
+  Outbox outbox(texts(4));
   for (std::uint32_t number = 1; number <= 2; ++number) {
     outbox.offer(frame(number));
     EXPECT_EQ(nextFrame(outbox), number);
@@ -27,7 +29,7 @@ TEST(Outbox, SendsAtMostTwoUnacknowledgedFrames) {
 }
 
 TEST(Outbox, KeepsOnlyTheLatestFrameThatWaits) {
-  Outbox outbox(4);
+  Outbox outbox(texts(4));
   for (std::uint32_t number = 1; number <= 5; ++number) outbox.offer(frame(number));
   EXPECT_EQ(nextFrame(outbox), 5U);
   EXPECT_EQ(nextFrame(outbox), 0U);
@@ -36,7 +38,7 @@ TEST(Outbox, KeepsOnlyTheLatestFrameThatWaits) {
 }
 
 TEST(Outbox, TakesAnAcknowledgementForAllFramesBeforeIt) {
-  Outbox outbox(4);
+  Outbox outbox(texts(4));
   for (std::uint32_t number = 1; number <= 2; ++number) {
     outbox.offer(frame(number));
     nextFrame(outbox);
@@ -46,7 +48,7 @@ TEST(Outbox, TakesAnAcknowledgementForAllFramesBeforeIt) {
 }
 
 TEST(Outbox, IgnoresAcknowledgementsOfFramesThatAreNotOnTheirWay) {
-  Outbox outbox(4);
+  Outbox outbox(texts(4));
   for (std::uint32_t number = 1; number <= 2; ++number) {
     outbox.offer(frame(number));
     nextFrame(outbox);
@@ -59,7 +61,7 @@ TEST(Outbox, IgnoresAcknowledgementsOfFramesThatAreNotOnTheirWay) {
 }
 
 TEST(Outbox, KeepsCountWhenFrameNumbersWrapAround) {
-  Outbox outbox(4);
+  Outbox outbox(texts(4));
   outbox.offer(frame(0xFFFFFFFF));
   nextFrame(outbox);
   outbox.offer(frame(0));
@@ -69,7 +71,7 @@ TEST(Outbox, KeepsCountWhenFrameNumbersWrapAround) {
 }
 
 TEST(Outbox, SendsTextsInOrderAndBeforeFrames) {
-  Outbox outbox(4);
+  Outbox outbox(texts(4));
   outbox.offer(frame(1));
   EXPECT_TRUE(outbox.pushText("a"));
   EXPECT_TRUE(outbox.pushText("b"));
@@ -79,7 +81,7 @@ TEST(Outbox, SendsTextsInOrderAndBeforeFrames) {
 }
 
 TEST(Outbox, RefusesMoreTextsThanItsLimit) {
-  Outbox outbox(2);
+  Outbox outbox(texts(2));
   EXPECT_TRUE(outbox.pushText("a"));
   EXPECT_TRUE(outbox.pushText("b"));
   EXPECT_FALSE(outbox.pushText("c"));
@@ -87,8 +89,39 @@ TEST(Outbox, RefusesMoreTextsThanItsLimit) {
   EXPECT_TRUE(outbox.pushText("d"));
 }
 
+TEST(Outbox, RefusesMoreBytesOfTextThanItsLimitButForASingleText) {
+  Outbox outbox(texts(9));
+  EXPECT_TRUE(outbox.pushText(std::string(5000, 'x')));
+  EXPECT_FALSE(outbox.pushText("y"));
+  outbox.next();
+  EXPECT_TRUE(outbox.pushText("y"));  // and while the large one is being sent, one more
+  EXPECT_FALSE(outbox.pushText("z"));
+  outbox.next();
+  EXPECT_TRUE(outbox.pushText(std::string(50, 'x')));
+  EXPECT_TRUE(outbox.pushText(std::string(49, 'x')));
+  EXPECT_FALSE(outbox.pushText("y"));
+}
+
+TEST(Outbox, LeavesAFairShareToEachWhenAllTogetherHaveMoreThanTheyMay) {
+  const auto all = std::make_shared<std::atomic<std::size_t>>(0);
+  {
+    Outbox greedy(texts(9), all), modest(texts(9), all);
+    EXPECT_TRUE(greedy.pushText(std::string(1000, 'x')));
+    EXPECT_TRUE(modest.pushText("1234"));
+    EXPECT_TRUE(modest.pushText("123456"));
+    EXPECT_FALSE(modest.pushText("1"));
+    EXPECT_EQ(*all, 1010U);
+    greedy.close({1008, ""}, true);
+    EXPECT_EQ(*all, 10U);
+    EXPECT_TRUE(modest.pushText("1"));
+    modest.next();
+    EXPECT_EQ(*all, 11U);
+  }
+  EXPECT_EQ(*all, 0U);
+}
+
 TEST(Outbox, ClosesAfterTheTextsAndSendsNothingMore) {
-  Outbox outbox(4);
+  Outbox outbox(texts(4));
   outbox.offer(frame(1));
   outbox.pushText("last");
   outbox.close({1000, "done"}, false);

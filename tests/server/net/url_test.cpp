@@ -42,6 +42,34 @@ TEST(Origin, IsTheOwnOneWhenHostAndPortAgreeWhateverTheScheme) {
   EXPECT_FALSE(sameOrigin("http://localhost:8080.evil.example", "localhost:8080"));
 }
 
+TEST(Origin, HasAWebSchemeAndNothingButAHostAndAPort) {
+  for (const char* origin : {"ftp://a:1", "file://a:1", "://a:1", "a:1", "http:/a:1", "http://a:1/",
+                             "http://user@a:1", "http://a:1x", "http://a:", "http://a:1@a:1", "http://a :1",
+                             "http://a:65537", "http://b@a:1", "x-http://a:1"})
+    EXPECT_FALSE(sameOrigin(origin, "a:1")) << origin;
+  EXPECT_FALSE(sameOrigin("ftp://evil@a", "evil@a"));
+  EXPECT_FALSE(sameOrigin("http://evil@a", "evil@a"));
+  EXPECT_TRUE(sameOrigin("https://a", "a:443"));
+  EXPECT_TRUE(sameOrigin("http://a", "a:80"));
+  EXPECT_FALSE(sameOrigin("https://a", "a:80"));
+}
+
+TEST(Authority, IsAHostAndMaybeAPort) {
+  const auto host = [](std::string_view text) {
+    const auto found = parseAuthority(text);
+    return found ? std::string(found->host) : "";
+  };
+  EXPECT_EQ(host("lab.example"), "lab.example");
+  EXPECT_EQ(host("127.0.0.1:8080"), "127.0.0.1");
+  EXPECT_EQ(parseAuthority("a:8080")->port, 8080);
+  EXPECT_EQ(host("[::1]:8080"), "[::1]");
+  EXPECT_EQ(host("[::ffff:1.2.3.4]"), "[::ffff:1.2.3.4]");
+  for (const char* bad :
+       {"", ":80", "a:", "a:b", "a:-1", "a:65536", "a b", "a/b", "u@a", "localhost:80@evil.com",
+        "[::1].evil.com", "[::1]x", "[::1", "[]", "[", "]", "[evil.com]", "a,b"})
+    EXPECT_EQ(host(bad), "") << bad;
+}
+
 TEST(Origin, IsAllowedWhenMissingOwnOrListed) {
   const std::vector<std::string> listed{"https://lab.example"};
   EXPECT_TRUE(originAllowed(Request{}, {}));

@@ -29,7 +29,7 @@ class WebSocketTest : public testing::Test {
     Options options;
     options.port = 0;
     options.messageLimit = 1000;
-    options.controlQueueLimit = 8;
+    options.unsentTexts.count = 8;
     options.allowedOrigins = {"https://lab.example"};
     return options;
   }

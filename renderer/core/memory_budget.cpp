@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/core/memory_budget.h"
+
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "renderer/core/error.h"
+
+namespace scolopax {
+namespace {
+
+std::string mebibytes(std::uint64_t bytes) { return std::to_string((bytes + (1 << 20) - 1) >> 20) + " MiB"; }
+
+}  // namespace
+
+MemoryBudget::Share& MemoryBudget::Share::operator=(Share&& other) noexcept {
+  std::swap(budget_, other.budget_);
+  std::swap(use_, other.use_);
+  std::swap(bytes_, other.bytes_);
+  return *this;
+}
+
+MemoryBudget::Share::~Share() {
+  if (budget_) budget_->change(use_, bytes_, 0);
+}
+
+void MemoryBudget::Share::resize(std::uint64_t bytes) {
+  if (budget_) budget_->change(use_, bytes_, bytes);
+  bytes_ = bytes;
+}
+
+MemoryBudget::Share MemoryBudget::take(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use,
+                                       std::uint64_t bytes) {
+  Share share(budget, use);
+  share.resize(bytes);
+  return share;
+}
+
+std::shared_ptr<MemoryBudget::Share> MemoryBudget::takeShared(const std::shared_ptr<MemoryBudget>& budget,
+                                                              MemoryUse use, std::uint64_t bytes) {
+  return std::make_shared<Share>(take(budget, use, bytes));
+}
+
+std::uint64_t MemoryBudget::total() const {
+  return std::accumulate(used_.begin(), used_.end(), std::uint64_t(0));
+}
+
+std::uint64_t MemoryBudget::used(MemoryUse use) const {
+  const std::lock_guard lock(mutex_);
+  return used_[std::size_t(use)];
+}
+
+void MemoryBudget::change(MemoryUse use, std::uint64_t from, std::uint64_t to) {
+  const std::lock_guard lock(mutex_);
+  const std::uint64_t most = to <= kOrdinaryBytes ? limit_ : limit_ / 4 * 3;
+  const std::uint64_t others = total() - from;
+  if (to > from && (to > most || others > most - to))
+    throw Error(to > most ? ErrorCode::tooLarge : ErrorCode::busy,
+                "memory for " + std::string(kMemoryUses[std::size_t(use)]) + ": expected at most " +
+                    mebibytes(most) +
+                    (others > 0 ? " with the " + mebibytes(others) + " that are taken" : "") + ", found " +
+                    mebibytes(to));
+  used_[std::size_t(use)] += to;
+  used_[std::size_t(use)] -= from;
+}
+
+}  // namespace scolopax

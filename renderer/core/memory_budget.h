@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// One bound on the memory that requests make a server take: films, pictures, encodings, macrocells. What
+// takes much asks here first; what is refused says how much there is.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string_view>
+#include <utility>
+
+namespace scolopax {
+
+/// What memory is for.
+enum class MemoryUse { films, grids, pictures, encodings };
+inline constexpr std::string_view kMemoryUses[] = {"films", "grids", "pictures", "encodings"};
+
+/// Every function may be called from any thread. Shares keep the budget alive.
+class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
+ public:
+  /// Of the budget the last quarter is left to shares no larger than this: large ones do not keep the
+  /// ordinary from their work.
+  static constexpr std::uint64_t kOrdinaryBytes = 128 << 20;
+
+  explicit MemoryBudget(std::uint64_t limitBytes) : limit_(limitBytes) {}
+
+  /// Bytes that are taken as long as it lives. One that was made by default is of no budget and always
+  /// granted.
+  class Share {
+   public:
+    Share() = default;
+    Share(Share&& other) noexcept { *this = std::move(other); }
+    Share& operator=(Share&& other) noexcept;
+    ~Share();
+    /// Throws and stays as it was: Error(tooLarge) when there are never so many, Error(busy) when there are
+    /// not now.
+    void resize(std::uint64_t bytes);
+    std::uint64_t bytes() const { return bytes_; }
+
+   private:
+    friend class MemoryBudget;
+    Share(std::shared_ptr<MemoryBudget> budget, MemoryUse use) : budget_(std::move(budget)), use_(use) {}
+    std::shared_ptr<MemoryBudget> budget_;
+    MemoryUse use_ = MemoryUse::films;
+    std::uint64_t bytes_ = 0;
+  };
+  /// Throws as Share::resize. Of a null budget everything is granted.
+  static Share take(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use, std::uint64_t bytes = 0);
+  /// The same, for what several hold.
+  static std::shared_ptr<Share> takeShared(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use,
+                                           std::uint64_t bytes);
+
+  std::uint64_t limit() const { return limit_; }
+  std::uint64_t used(MemoryUse use) const;
+
+ private:
+  void change(MemoryUse use, std::uint64_t from, std::uint64_t to);
+  std::uint64_t total() const;
+
+  const std::uint64_t limit_;
+  mutable std::mutex mutex_;
+  std::array<std::uint64_t, std::size(kMemoryUses)> used_{};
+};
+
+/// The value, shared; when nobody holds it any more, its memory goes back.
+template <class T>
+std::shared_ptr<const T> withShare(MemoryBudget::Share share, T value) {
+  struct Held {
+    MemoryBudget::Share share;
+    T value;
+  };
+  const auto held = std::make_shared<const Held>(Held{std::move(share), std::move(value)});
+  return {held, &held->value};
+}
+
+}  // namespace scolopax

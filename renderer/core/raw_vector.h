@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// A vector of numbers whose new elements are left as the memory is: for what is filled anyway, by many
+// threads.
+#pragma once
+#include <memory>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace scolopax {
+
+template <class T>
+struct RawAllocator : std::allocator<T> {
+  template <class U>
+  struct rebind {
+    using other = RawAllocator<U>;
+  };
+  /// Without a value: default-initialised, which for numbers does nothing.
+  template <class U>
+  void construct(U* at) noexcept(std::is_nothrow_default_constructible_v<U>) {
+    ::new (static_cast<void*>(at)) U;
+  }
+  template <class U, class... Values>
+  void construct(U* at, Values&&... values) {
+    ::new (static_cast<void*>(at)) U(std::forward<Values>(values)...);
+  }
+};
+
+template <class T>
+using RawVector = std::vector<T, RawAllocator<T>>;
+
+}  // namespace scolopax

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Somebody who works with the server while others attack it, and what the attack does to him and to the process."""
+import argparse
+import asyncio
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from protocol_client import Frame, Viewer, call, call_json  # noqa: E402
+from serving import PROGRAM, Server, write_volume  # noqa: E402
+
+# `make check` attacks with all it has, `make test` with as much as ends soon.
+SANITIZED = bool(os.environ.get("SCOLOPAX_SANITIZED"))
+FULL = bool(os.environ.get("SCOLOPAX_HOSTILE_FULL"))
+SECONDS = 10 if FULL else 3
+ORBITALS = 256 if FULL else 128
+PERIOD = 0.05  # between two edits
+
+
+class Innocent:
+    """`with Innocent(server) as viewer:` edits a scene of 256 x 256 pixels twenty times a second and notes how long each
+    edit takes to be seen. In a process of his own: the attackers' work is not to delay his."""
+
+    def __init__(self, server, dataset="blob-a-64x64x64-uint8"):
+        self.latencies, self.ready = [], threading.Event()
+        self.process = subprocess.Popen(
+            [sys.executable, os.path.abspath(__file__), str(server.port), server.token, dataset],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.thread = threading.Thread(target=self.read)
+
+    def __enter__(self):
+        self.thread.start()
+        self.ready.wait(60)
+        return self
+
+    def __exit__(self, *_):
+        self.process.stdin.close()
+        self.thread.join(60)
+        self.process.wait(60)
+        self.process.stdout.close()
+
+    def read(self):
+        for line in self.process.stdout:
+            self.latencies.append(float(line))
+            self.ready.set()
+
+    def watch(self, seconds):
+        """Latencies of the edits that are seen in this time."""
+        first = len(self.latencies)
+        time.sleep(seconds)
+        return self.latencies[first:]
+
+
+async def work(server, dataset):
+    scene = {"dataset": dataset, "image": {"width": 256, "height": 256}}
+    session = call_json(server, "POST", "/api/v1/sessions", {"scene": scene})[1]
+    over = threading.Event()
+    threading.Thread(target=lambda: (sys.stdin.read(), over.set()), daemon=True).start()
+    async with Viewer(server, session) as viewer:
+        await viewer.frame()
+        while not over.is_set():
+            begin = time.monotonic()
+            number = await viewer.patch({"camera": {"fovY": 30 + viewer.patches % 10}})
+            await viewer.until(lambda m, number=number: isinstance(m, Frame) and m.patch >= number)
+            print(time.monotonic() - begin, flush=True)
+            await asyncio.sleep(max(0, begin + PERIOD - time.monotonic()))
+    call(server, "DELETE", f"/api/v1/sessions/{session['id']}")
+
+
+def percentile(values, p):
+    return sorted(values)[min(len(values) - 1, int(p * len(values)))] if values else float("inf")
+
+
+class HostileTest(unittest.TestCase):
+    """Has a server with a small volume, for the innocent, and a large one."""
+    options = ()
+    orbitals = ORBITALS
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        large = os.path.join(cls.folder.name, "orbitals.nrrd")
+        subprocess.run([PROGRAM, "generate", "orbitals", large, "--size", str(cls.orbitals)], check=True, timeout=300)
+        small = write_volume(cls.folder.name, size=64, channels=("a",))
+        cls.server = Server(*cls.options, paths=[*small, large])
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.server.stop()
+        cls.folder.cleanup()
+
+    def session(self, **scene):
+        status, session = self.server.json("POST", "/api/v1/sessions", {"scene": scene})
+        self.assertEqual(status, 201, session)
+        return session
+
+    def metric(self, name):
+        text = self.server.call("GET", "/metrics")[2].decode()
+        return sum(float(line.split()[-1]) for line in text.splitlines() if line.startswith(name))
+
+    def memory(self, field="VmRSS"):
+        """MiB."""
+        with open(f"/proc/{self.server.process.pid}/status", encoding="utf-8") as file:
+            return next(int(line.split()[1]) for line in file if line.startswith(field)) / 1024
+
+    def assert_memory_below(self, found, bound):
+        """Of sanitizers' memory nothing is known."""
+        if not SANITIZED:
+            self.assertLess(found, bound)
+
+    def descriptors(self):
+        return len(os.listdir(f"/proc/{self.server.process.pid}/fd"))
+
+    def under(self, attack, seconds=SECONDS):
+        """Calls attack(over) while the innocent works. Asserts that he got on: a tenth of the frames that he gets by
+        himself, where a server that stalls gives him one or none; how late they were is printed."""
+        with Innocent(self.server) as viewer:
+            before = viewer.watch(max(2, seconds / 3))
+            over = threading.Event()
+            failures = []
+
+            def run():
+                try:
+                    attack(over)
+                except Exception as error:  # pylint: disable=broad-except
+                    failures.append(error)
+
+            thread = threading.Thread(target=run)
+            thread.start()
+            during = viewer.watch(seconds)
+            over.set()
+            thread.join(120)
+            rate = len(before) / max(2, seconds / 3)
+            print(f"\n{self.id().split('.')[-1]}: undisturbed {rate:.1f} frames/s, median {percentile(before, .5) * 1e3:.0f} "
+                  f"ms, p95 {percentile(before, .95) * 1e3:.0f} ms; attacked {len(during) / seconds:.1f} frames/s, median "
+                  f"{percentile(during, .5) * 1e3:.0f} ms, p95 {percentile(during, .95) * 1e3:.0f} ms, longest "
+                  f"{max(during, default=float('inf')) * 1e3:.0f} ms", flush=True)
+            self.assertEqual(failures, [])
+            self.assertIsNone(viewer.process.poll())
+            self.assertGreaterEqual(len(during), rate * seconds / 10)
+
+
+if __name__ == "__main__":
+    asyncio.run(work(argparse.Namespace(port=int(sys.argv[1]), token=sys.argv[2]), sys.argv[3]))
