@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <new>
 
@@ -15,7 +16,7 @@
 namespace scolopax {
 namespace {
 
-double squaredLength(const glm::dvec3& v) { return v.r * v.r + v.g * v.g + v.b * v.b; }
+double squaredLength(const glm::dvec4& v) { return glm::dot(v, v); }
 
 }  // namespace
 
@@ -28,7 +29,7 @@ void Film::reset(int width, int height) {
     pass_.resize(count);
     sum_.assign(count, glm::dvec4(0));
     squares_.assign(count, 0);
-    replicate_.assign(count, glm::dvec3(0));
+    replicate_.assign(count, glm::dvec4(0));
     replicateSquares_.assign(count, 0);
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::tooLarge,
@@ -43,11 +44,11 @@ void Film::add() {
                       for (std::size_t i = range.begin(); i < range.end(); ++i) {
                         const glm::dvec4 v(pass_[i]);
                         sum_[i] += v;
-                        squares_[i] += squaredLength(glm::dvec3(v));
-                        replicate_[i] += glm::dvec3(v);
+                        squares_[i] += squaredLength(v);
+                        replicate_[i] += v;
                         if (!replicateEnds) continue;
                         replicateSquares_[i] += squaredLength(replicate_[i]);
-                        replicate_[i] = glm::dvec3(0);
+                        replicate_[i] = glm::dvec4(0);
                       }
                     });
   ++samples_;
@@ -68,14 +69,14 @@ double Film::estimatedError() const {
   const double n = enough ? replicates : samples_;
   double deviations = 0;  // squared, of the parts, over pixels and components
   for (std::size_t i = 0; i < sum_.size(); ++i) {
-    const glm::dvec3 whole = glm::dvec3(sum_[i]) - (enough ? replicate_[i] : glm::dvec3(0));
+    const glm::dvec4 whole = sum_[i] - (enough ? replicate_[i] : glm::dvec4(0));
     const double squares = enough ? replicateSquares_[i] : squares_[i];
     deviations += std::max(0.0, squares - squaredLength(whole) / n);
   }
   const double samplesPerPart = enough ? kernel::kReplicateSamples : 1;
   // A replicate that has only begun counts for nothing: its samples are not yet spread as well.
   const double varianceOfMeans = deviations / (n - 1) / (samplesPerPart * samplesPerPart * n);
-  return std::sqrt(varianceOfMeans / (3.0 * double(sum_.size())));
+  return std::sqrt(varianceOfMeans / (4.0 * double(sum_.size())));
 }
 
 }  // namespace scolopax

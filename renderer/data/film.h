@@ -24,7 +24,7 @@ class Film {
   std::uint32_t samples() const { return samples_; }
   /// Mean of the samples; all zero when there are none.
   Image image() const;
-  /// Estimated RMSE over linear premultiplied RGB of image(); NaN below two samples. From the variance
+  /// Estimated RMSE over linear premultiplied RGBA of image(); NaN below two samples. From the variance
   /// between replicates, which are independent, as soon as there are kEnoughReplicates of them. Before, from
   /// the samples' variance, which is too large where sampling is of low discrepancy: an upper estimate, for a
   /// marcher by far.
@@ -36,9 +36,9 @@ class Film {
   std::uint32_t samples_ = 0;
   std::vector<glm::vec4> pass_;
   std::vector<glm::dvec4> sum_;
-  std::vector<double> squares_;  // sum of r^2 + g^2 + b^2
+  std::vector<double> squares_;  // sum of r^2 + g^2 + b^2 + a^2
   // The same over whole replicates of kernel::kReplicateSamples samples.
-  std::vector<glm::dvec3> replicate_;  // sum over the one that has begun
+  std::vector<glm::dvec4> replicate_;  // sum over the one that has begun
   std::vector<double> replicateSquares_;
 };
 
