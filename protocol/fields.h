@@ -190,7 +190,7 @@ struct Table<Stop> {
   static constexpr auto fields = std::tuple{
       field("samples", &Stop::samples, "Samples per pixel.", {.atLeast = 1, .atMost = 16777216}),
       field("seconds", &Stop::seconds, "Time spent rendering.", {.unit = "seconds", .above = 0}),
-      field("error", &Stop::error, "Estimated RMSE over linear premultiplied RGB, from 16 samples on.",
+      field("error", &Stop::error, "Estimated RMSE over linear premultiplied RGBA, from 16 samples on.",
             {.above = 0}),
   };
 };

@@ -26,7 +26,7 @@ struct FrameHeader {
   std::uint32_t revision = 0;           ///< of the scene that the whole image shows
   std::uint32_t patch = 0;              ///< id of this client's last patch that is in it; 0: none
   std::uint32_t samples = 0;            ///< per pixel
-  float error = 0;                      ///< estimated RMSE, linear; NaN below two samples
+  float error = 0;                      ///< estimated RMSE, linear RGBA; NaN below two samples
   std::uint32_t rebuildUs = 0, renderUs = 0, encodeUs = 0;
   bool operator==(const FrameHeader&) const = default;
 };

@@ -68,7 +68,7 @@ class Renderer {
   virtual Choice choice() const = 0;
   /// Samples per pixel in the film.
   virtual std::uint32_t samples() const = 0;
-  /// Estimated RMSE over linear premultiplied RGB of the picture as it stands: of noise and, for quadrature
+  /// Estimated RMSE over linear premultiplied RGBA of the picture as it stands: of noise and, for quadrature
   /// that was chosen automatically or has 16 samples, bias; NaN below two samples.
   virtual double estimatedError() const = 0;
   /// From now on, count what samples cost; costs a little time and 16 bytes a pixel. Call before setScene.

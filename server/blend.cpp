@@ -45,10 +45,10 @@ Image enlarged(const Image& image, int width, int height) {
 double mixIn(const Image& before, double error, Image* image) {
   double squares = 0;
   for (std::size_t i = 0; i < before.pixels.size(); ++i) {
-    const glm::dvec3 d(image->pixels[i] - before.pixels[i]);
+    const glm::dvec4 d(image->pixels[i] - before.pixels[i]);
     squares += glm::dot(d, d);
   }
-  const double difference = squares / (3.0 * double(before.pixels.size()));
+  const double difference = squares / (4.0 * double(before.pixels.size()));
   const double share = difference > 0 ? std::clamp(1 - error * error / difference, 0.0, 1.0) : 1;
   for (std::size_t i = 0; i < before.pixels.size(); ++i)
     image->pixels[i] = before.pixels[i] * float(1 - share) + image->pixels[i] * float(share);

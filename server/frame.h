@@ -23,7 +23,7 @@ struct FrameInfo {
   std::uint32_t revision = 0;         ///< of the scene it shows: one, never a mixture
   std::uint32_t samples = 0;          ///< per pixel
   Method method = Method::automatic;  ///< that was used
-  float error = 0;                    ///< estimated RMSE over linear premultiplied RGB; NaN below two samples
+  float error = 0;  ///< estimated RMSE over linear premultiplied RGBA; NaN below two samples
   std::uint32_t rebuildUs = 0, renderUs = 0,
                 encodeUs = 0;  ///< the last rebuild, the last pass, this encoding
   bool interactive = false;    ///< made while edits arrive, or soon after: maybe smaller

@@ -22,7 +22,7 @@ export interface FrameHeader {
   /** Newest patch of this client that the picture contains; 0 for none. */
   patch: number;
   samples: number;
-  /** Estimated RMSE, linear premultiplied RGB; NaN while unknown. */
+  /** Estimated RMSE, linear premultiplied RGBA; NaN while unknown. */
   error: number;
   rebuildUs: number;
   renderUs: number;

@@ -83,7 +83,7 @@ export function StatusBar({ store }: { store: Store }) {
           <Figure
             name="error"
             value={Number.isFinite(frame.error) ? frame.error.toPrecision(2) : '–'}
-            hint="Estimated RMSE, linear premultiplied RGB"
+            hint="Estimated RMSE, linear premultiplied RGBA"
           />
           <Figure
             name="ms latency"

@@ -76,16 +76,16 @@ double errorOf(const Pictures& coarse, const Pictures& fine, bool withNoise) {
   const double n = double(coarse.size());
   double sum = 0;
   for (std::size_t i = 0; i < coarse[0].size(); ++i) {
-    glm::dvec3 all(0);
+    glm::dvec4 all(0);
     double squares = 0;
     for (std::size_t s = 0; s < coarse.size(); ++s) {
-      const glm::dvec3 difference = glm::dvec3(coarse[s][i]) - glm::dvec3(fine[s][i]);
+      const glm::dvec4 difference = glm::dvec4(coarse[s][i]) - glm::dvec4(fine[s][i]);
       all += difference;
       squares += glm::dot(difference, difference);
     }
     sum += withNoise ? glm::dot(all, all) / (n * n) : (glm::dot(all, all) - squares) / (n * (n - 1));
   }
-  return 4.0 / 3.0 * std::sqrt(std::max(0.0, sum / (3.0 * double(coarse[0].size()))));
+  return 4.0 / 3.0 * std::sqrt(std::max(0.0, sum / (4.0 * double(coarse[0].size()))));
 }
 
 }  // namespace

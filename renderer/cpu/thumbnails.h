@@ -11,7 +11,7 @@ namespace scolopax {
 /// Side of the pictures, pixels: the longer one.
 inline constexpr int kThumbnailSide = 24, kLitThumbnailSide = 12;
 
-/// RMSE, over linear premultiplied RGB, of the expected picture of the plan's scene by quadrature at its
+/// RMSE, over linear premultiplied RGBA, of the expected picture of the plan's scene by quadrature at its
 /// step: what half the step, and strata half as thick, change of it, as an error of order 2 has it (4/3 of
 /// that). Two pictures of each, with random numbers of their own, tell it from noise. Takes the threads of
 /// the caller's arena.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <new>
 
@@ -17,7 +18,7 @@
 namespace scolopax {
 namespace {
 
-double squaredLength(const glm::dvec3& v) { return v.r * v.r + v.g * v.g + v.b * v.b; }
+double squaredLength(const glm::dvec4& v) { return glm::dot(v, v); }
 
 }  // namespace
 
@@ -48,14 +49,14 @@ void Film::add() {
                         if (first) {
                           sum_[i] = glm::dvec4(0);
                           squares_[i] = replicateSquares_[i] = 0;
-                          replicate_[i] = glm::dvec3(0);
+                          replicate_[i] = glm::dvec4(0);
                         }
                         sum_[i] += v;
-                        squares_[i] += squaredLength(glm::dvec3(v));
-                        replicate_[i] += glm::dvec3(v);
+                        squares_[i] += squaredLength(v);
+                        replicate_[i] += v;
                         if (!replicateEnds) continue;
                         replicateSquares_[i] += squaredLength(replicate_[i]);
-                        replicate_[i] = glm::dvec3(0);
+                        replicate_[i] = glm::dvec4(0);
                       }
                     });
   ++samples_;
@@ -79,7 +80,7 @@ double Film::estimatedError() const {
   const double n = enough ? replicates : samples_;
   const auto add = [&](const tbb::blocked_range<std::size_t>& range, double sum) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      const glm::dvec3 whole = glm::dvec3(sum_[i]) - (enough ? replicate_[i] : glm::dvec3(0));
+      const glm::dvec4 whole = sum_[i] - (enough ? replicate_[i] : glm::dvec4(0));
       const double squares = enough ? replicateSquares_[i] : squares_[i];
       sum += std::max(0.0, squares - squaredLength(whole) / n);
     }
@@ -91,7 +92,7 @@ double Film::estimatedError() const {
   const double samplesPerPart = enough ? kernel::kReplicateSamples : 1;
   // A replicate that has only begun counts for nothing: its samples are not yet spread as well.
   const double varianceOfMeans = deviations / (n - 1) / (samplesPerPart * samplesPerPart * n);
-  return std::sqrt(varianceOfMeans / (3.0 * double(sum_.size())));
+  return std::sqrt(varianceOfMeans / (4.0 * double(sum_.size())));
 }
 
 }  // namespace scolopax

@@ -20,15 +20,14 @@ class Film {
   /// Adds the pass to every pixel.
   void add();
   /// Of memory, for each pixel.
-  static constexpr std::size_t kPixelBytes =
-      sizeof(glm::vec4) + sizeof(glm::dvec4) + sizeof(glm::dvec3) + 2 * sizeof(double);
+  static constexpr std::size_t kPixelBytes = sizeof(glm::vec4) + 2 * sizeof(glm::dvec4) + 2 * sizeof(double);
   int width() const { return width_; }
   int height() const { return height_; }
   std::size_t pixelCount() const { return sum_.size(); }
   std::uint32_t samples() const { return samples_; }
   /// Mean of the samples; all zero when there are none.
   Image image() const;
-  /// Estimated RMSE over linear premultiplied RGB of image(); NaN below two samples. From the variance
+  /// Estimated RMSE over linear premultiplied RGBA of image(); NaN below two samples. From the variance
   /// between replicates, which are independent, as soon as there are kEnoughReplicates of them. Before, from
   /// the samples' variance, which is too large where sampling is of low discrepancy: an upper estimate, for a
   /// marcher by far.
@@ -41,9 +40,9 @@ class Film {
   RawVector<glm::vec4> pass_;
   // Undefined as long as there is no sample.
   RawVector<glm::dvec4> sum_;
-  RawVector<double> squares_;  // sum of r^2 + g^2 + b^2
+  RawVector<double> squares_;  // sum of r^2 + g^2 + b^2 + a^2
   // The same over whole replicates of kernel::kReplicateSamples samples.
-  RawVector<glm::dvec3> replicate_;  // sum over the one that has begun
+  RawVector<glm::dvec4> replicate_;  // sum over the one that has begun
   RawVector<double> replicateSquares_;
 };
 

@@ -28,7 +28,7 @@ ImageDifference compareImages(const Image& a, const Image& b) {
   checkComparable(a, b);
   double sum = 0, maximum = 0, relative = 0;
   for (std::size_t i = 0; i < a.pixels.size(); ++i)
-    for (int c = 0; c < 3; ++c) {
+    for (int c = 0; c < 4; ++c) {
       const double reference = b.pixels[i][c];
       const double difference = std::abs(double(a.pixels[i][c]) - reference);
       if (std::isnan(difference)) return {difference, difference, difference, difference};
@@ -38,7 +38,7 @@ ImageDifference compareImages(const Image& a, const Image& b) {
                       ? difference
                       : difference * difference / (reference * reference + kRelativeEpsilon);
     }
-  const double components = 3.0 * double(a.pixels.size());
+  const double components = 4.0 * double(a.pixels.size());
   const double rmse = std::sqrt(sum / components);
   return {rmse, -20 * std::log10(rmse), maximum, relative / components};
 }

@@ -8,11 +8,11 @@ namespace scolopax {
 /// Squared relative errors are (a - b)^2 / (b^2 + this): what is darker than a tenth counts less.
 inline constexpr double kRelativeEpsilon = 0.01;
 
-/// Differences over linear premultiplied RGB (alpha is not looked at), with a peak value of 1. A component
-/// that is not finite is never passed over: an infinite one makes rmse, maximum and relative infinite, a NaN
-/// all of them NaN.
+/// Differences over linear premultiplied RGB and alpha, with a peak value of 1: over which background a
+/// picture will be seen is not known. A component that is not finite is never passed over: an infinite one
+/// makes rmse, maximum and relative infinite, a NaN all of them NaN.
 struct ImageDifference {
-  double rmse = 0;      ///< square root of the mean squared difference over all pixels and 3 components
+  double rmse = 0;      ///< square root of the mean squared difference over all pixels and 4 components
   double psnr = 0;      ///< -20 log10(rmse), dB; infinite for equal pictures
   double maximum = 0;   ///< largest absolute difference of one component
   double relative = 0;  ///< mean of (a - b)^2 / (b^2 + kRelativeEpsilon): b is the reference

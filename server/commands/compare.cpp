@@ -53,7 +53,7 @@ CLI::App* addCompareCommand(CLI::App& root) {
   CLI::App* command = root.add_subcommand(
       "compare",
       "Print RMSE, PSNR (dB, peak 1), the largest difference and the mean squared relative error of two "
-      "pictures' linear RGB, and their mean FLIP");
+      "pictures' linear premultiplied RGBA, and their mean FLIP");
   const auto options = std::make_shared<CompareOptions>();
   command->add_option("A", options->a, "First picture (exr, tif, png, jpg)")->required();
   command->add_option("B", options->b, "Second picture, of the same size; the relative error's reference")

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <memory>
 
 #include "renderer/io/image_file.h"
@@ -22,9 +23,8 @@ struct Options {
 
 double rootMeanSquare(const std::vector<glm::vec4>& values) {
   double sum = 0;
-  for (const glm::vec4& v : values)
-    sum += double(v.r) * double(v.r) + double(v.g) * double(v.g) + double(v.b) * double(v.b);
-  return std::sqrt(sum / (3 * double(values.size())));
+  for (const glm::vec4& v : values) sum += glm::dot(glm::dvec4(v), glm::dvec4(v));
+  return std::sqrt(sum / (4 * double(values.size())));
 }
 
 void renderTruth(const Options& options) {

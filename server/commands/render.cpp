@@ -169,7 +169,7 @@ CLI::App* addRenderCommand(CLI::App& root) {
   command->add_option("--samples", o->samples, "Stop at so many samples a pixel")
       ->check(CLI::Range(1u, 1u << 24));
   command->add_option("--seconds", o->seconds, "Stop after this time")->check(numberUpTo(1e9, false));
-  command->add_option("--error", o->error, "Stop at this estimated RMSE over linear RGB")
+  command->add_option("--error", o->error, "Stop at this estimated RMSE over linear premultiplied RGBA")
       ->check(numberUpTo(1e9, false));
   command->add_option("--threads", o->threads, "Threads to use; 0 takes all")
       ->envname("SCOLOPAX_THREADS")

@@ -8,6 +8,7 @@ import argparse
 import json
 import os
 import statistics
+import struct
 import subprocess
 import sys
 import tempfile
@@ -62,11 +63,18 @@ def write_nrrd(path, voxels):
         file.write(voxels.tobytes())
 
 
-def write_pfm(path, picture):
-    """RGB as 32-bit floats, rows from the bottom (Debevec's portable float map)."""
+def write_tiff(path, picture):
+    """Premultiplied RGBA as 32-bit floats: a header, the pixels in one strip, four times the words 32 and 3 (bits; floats),
+    and the directory."""
+    pixels = numpy.ascontiguousarray(picture).astype("<f4").tobytes()
+    words = 8 + len(pixels)
+    entries = [(256, 4, 1, picture.shape[1]), (257, 4, 1, picture.shape[0]), (258, 3, 4, words), (259, 3, 1, 1),
+               (262, 3, 1, 2), (273, 4, 1, 8), (277, 3, 1, 4), (278, 4, 1, picture.shape[0]), (279, 4, 1, len(pixels)),
+               (338, 3, 1, 1), (339, 3, 4, words + 8)]
     with open(path, "wb") as file:
-        file.write(f"PF\n{picture.shape[1]} {picture.shape[0]}\n-1.0\n".encode())
-        file.write(numpy.ascontiguousarray(picture[::-1, :, :3]).astype("<f4").tobytes())
+        file.write(struct.pack("<2sHI", b"II", 42, words + 16) + pixels + struct.pack("<8H", *[32] * 4, *[3] * 4))
+        file.write(struct.pack("<H", len(entries)) + b"".join(struct.pack("<HHII", *entry) for entry in entries))
+        file.write(bytes(4))
 
 
 class Workplace:
@@ -91,8 +99,8 @@ class Workplace:
         self.run("reference", scene, "-o", self.path("truth.exr"), "--samples-per-axis", "1")
 
     def error(self, picture):
-        write_pfm(self.path("picture.pfm"), picture)
-        out = subprocess.run([PROGRAM, "compare", self.path("picture.pfm"), self.path("truth.exr"), "--json"],
+        write_tiff(self.path("picture.tif"), picture)
+        out = subprocess.run([PROGRAM, "compare", self.path("picture.tif"), self.path("truth.exr"), "--json"],
                              check=True, capture_output=True, text=True).stdout
         return {name: json.loads(out)[name] for name in ("rmse", "psnr")}
 

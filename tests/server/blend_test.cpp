@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <random>
 
 namespace scolopax::server {
@@ -49,6 +50,12 @@ TEST(Blend, TakesNothingOfAPictureThatIsAllNoise) {
   EXPECT_EQ(image.pixels, constant(2, 2, 0).pixels);
 }
 
+TEST(Blend, LooksAtAlphaAsErrorDoes) {
+  // Half of the squared difference is the error's: an equal share of both.
+  Image image{1, 1, {{0, 0, 0, 1}}};
+  EXPECT_NEAR(mixIn({1, 1, {{0, 0, 0, 0}}}, std::sqrt(0.5 / 4), &image), 0.5, 1e-12);
+}
+
 TEST(Blend, OfTwoNoisyPicturesIsBetterThanBothByTheLawOfIndependentErrors) {
   std::mt19937 random(7);
   for (const double errorBefore : {0.01, 0.1, 1.0})
@@ -56,16 +63,16 @@ TEST(Blend, OfTwoNoisyPicturesIsBetterThanBothByTheLawOfIndependentErrors) {
       std::normal_distribution<float> noiseBefore(0, float(errorBefore)), noise(0, float(error));
       Image before{200, 200, {}}, image{200, 200, {}};  // the truth is 0
       for (int i = 0; i < 200 * 200; ++i) {
-        before.pixels.emplace_back(noiseBefore(random), noiseBefore(random), noiseBefore(random), 1);
-        image.pixels.emplace_back(noise(random), noise(random), noise(random), 1);
+        before.pixels.emplace_back(noiseBefore(random), noiseBefore(random), noiseBefore(random), noiseBefore(random));
+        image.pixels.emplace_back(noise(random), noise(random), noise(random), noise(random));
       }
       mixIn(before, error, &image);
       double squares = 0;
-      for (const glm::vec4& p : image.pixels) squares += p.r * p.r + p.g * p.g + p.b * p.b;
+      for (const glm::vec4& p : image.pixels) squares += double(glm::dot(p, p));
       const double best = 1 / std::sqrt(1 / (error * error) + 1 / (errorBefore * errorBefore));
-      // 120,000 numbers know a variance to 0.4 % (1 sigma), and with it the share to at most 1.2 % (3 sigma).
-      EXPECT_GT(std::sqrt(squares / (3 * 200 * 200)), 0.99 * best) << errorBefore << " " << error;
-      EXPECT_LT(std::sqrt(squares / (3 * 200 * 200)), 1.01 * std::hypot(best, 0.012 * error))
+      // 160,000 numbers know a variance to 0.4 % (1 sigma), and with it the share to at most 1.2 % (3 sigma).
+      EXPECT_GT(std::sqrt(squares / (4 * 200 * 200)), 0.99 * best) << errorBefore << " " << error;
+      EXPECT_LT(std::sqrt(squares / (4 * 200 * 200)), 1.01 * std::hypot(best, 0.012 * error))
           << errorBefore << " " << error;
     }
 }

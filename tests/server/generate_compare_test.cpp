@@ -73,8 +73,8 @@ TEST_F(Commands, GenerateLeavesTheFileBeforeWhenItCannotWriteAll) {
 }
 
 TEST_F(Commands, CompareTellsHowFarPicturesAreApart) {
-  const std::string a = writePicture("a.exr", 3, {0.5f, 0.5f, 0.5f, 1}),
-                    b = writePicture("b.tif", 3, {0.25f, 0.25f, 0.25f, 1});
+  const std::string a = writePicture("a.exr", 3, {0.5f, 0.5f, 0.5f, 0.5f}),
+                    b = writePicture("b.tif", 3, {0.25f, 0.25f, 0.25f, 0.25f});
   const auto json = nlohmann::json::parse(run({"compare", a, b, "--json"}));
   EXPECT_EQ(json.at("rmse"), 0.25);
   EXPECT_EQ(json.at("max"), 0.25);

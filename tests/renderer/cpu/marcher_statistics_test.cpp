@@ -49,9 +49,9 @@ INSTANTIATE_TEST_SUITE_P(Methods, Quadrature,
                                           testing::ValuesIn(kBlends)),
                          nameOfQuadrature);
 
-class Estimate : public testing::TestWithParam<int> {};
+class Estimates : public testing::TestWithParam<int> {};
 
-TEST_P(Estimate, OfBiasIsThatOfTheReference) {
+TEST_P(Estimates, OfBiasIsThatOfTheReference) {
   const auto made = testScene(kTestScenes[GetParam()]);
   if (!made) GTEST_SKIP() << "the data set is absent from " << SCOLOPAX_DATA_DIR;
   for (const bool lit : {false, true})
@@ -68,10 +68,10 @@ TEST_P(Estimate, OfBiasIsThatOfTheReference) {
       const Image other = renderSamples(made->volume, scene, 128);
       double squares = 0;
       for (std::size_t i = 0; i < expected.pixels.size(); ++i) {
-        const glm::dvec3 truth(expected.pixels[i]);
-        squares += glm::dot(glm::dvec3(one.pixels[i]) - truth, glm::dvec3(other.pixels[i]) - truth);
+        const glm::dvec4 truth(expected.pixels[i]);
+        squares += glm::dot(glm::dvec4(one.pixels[i]) - truth, glm::dvec4(other.pixels[i]) - truth);
       }
-      const double truth = std::sqrt(std::max(0.0, squares) / (3.0 * double(expected.pixels.size())));
+      const double truth = std::sqrt(std::max(0.0, squares) / (4.0 * double(expected.pixels.size())));
       RenderPlan plan(made->volume);
       plan.update(scene);
       const double found = estimateBias(plan);
@@ -81,7 +81,7 @@ TEST_P(Estimate, OfBiasIsThatOfTheReference) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, Estimate, testing::Range(0, int(std::size(kTestScenes))),
+INSTANTIATE_TEST_SUITE_P(Scenes, Estimates, testing::Range(0, int(std::size(kTestScenes))),
                          [](const auto& tested) { return std::string(kTestSceneNames[tested.param]); });
 
 TEST(Automatic, StaysBelowTheErrorThatIsAskedFor) {
@@ -104,6 +104,53 @@ TEST(Automatic, StaysBelowTheErrorThatIsAskedFor) {
         EXPECT_LT(compareImages(renderer->image(), expected).rmse, target)
             << kTestSceneNames[int(which)] << " lit " << lit << " step " << renderer->choice().step;
       }
+  }
+}
+
+/// Detail finer than a voxel, in black: nothing of it shows but alpha.
+VolumeAndScene blackNoise() {
+  const glm::ivec3 dims(12, 12, 12);
+  std::uint32_t state = 5;
+  const auto noise = [&](int, int, int) { return (state = state * 1664525u + 1013904223u) >> 24; };
+  VolumeAndScene made{volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, noise)), {}};
+  made.scene = framed(*made.volume, 24);
+  ChannelAppearance& black = made.scene.channels[0];
+  black.rangeLo = 30;
+  black.rangeHi = 120;
+  black.density = 0.15;
+  black.color = {{0, glm::dvec3(0)}};
+  made.scene.background = glm::vec3(1);
+  return made;
+}
+
+TEST(Automatic, TakesAStepThatIsSmallEnoughForAlphaAlone) {
+  const auto [volume, framed] = blackNoise();
+  Scene scene = framed;
+  scene.method = Method::automatic;
+  const Image expected = reference::renderReference(*volume, scene, 1).image;
+  for (const double target : {1e-2, 1e-3}) {
+    scene.targetError = target;
+    const auto renderer = makeCpuRenderer(volume, 0);
+    renderer->setScene(scene);
+    const std::atomic<bool> never = false;
+    for (int i = 0; i < 64; ++i) renderer->renderSample(never);
+    EXPECT_LT(compareImages(renderer->image(), expected).rmse, target);
+    EXPECT_GT(renderer->estimatedError(), compareImages(renderer->image(), expected).rmse / 2);
+  }
+}
+
+TEST(Estimate, OfTheBiasOfBlackMatterIsThatOfItsAlpha) {
+  const auto [volume, framed] = blackNoise();
+  Scene scene = framed;
+  scene.method = Method::raymarch;
+  const Image expected = reference::renderReference(*volume, scene, 1).image;
+  for (const double step : {4.0, 1.0}) {
+    scene.step = step;
+    RenderPlan plan(volume);
+    plan.update(scene);
+    const double truth = compareImages(renderSamples(volume, scene, 256), expected).rmse;
+    EXPECT_GT(estimateBias(plan), truth / 3);
+    EXPECT_LT(estimateBias(plan), truth * 3);
   }
 }
 

@@ -40,24 +40,24 @@ class LowDiscrepancy : public testing::Test {
 
 TEST_F(LowDiscrepancy, HasTheExpectedPictureOfTheReference) {
   // Squared deviation of the mean over replicates from the reference, in units of what their spread allows: 1
-  // with a standard deviation of about sqrt(2 / 2304) times a correlation of components below 3: 0.1. A bias
+  // with a standard deviation of about sqrt(2 / 2304) times a correlation of components below 4: 0.12. A bias
   // of the size of one replicate's noise / 8 makes it 2.
   constexpr int kReplicates = 32, kSamples = 16;
   for (const Method method : kTrackers) {
     scene_.method = method;
-    std::vector<glm::dvec3> mean(truth_.pixels.size(), glm::dvec3(0)), squares = mean;
+    std::vector<glm::dvec4> mean(truth_.pixels.size(), glm::dvec4(0)), squares = mean;
     for (int r = 0; r < kReplicates; ++r) {
       scene_.seed = std::uint32_t(r);
       const Image image = renderSamples(volume_, scene_, kSamples);
       for (std::size_t i = 0; i < mean.size(); ++i) {
-        const glm::dvec3 v(image.pixels[i]);
+        const glm::dvec4 v(image.pixels[i]);
         mean[i] += v / double(kReplicates);
         squares[i] += v * v / double(kReplicates);
       }
     }
     double deviation = 0, allowed = 0;
     for (std::size_t i = 0; i < mean.size(); ++i)
-      for (int c = 0; c < 3; ++c) {
+      for (int c = 0; c < 4; ++c) {
         deviation += std::pow(mean[i][c] - double(truth_.pixels[i][c]), 2);
         allowed += (squares[i][c] - mean[i][c] * mean[i][c]) / (kReplicates - 1.0);
       }

@@ -25,19 +25,19 @@ TEST(ImageDifference, OfEqualPicturesIsZeroWithInfinitePsnr) {
 
 TEST(ImageDifference, HasTheValuesComputedByHand) {
   Image a = makeImage(2, 1, {0, 0, 0, 0}), b = a;
-  // Squared differences 0.25, 0.0625, 0 and 1, 0, 0.0625: their mean over 6 components is 1.375 / 6.
-  a.pixels[0] = {0.5f, 0.25f, 0.125f, 1};
+  // Squared differences 0.25, 0.0625, 0, 0.25 and 1, 0, 0.0625, 0: their mean over 8 components is 1.625 / 8.
+  a.pixels[0] = {0.5f, 0.25f, 0.125f, 0.5f};
   b.pixels[0] = {1.0f, 0.0f, 0.125f, 1};
   a.pixels[1] = {2.0f, 0.5f, 0.5f, 1};
   b.pixels[1] = {1.0f, 0.5f, 0.75f, 1};
   const ImageDifference d = compareImages(a, b);
-  EXPECT_NEAR(d.rmse, 0.47871355387816905, 1e-15);
-  EXPECT_NEAR(d.psnr, 6.398486, 1e-6);
+  EXPECT_NEAR(d.rmse, 0.45069390943299864, 1e-15);
+  EXPECT_NEAR(d.psnr, 6.922366, 1e-6);
   EXPECT_EQ(d.maximum, 1.0);
 }
 
 TEST(ImageDifference, OfAUniformTenthIsTwentyDecibels) {
-  const ImageDifference d = compareImages(makeImage(5, 7, {0, 0, 0, 1}), makeImage(5, 7, glm::vec4(0.1f)));
+  const ImageDifference d = compareImages(makeImage(5, 7, {0, 0, 0, 0}), makeImage(5, 7, glm::vec4(0.1f)));
   EXPECT_NEAR(d.rmse, 0.1, 1e-8);
   EXPECT_NEAR(d.psnr, 20, 1e-6);
   EXPECT_NEAR(d.maximum, 0.1, 1e-8);
@@ -45,19 +45,22 @@ TEST(ImageDifference, OfAUniformTenthIsTwentyDecibels) {
 
 TEST(ImageDifference, RelativeErrorHasTheValueComputedByHand) {
   Image a = makeImage(2, 1, {0, 0, 0, 0}), b = a;
-  // The second picture is the reference: 0.25 / 0.26, 0.01 / 0.01, 0, and 1 / 4.01, 0, 0.
+  // The second picture is the reference: 0.25 / 0.26, 0.01 / 0.01, 0, 0, and 1 / 4.01, 0, 0, 0.
   a.pixels[0] = {1.0f, 0.1f, 0.7f, 1};
   b.pixels[0] = {0.5f, 0.0f, 0.7f, 1};
   a.pixels[1] = {1.0f, 0.25f, 0.0f, 1};
   b.pixels[1] = {2.0f, 0.25f, 0.0f, 1};
-  EXPECT_NEAR(compareImages(a, b).relative, (0.9615384615384616 + 1 + 0.24937655860349128) / 6, 1e-7);
-  EXPECT_NEAR(compareImages(b, a).relative, (0.25 / 1.01 + 0.01 / 0.02 + 1 / 1.01) / 6, 1e-7);
+  EXPECT_NEAR(compareImages(a, b).relative, (0.9615384615384616 + 1 + 0.24937655860349128) / 8, 1e-7);
+  EXPECT_NEAR(compareImages(b, a).relative, (0.25 / 1.01 + 0.01 / 0.02 + 1 / 1.01) / 8, 1e-7);
   EXPECT_EQ(compareImages(a, a).relative, 0);
 }
 
-TEST(ImageDifference, DoesNotLookAtAlpha) {
+TEST(ImageDifference, CountsAlphaAsMuchAsAColor) {
+  // Black matter over a bright background: all that shows of it is alpha.
   const ImageDifference d = compareImages(makeImage(2, 2, {0, 0, 0, 0}), makeImage(2, 2, {0, 0, 0, 1}));
-  EXPECT_EQ(d.rmse, 0);
+  EXPECT_EQ(d.rmse, 0.5);
+  EXPECT_EQ(d.maximum, 1);
+  EXPECT_NEAR(d.relative, 1 / 1.01 / 4, 1e-7);
 }
 
 TEST(ImageDifference, IsSymmetric) {
@@ -79,6 +82,8 @@ TEST(ImageDifference, NeverPassesOverAPixelThatIsNotFinite) {
   EXPECT_TRUE(std::isinf(compareImages(a, b).maximum));
   EXPECT_TRUE(std::isinf(compareImages(a, b).relative));
   EXPECT_TRUE(std::isinf(compareImages(b, a).relative));
+  a.pixels[1] = {0, 0, 0, std::numeric_limits<float>::quiet_NaN()};
+  EXPECT_TRUE(std::isnan(compareImages(a, b).rmse));
 }
 
 TEST(ImageDifference, RefusesDifferentSizesAndNamesBoth) {
