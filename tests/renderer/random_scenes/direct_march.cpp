@@ -138,9 +138,10 @@ class Marcher {
   Marched pixel(int column, int row) const {
     const Camera& camera = scene_.camera;
     const dvec3 forward = unit(camera.target - camera.eye);
-    dvec3 right = unit(glm::cross(forward, camera.up));
-    if (right == dvec3(0))
+    dvec3 right = glm::cross(forward, unit(camera.up));
+    if (!(glm::length(right) > 1e-6))  // up along the view
       right = unit(glm::cross(forward, std::abs(forward.z) < 0.9 ? dvec3(0, 0, 1) : dvec3(0, 1, 0)));
+    right = unit(right);
     const dvec3 up = glm::cross(right, forward);
     const double height =
         camera.orthoHeight ? *camera.orthoHeight : 2 * std::tan(camera.fovY * 3.14159265358979323846 / 360);
@@ -237,7 +238,8 @@ class Marcher {
       return PointSample{extinction, dvec3(0), decisions.hash()};
     };
     const auto decisionsAt = [&](double t) { return sampleAt(t).decisions; };
-    SteppedMarch march(sampleAt, decisionsAt, {stepsFor((end - begin) * direction, 12), 1e-7, density_, 1});
+    SteppedMarch march(sampleAt, decisionsAt,
+                       {stepsFor((end - begin) * direction, 12), 1e-7, density_, 1, kMostShadowSamples});
     march.march(begin, end);
     *error = std::fmax(*error, march.error());
     return march.result().transmittance;
@@ -328,14 +330,17 @@ class Marcher {
     };
     const auto sampleAt = [&](double t) { return sample(t, true); };
     const auto decisionsAt = [&](double t) { return sample(t, false).decisions; };
-    const StepRules rules{stepsFor((end - begin) * way, lit ? 40 : 300), lit ? 1e-6 : 1e-9, density_,
-                          radiance_};
+    const int perVoxel = scene_.shadows ? 16 : lit ? 64 : 300;
+    const StepRules rules{stepsFor((end - begin) * way, perVoxel), lit ? 1e-6 : 1e-9, density_, radiance_,
+                          scene_.shadows ? kMostLitSamples : kMostSamples};
     SteppedMarch march(sampleAt, decisionsAt, rules);
     march.march(begin, end);
     const Stretch& result = march.result();
     return {glm::dvec4(result.light, 1 - result.transmittance),
             (march.error() + double(lights_.size()) * shadowError) * radiance_};
   }
+
+  static constexpr int kMostShadowSamples = 2000, kMostLitSamples = 2000, kMostSamples = 200000;
 
   const Scene& scene_;
   Grid grid_;

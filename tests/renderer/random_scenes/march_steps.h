@@ -27,6 +27,7 @@ struct StepRules {
   double tolerance;    ///< of what a halving may change, per step
   double largestRate;  ///< bound of the extinction: a step across a decision may be as thick as `tolerance`
   double largestRadiance;  ///< relative to which light is told
+  int most;                ///< samples after which no step is halved any more
 };
 
 /// sampleAt(t) gives the PointSample, decisionsAt(t) only its hash.
@@ -73,9 +74,11 @@ class SteppedMarch {
     const bool alike = before == left.decisions && left.decisions == middle.decisions &&
                        middle.decisions == right.decisions && right.decisions == after;
     const double most = alike ? change : all_.transmittance * -std::expm1(-rules_.largestRate * 2 * half);
-    if ((change <= rules_.tolerance && most <= rules_.tolerance) || depth == kMaxDepth || !(a < m && m < b)) {
+    const bool enough = change <= rules_.tolerance && most <= rules_.tolerance;
+    samples_ += 2;
+    if (enough || samples_ > rules_.most || depth == kMaxDepth || !(a < m && m < b)) {
       all_ = joined(all_, fine);
-      error_ += change;
+      error_ += enough ? change : std::max(change, most);
       return;
     }
     step(a, m, before, middle.decisions, left, depth + 1);
@@ -88,6 +91,7 @@ class SteppedMarch {
   StepRules rules_;
   Stretch all_;
   double error_ = 0;
+  int samples_ = 0;
 };
 
 }  // namespace scolopax::random_scenes
