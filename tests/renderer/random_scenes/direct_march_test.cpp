@@ -24,7 +24,8 @@ Drawing drawing(ChannelSource channel, glm::ivec3 dims) {
   made.scene.channels.resize(1);
   made.scene.filter = PixelFilter::point;
   made.scene.width = made.scene.height = 1;
-  made.scene.camera = {glm::dvec3(dims - 1) * 0.5 - glm::dvec3(0, 0, 10), glm::dvec3(dims - 1) * 0.5};
+  made.scene.camera.target = glm::dvec3(dims - 1) * 0.5;
+  made.scene.camera.eye = made.scene.camera.target - glm::dvec3(0, 0, 10);
   made.scene.camera.orthoHeight = 1e-9;
   return made;
 }
@@ -77,7 +78,9 @@ TEST(DirectMarch, ShadesNormalsThatTurnAlongTheRay) {
   d.scene.shading = true;
   d.scene.lights = {{LightType::directional, {1, 0, 0}}};
   d.scene.width = d.scene.height = 8;
-  d.scene.camera = {{5, 4, 3}, {0.5, 0.5, 0.5}, {0, 0, 1}};
+  d.scene.camera.eye = {5, 4, 3};
+  d.scene.camera.target = {0.5, 0.5, 0.5};
+  d.scene.camera.up = {0, 0, 1};
   d.scene.camera.orthoHeight = 2;
   const Marched found = directMarch(d.source, d.scene, 6, 4);
   EXPECT_NEAR(found.rgba.r, 0.22801, 5e-5);

@@ -8,10 +8,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <mutex>
-#include <set>
 
-#include "protocol/schema.h"
-#include "server/scene_resolver.h"
 #include "tests/renderer/random_scenes/checks.h"
 
 namespace scolopax::random_scenes {

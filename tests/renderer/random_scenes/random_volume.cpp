@@ -14,6 +14,12 @@
 namespace scolopax::random_scenes {
 namespace {
 
+/// Rounded to a float; through memory, because GCC 12 leaves out such a rounding of neighbouring numbers.
+double asFloat(double value) {
+  volatile float rounded = float(value);
+  return double(rounded);
+}
+
 glm::dmat3 rotation(Draw& draw) {
   const glm::dvec3 x = draw.direction();
   glm::dvec3 y = glm::cross(x, draw.direction());
@@ -39,9 +45,11 @@ Grid drawGrid(std::uint64_t scene) {
   const double far = draw.chance(0.1) ? 1e4 : 3;
   const glm::dvec3 origin = draw.chance(0.5) ? glm::dvec3(0) : size * draw.vector(-far, far);
   // As floats, which is what a NIfTI header holds.
-  for (int axis = 0; axis < 3; ++axis)
-    grid.worldFromVoxel[axis] = glm::dvec4(glm::vec3(spacing[axis] * axes[axis]), 0);
-  grid.worldFromVoxel[3] = glm::dvec4(glm::vec3(origin), 1);
+  for (int row = 0; row < 3; ++row) {
+    for (int axis = 0; axis < 3; ++axis)
+      grid.worldFromVoxel[axis][row] = asFloat(spacing[axis] * axes[axis][row]);
+    grid.worldFromVoxel[3][row] = asFloat(origin[row]);
+  }
   return grid;
 }
 
@@ -108,9 +116,9 @@ ChannelSource drawChannel(std::uint64_t scene, int number, const glm::ivec3& dim
   if (type == 2) fillIntegers<std::int16_t>(draw, values, &channel);
   if (type == 3) fillFloats(draw, values, &channel);
   if (draw.chance(0.25)) {
-    channel.slope = double(float(draw.between(-3, 3)));
+    channel.slope = asFloat(draw.between(-3, 3));
     if (channel.slope == 0) channel.slope = 1;
-    channel.intercept = double(float(draw.between(-500, 500)));
+    channel.intercept = asFloat(draw.between(-500, 500));
   }
   channel.name = "channel_" + std::to_string(number);
   return channel;
