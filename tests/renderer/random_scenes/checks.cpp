@@ -143,7 +143,7 @@ class Checks {
     const double stated =
         isLit(scene) ? reference::Integrator::kToleranceLit : reference::Integrator::kTolerance;
     const double claimed = std::max(found.maximumRayError, stated * largest_) + 1e-7 * largest_;
-    for (int k = 0; k < (scene.shadows ? 1 : 3); ++k) {
+    for (int k = 0; k < (scene.shadows ? 1 : 8); ++k) {
       const int pixel = draw.integer(0, pixels - 1);
       const Marched own = directMarch(drawn_.source, scene, pixel % scene.width, pixel / scene.width);
       for (int c = 0; c < 4; ++c) {
@@ -170,9 +170,9 @@ class Checks {
 
   /// Seeds and samples that cost about `fetches`.
   Effort effortFor(const Scene& scene, double fetches, int most) const {
-    const double samples = std::clamp(fetches / costOf(drawn_.volume, scene), 64.0, double(most));
-    const int each = scene.sampling == Sampling::independent ? 256 : 16;
-    return {std::max(4, int(samples) / each), each};
+    const int samples = int(std::clamp(fetches / costOf(drawn_.volume, scene), 32.0, double(most)));
+    const int each = scene.sampling == Sampling::independent ? std::min(256, samples / 4) : 8;
+    return {std::max(8, samples) / each, each};
   }
 
   /// A few standard errors, and a few samples: of what a sample shows at the least when it hits anything.
@@ -190,7 +190,7 @@ class Checks {
 
   void checkTracker(const Scene& scene) {
     const double rounding = 1e-6 * largest_;
-    valueSamples_ = scene.sampling == Sampling::independent ? 1 : 16;
+    valueSamples_ = scene.sampling == Sampling::independent ? 1 : 8;
     const Estimates quick = estimate(drawn_.volume, scene, effortFor(scene, 1e6, 1 << 14), 1);
     const auto allowedQuick = [&](std::size_t i, int c) {
       return quickNoise(quick, quick_, i, c) + rounding;
@@ -240,7 +240,7 @@ class Checks {
   }
 
   void checkQuadrature(Scene scene) {
-    valueSamples_ = scene.sampling == Sampling::independent ? 1 : 16;
+    valueSamples_ = scene.sampling == Sampling::independent ? 1 : 8;
     const Levels quick = levelsOf(scene, scene.step, 1e5, isLit(scene) ? 1 << 12 : 512, 2);
     scene.step = quick.finest;
     const Estimates& last = quick.at.back();

@@ -51,7 +51,7 @@ class SteppedMarch {
   double error() const { return error_ + (all_.transmittance > kOpaque ? 0 : all_.transmittance); }
 
  private:
-  static constexpr double kOpaque = 1e-9;
+  static constexpr double kOpaque = 1e-9, kThin = 0.1;
 
   static Stretch slab(const PointSample& sample, double length) {
     const double alpha = -std::expm1(-sample.extinction * length);
@@ -74,7 +74,9 @@ class SteppedMarch {
     const bool alike = before == left.decisions && left.decisions == middle.decisions &&
                        middle.decisions == right.decisions && right.decisions == after;
     const double most = alike ? change : all_.transmittance * -std::expm1(-rules_.largestRate * 2 * half);
-    const bool enough = change <= rules_.tolerance && most <= rules_.tolerance;
+    // In a thick step all samples lie deep, and say nothing of what its front shows.
+    const bool thin = std::max({left.extinction, middle.extinction, right.extinction}) * 2 * half <= kThin;
+    const bool enough = change <= rules_.tolerance && most <= rules_.tolerance && thin;
     samples_ += 2;
     if (enough || samples_ > rules_.most || depth == kMaxDepth || !(a < m && m < b)) {
       all_ = joined(all_, fine);
