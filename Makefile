@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # make run     build everything, make the demo data if DATA names none, serve it on loopback
 # make test    build and run the tests; make check adds sanitizers, clang-tidy, fuzzing, hostile clients with large
-#              volumes and four times the samples in the statistical tests
+#              volumes, four times the samples in the statistical tests and ten times the random scenes
 DATA ?=
 PORT ?= 8080
 JOBS ?= $(shell nproc)
@@ -38,11 +38,12 @@ test: test-deps web
 check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
 	$(CTEST) --test-dir build/release -L hostile --output-on-failure
 	SCOLOPAX_STATISTICS=4 $(CTEST) --test-dir build/release -L statistics --output-on-failure
+	SCOLOPAX_RANDOM_SCENES=3000 $(CTEST) --test-dir build/release -L random-scenes --output-on-failure
 
 check-asan-ubsan: test-deps
 	cmake --preset asan-ubsan > /dev/null
 	cmake --build --preset asan-ubsan -j $(JOBS)
-	$(CTEST) --test-dir build/asan-ubsan -j $(JOBS) -LE 'web|statistics|hostile' --output-on-failure
+	SCOLOPAX_RANDOM_SCENES=20 $(CTEST) --test-dir build/asan-ubsan -j $(JOBS) -LE 'web|statistics|hostile' --output-on-failure
 	$(CTEST) --test-dir build/asan-ubsan -L hard --output-on-failure
 
 # The server's threads, with renderers that tests make up: those of the true ones are TBB's, which is not instrumented.

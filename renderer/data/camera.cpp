@@ -23,15 +23,21 @@ glm::dvec3 normalizeSafely(const glm::dvec3& v) {
   return glm::normalize(v / largest);
 }
 
+/// Between `up` and the view, in radians: below, `up` says nothing.
+constexpr double kLeastAngle = 1e-6;
+
 Basis basisOf(const Camera& camera) {
   const glm::dvec3 forward = normalizeSafely(camera.target - camera.eye);
   if (forward == glm::dvec3(0))
     throw Error(ErrorCode::badInput, "camera: eye and target must be different, finite points");
-  glm::dvec3 right = normalizeSafely(glm::cross(forward, normalizeSafely(camera.up)));
-  if (right == glm::dvec3(0)) {  // up along the view, or zero: any direction across it will do
+  glm::dvec3 right = glm::cross(forward, normalizeSafely(camera.up));
+  // Along the view, or zero: any direction across will do. A smaller cross product would be rounding, and not
+  // at right angles to the view.
+  if (!(glm::length(right) > kLeastAngle)) {
     const glm::dvec3 across = std::abs(forward.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
-    right = glm::normalize(glm::cross(forward, across));
+    right = glm::cross(forward, across);
   }
+  right = glm::normalize(right);
   return {right, glm::cross(right, forward), forward};
 }
 

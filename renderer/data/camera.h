@@ -13,8 +13,8 @@ namespace scolopax {
 struct Camera {
   glm::dvec3 eye{0, 0, 1};
   glm::dvec3 target{0};
-  glm::dvec3 up{0, 1, 0};
-  double fovY = 35;                   ///< degrees, used without orthoHeight; in (0, 180)
+  glm::dvec3 up{0, 1, 0};  ///< within 1e-6 of the view's direction: z is taken, or y where z is near it
+  double fovY = 35;        ///< degrees, used without orthoHeight; in (0, 180)
   std::optional<double> orthoHeight;  ///< full height of the view in world units: an orthographic camera
   bool operator==(const Camera&) const = default;
 };

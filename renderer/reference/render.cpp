@@ -27,8 +27,9 @@ struct View {
     if (!(distance > 0) || !std::isfinite(distance))
       throw Error(ErrorCode::badInput, "reference: eye and target must be different, finite points");
     forward = (camera.target - camera.eye) / distance;
-    right = glm::cross(forward, camera.up);
-    if (!(glm::length(right) > 0))  // up along the view: the choice that every backend makes
+    const double upSize = std::max({std::abs(camera.up.x), std::abs(camera.up.y), std::abs(camera.up.z)});
+    right = upSize > 0 ? glm::cross(forward, glm::normalize(camera.up / upSize)) : glm::dvec3(0);
+    if (!(glm::length(right) > 1e-6))  // up along the view: the choice that every backend makes
       right = glm::cross(forward, std::abs(forward.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0));
     right = glm::normalize(right);
     up = glm::cross(right, forward);

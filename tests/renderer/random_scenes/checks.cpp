@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/renderer/random_scenes/checks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <sstream>
+
+#include "renderer/reference/render.h"
+#include "renderer/renderer.h"
+#include "tests/renderer/random_scenes/direct_march.h"
+#include "tests/renderer/random_scenes/draw.h"
+#include "tests/renderer/random_scenes/estimates.h"
+
+namespace scolopax::random_scenes {
+namespace {
+
+bool isLit(const Scene& scene) { return scene.shading || scene.shadows; }
+
+/// The expected picture, its mean as the last entry, and how far it may be off.
+struct Truth {
+  std::vector<glm::dvec4> mean, slack;
+};
+
+Truth referenceOf(const Volume& volume, const Scene& scene, int samplesPerAxis) {
+  const auto found = reference::renderReference(volume, scene, samplesPerAxis, scene.seed);
+  Truth truth;
+  glm::dvec4 sum(0), variance(0);
+  const double count = double(found.image.pixels.size());
+  for (std::size_t i = 0; i < found.image.pixels.size(); ++i) {
+    const glm::dvec4 value(found.image.pixels[i]), noise(found.standardError[i]);
+    truth.mean.push_back(value);
+    // Strata that are mixed may look even, as long as there are few of them.
+    const double few = scene.filter == PixelFilter::point ? 0 : 2.0 / (samplesPerAxis * samplesPerAxis);
+    truth.slack.push_back(8.0 * noise + few + found.maximumRayError);
+    sum += value;
+    variance += noise * noise;
+  }
+  truth.mean.push_back(sum / count);
+  truth.slack.push_back(8.0 * glm::sqrt(variance) / count + found.maximumRayError);
+  return truth;
+}
+
+/// What the rounding of floats can do to a picture: what the reference's becomes when the eye moves by three
+/// ten-millionths of the box, and values by as much of the largest.
+void addRounding(const RandomScene& drawn, const Scene& scene, Truth* truth) {
+  constexpr double kRounding = 3e-7;
+  const auto compare = [&](const Scene& changed) {
+    const Truth other = referenceOf(*drawn.volume, changed, 1);
+    for (std::size_t i = 0; i < truth->mean.size(); ++i)
+      truth->slack[i] = glm::max(truth->slack[i], glm::abs(other.mean[i] - truth->mean[i]));
+  };
+  for (const double sign : {-1.0, 1.0}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      Scene moved = scene;
+      moved.camera.eye[axis] += sign * kRounding * drawn.source.grid.diagonal();
+      moved.camera.target[axis] += sign * kRounding * drawn.source.grid.diagonal();
+      compare(moved);
+    }
+    Scene shifted = scene;
+    for (std::size_t n = 0; n < shifted.channels.size(); ++n) {
+      const Histogram& values = drawn.volume->channels()[n].histogram;
+      const double size = std::max(std::abs(values.minimum), std::abs(values.maximum));
+      shifted.channels[n].rangeLo += sign * kRounding * size;
+      shifted.channels[n].rangeHi += sign * kRounding * size;
+    }
+    compare(shifted);
+  }
+}
+
+/// Where an estimate lies farthest beyond what it may be off by.
+struct Worst {
+  std::size_t pixel = 0;
+  int component = 0;
+  double found = 0, expected = 0, allowed = 0;
+  bool beyond() const { return !(std::abs(found - expected) <= allowed); }
+};
+Worst worstOf(const Estimates& found, const Truth& truth,
+              const std::function<double(std::size_t, int)>& allowed) {
+  Worst worst;
+  double most = -1;
+  for (std::size_t i = 0; i < found.mean.size(); ++i)
+    for (int c = 0; c < 4; ++c) {
+      const double limit = allowed(i, c) + truth.slack[i][c];
+      const double off = std::abs(found.mean[i][c] - truth.mean[i][c]) / std::max(limit, 1e-30);
+      if (off > most || !(off == off)) {
+        most = off == off ? off : 1e300;
+        worst = {i, c, found.mean[i][c], truth.mean[i][c], limit};
+      }
+    }
+  return worst;
+}
+
+std::string textOf(const Worst& worst, const Estimates& found) {
+  std::ostringstream text;
+  text.precision(7);
+  text << (worst.pixel + 1 == found.mean.size() ? "the picture's mean"
+                                                : "pixel " + std::to_string(worst.pixel))
+       << " component " << worst.component << ": found " << worst.found << ", expected " << worst.expected
+       << " within " << worst.allowed << ", from " << found.count << " values";
+  return text.str();
+}
+
+class Checks {
+ public:
+  explicit Checks(const RandomScene& drawn)
+      : drawn_(drawn), scene_(drawn.scene), largest_(largestSample(drawn.scene)) {
+    scene_.targetError = drawn.wire["stop"]["error"];
+    // A pixel's area takes the reference hundreds of rays: without light, of which the filter knows nothing.
+    if (isLit(scene_)) scene_.filter = PixelFilter::point;
+  }
+
+  std::vector<Finding> all() {
+    checkReference();
+    if (!findings_.empty()) return findings_;  // what the others would be held against
+    quick_ = referenceOf(*drawn_.volume, scene_, kQuickStrata);
+    for (std::size_t i = 0; i < std::size(kMethods); ++i) {
+      Scene scene = scene_;
+      scene.method = Method(i);
+      if (scene.method == Method::automatic)
+        checkAutomatic(scene);
+      else if (hasStep(scene.method))
+        checkQuadrature(scene);
+      else
+        checkTracker(scene);
+    }
+    return findings_;
+  }
+
+ private:
+  void report(std::string what, std::string text) {
+    findings_.push_back({drawn_.number, std::move(what), std::move(text)});
+  }
+
+  void checkReference() {
+    Scene scene = scene_;
+    scene.filter = PixelFilter::point;
+    const int pixels = scene.width * scene.height;
+    Draw draw(drawn_.number, "pixels to march");
+    const auto found = reference::renderReference(*drawn_.volume, scene, 1);
+    // The reference's claim of one ray, or what its tolerance is.
+    const double stated =
+        isLit(scene) ? reference::Integrator::kToleranceLit : reference::Integrator::kTolerance;
+    const double claimed = std::max(found.maximumRayError, stated * largest_) + 1e-7 * largest_;
+    for (int k = 0; k < (scene.shadows ? 1 : 8); ++k) {
+      const int pixel = draw.integer(0, pixels - 1);
+      const Marched own = directMarch(drawn_.source, scene, pixel % scene.width, pixel / scene.width);
+      for (int c = 0; c < 4; ++c) {
+        const double value = double(found.image.pixels[std::size_t(pixel)][c]);
+        if (std::abs(value - own.rgba[c]) <= claimed + own.error) continue;
+        std::ostringstream text;
+        text.precision(9);
+        text << "pixel " << pixel << " component " << c << ": reference " << value << " claims "
+             << found.maximumRayError << ", march " << own.rgba[c] << " within " << own.error;
+        return report("reference", text.str());
+      }
+    }
+  }
+
+  /// Of a pixel's sides, where the filter is the box: two rays in each stratum.
+  static constexpr int kQuickStrata = 6, kLongStrata = 32;
+  const Truth& longTruth() {
+    if (!long_) {
+      long_ = referenceOf(*drawn_.volume, scene_, kLongStrata);
+      if (scene_.filter == PixelFilter::point) addRounding(drawn_, scene_, &*long_);
+    }
+    return *long_;
+  }
+
+  /// Seeds and samples that cost about `fetches`.
+  Effort effortFor(const Scene& scene, double fetches, int most) const {
+    const int samples = int(std::clamp(fetches / costOf(drawn_.volume, scene), 32.0, double(most)));
+    const int each = scene.sampling == Sampling::independent ? std::min(256, samples / 4) : 8;
+    return {std::max(8, samples) / each, each};
+  }
+
+  /// A few standard errors, and a few samples: of what a sample shows at the least when it hits anything.
+  double quickNoise(const Estimates& found, const Truth& truth, std::size_t i, int c) const {
+    const double mean = std::max(0.0, truth.mean[i][c]), alpha = std::max(truth.mean[i].a, 1e-12);
+    const double ofHits = c < 3 ? mean * mean * (1 / alpha - 1) : alpha * (1 - alpha);
+    const double variance = std::max(found.variance[i][c], ofHits / valueSamples_);
+    return kQuickErrors * std::sqrt(variance / found.count) + 10 * mean / alpha / found.count / valueSamples_;
+  }
+  static constexpr double kQuickErrors = 4.5;
+
+  double longNoise(const Estimates& found, double range, std::size_t i, int c) const {
+    return empiricalBernstein(found.variance[i][c], range, found.count, kLogTerm);
+  }
+
+  void checkTracker(const Scene& scene) {
+    const double rounding = 1e-6 * largest_;
+    valueSamples_ = scene.sampling == Sampling::independent ? 1 : 8;
+    const Estimates quick = estimate(drawn_.volume, scene, effortFor(scene, 1e6, 1 << 14), 1);
+    const auto allowedQuick = [&](std::size_t i, int c) {
+      return quickNoise(quick, quick_, i, c) + rounding;
+    };
+    if (!worstOf(quick, quick_, allowedQuick).beyond()) return;
+    const Estimates more = estimate(drawn_.volume, scene, effortFor(scene, 4e7, 1 << 19), 1000);
+    const Worst worst = worstOf(more, longTruth(), [&](std::size_t i, int c) {
+      return longNoise(more, c < 3 ? largest_ : 1, i, c) + rounding;
+    });
+    if (worst.beyond()) report(std::string(nameOf(scene.method)), textOf(worst, more));
+  }
+
+  /// What quadrature leaves out on purpose, and what rounding does to the product of its transmittances.
+  double quadratureFloor(const Scene& scene, const Truth& truth, std::size_t i) const {
+    constexpr double kOpaque = 1e-4;
+    const double segments = drawn_.source.grid.diagonal() / (scene.step * smallestSpacing());
+    const bool mayEnd = i + 1 == truth.mean.size() || truth.mean[i].a > 1 - 2 * kOpaque ||
+                        scene.blend == BlendMode::composite || scene.filter == PixelFilter::box;
+    return ((mayEnd ? kOpaque : 0) + (scene.shadows ? kOpaque : 0) + 2e-7 * (10 + segments)) * largest_;
+  }
+  double smallestSpacing() const {
+    const glm::dvec3 spacing = drawn_.source.grid.spacing();
+    return std::min({spacing.x, spacing.y, spacing.z});
+  }
+
+  /// Pictures at three steps, each a quarter of the one before.
+  struct Levels {
+    std::vector<Estimates> at;
+    double finest;
+    /// What is left of an error that falls at least with the step: 1/3 of the last difference; all of it
+    /// here, as errors fall unevenly.
+    double bias(std::size_t i, int c) const {
+      double most = 0;
+      for (std::size_t k = 1; k < at.size(); ++k)
+        most = std::max(most, std::abs(at[k].mean[i][c] - at[k - 1].mean[i][c]) *
+                                  std::pow(0.25, double(at.size() - 1 - k)));
+      return most;
+    }
+  };
+  Levels levelsOf(Scene scene, double coarsest, double fetches, int most, std::uint32_t round) const {
+    Levels levels;
+    for (const double step : {coarsest, coarsest / 4, coarsest / 16}) {
+      scene.step = levels.finest = std::clamp(step, 0.01, 100.0);
+      levels.at.push_back(estimate(drawn_.volume, scene, effortFor(scene, fetches, most), round));
+    }
+    return levels;
+  }
+
+  void checkQuadrature(Scene scene) {
+    valueSamples_ = scene.sampling == Sampling::independent ? 1 : 8;
+    const Levels quick = levelsOf(scene, scene.step, 1e5, isLit(scene) ? 1 << 12 : 512, 2);
+    scene.step = quick.finest;
+    const Estimates& last = quick.at.back();
+    const auto allowedQuick = [&](std::size_t i, int c) {
+      return kQuickErrors * std::sqrt(last.variance[i][c] / last.count) + quick.bias(i, c) +
+             quadratureFloor(scene, quick_, i);
+    };
+    if (!worstOf(last, quick_, allowedQuick).beyond()) return;
+    const Levels more = levelsOf(scene, scene.step, 2e7, isLit(scene) ? 1 << 17 : 1 << 13, 2000);
+    scene.step = more.finest;
+    const Estimates& found = more.at.back();
+    const Worst worst = worstOf(found, longTruth(), [&](std::size_t i, int c) {
+      // The range that was seen: values are the same function of a few numbers, and none of them is rare.
+      const double range = found.most[i][c] - found.least[i][c];
+      return longNoise(found, range, i, c) + more.bias(i, c) + quadratureFloor(scene, longTruth(), i);
+    });
+    if (!worst.beyond()) return;
+    std::ostringstream text;
+    text << textOf(worst, found) << " at step " << more.finest << "; at 4 and 16 times that "
+         << more.at[1].mean[worst.pixel][worst.component] << ", "
+         << more.at[0].mean[worst.pixel][worst.component];
+    report(std::string(nameOf(scene.method)), text.str());
+  }
+
+  /// RMSE of the mean picture over RGB, less what noise explains.
+  double errorOf(const Estimates& found, const Truth& truth, bool quick) const {
+    double squares = 0;
+    const std::size_t pixels = found.mean.size() - 1;
+    for (std::size_t i = 0; i < pixels; ++i)
+      for (int c = 0; c < 3; ++c) {
+        const double range = found.most[i][c] - found.least[i][c];
+        const double noise = quick ? kQuickErrors * std::sqrt(found.variance[i][c] / found.count)
+                                   : longNoise(found, range, i, c);
+        const double off = std::abs(found.mean[i][c] - truth.mean[i][c]) - noise - truth.slack[i][c];
+        if (off > 0) squares += off * off;
+      }
+    return std::sqrt(squares / (3.0 * double(pixels)));
+  }
+
+  /// `auto` promises that bias stays below the error asked for.
+  void checkAutomatic(const Scene& scene) {
+    const auto chooser = makeCpuRenderer(drawn_.volume, 1);
+    chooser->setScene(scene);
+    const Choice choice = chooser->choice();
+    Scene chosen = scene;
+    chosen.method = choice.method;
+    if (!hasStep(choice.method)) return;  // checked as itself
+    chosen.step = choice.step;
+    const Estimates quick = estimate(drawn_.volume, chosen, effortFor(chosen, 1e5, 1 << 12), 3);
+    if (errorOf(quick, quick_, true) <= scene.targetError) return;
+    const Estimates more = estimate(drawn_.volume, chosen, effortFor(chosen, 2e7, 1 << 17), 3000);
+    const double error = errorOf(more, longTruth(), false);
+    if (error <= scene.targetError) return;
+    std::ostringstream text;
+    text << nameOf(choice.method) << " at step " << choice.step << " is off by " << error
+         << " (RMSE), asked was " << scene.targetError;
+    report("auto", text.str());
+  }
+
+  const RandomScene& drawn_;
+  Scene scene_;
+  double largest_;
+  double valueSamples_ = 1;
+  Truth quick_;
+  std::optional<Truth> long_;
+  std::vector<Finding> findings_;
+};
+
+}  // namespace
+
+std::vector<Finding> checkScene(const RandomScene& scene) { return Checks(scene).all(); }
+
+}  // namespace scolopax::random_scenes

@@ -1,0 +1,360 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/renderer/random_scenes/direct_march.h"
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+#include <vector>
+
+#include "tests/renderer/random_scenes/march_steps.h"
+
+namespace scolopax::random_scenes {
+namespace {
+
+using glm::dvec3;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Hash of the decisions that led to a sample.
+class Decisions {
+ public:
+  void note(std::uint64_t which) { hash_ = (hash_ ^ (which + 1)) * 0x100000001b3u; }
+  std::uint64_t hash() const { return hash_; }
+
+ private:
+  std::uint64_t hash_ = 0xcbf29ce484222325u;
+};
+
+/// One channel's values, and how it looks.
+struct Matter {
+  std::vector<double> values;  // data values, x fastest
+  glm::ivec3 dims;
+  const ChannelAppearance* look;
+
+  double voxel(int i, int j, int k) const { return values[std::size_t(i + dims.x * (j + dims.y * k))]; }
+  static double mean(double a, double b, double w) { return w == 1 ? b : a + w * (b - a); }
+
+  /// Trilinear; NaN in a cell with a corner that is not finite.
+  double at(const dvec3& p) const {
+    int low[3], high[3];
+    double w[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const double x = std::fmin(std::fmax(p[axis], 0), dims[axis] - 1);
+      low[axis] = std::max(0, std::min(int(std::floor(x)), dims[axis] - 2));
+      high[axis] = std::min(low[axis] + 1, dims[axis] - 1);
+      w[axis] = x - low[axis];
+    }
+    double plane[2];
+    for (int z = 0; z < 2; ++z) {
+      const int k = z ? high[2] : low[2];
+      double row[2];
+      for (int y = 0; y < 2; ++y) {
+        const int j = y ? high[1] : low[1];
+        const double a = voxel(low[0], j, k), b = voxel(high[0], j, k);
+        if (!std::isfinite(a) || !std::isfinite(b)) return std::numeric_limits<double>::quiet_NaN();
+        row[y] = mean(a, b, w[0]);
+      }
+      plane[z] = mean(row[0], row[1], w[1]);
+    }
+    return mean(plane[0], plane[1], w[2]);
+  }
+
+  /// Per voxel along each axis, by differences of one voxel; 0 where one of them is not finite.
+  dvec3 gradient(const dvec3& p) const {
+    dvec3 g(0);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double last = dims[axis] - 1, x = std::fmin(std::fmax(p[axis], 0), last);
+      dvec3 before = p, after = p;
+      before[axis] = std::fmax(x - 1, 0);
+      after[axis] = std::fmin(x + 1, last);
+      if (before[axis] < after[axis]) g[axis] = (at(after) - at(before)) / (after[axis] - before[axis]);
+      if (!std::isfinite(g[axis])) return dvec3(0);
+    }
+    return g;
+  }
+
+  double position(double value) const {
+    const double lo = look->rangeLo, hi = look->rangeHi;
+    if (lo == hi) return value < lo ? 0 : 1;
+    return std::pow(std::fmin(std::fmax((value - lo) / (hi - lo), 0), 1), look->gamma);
+  }
+
+  /// The last knot at or before `position` and the next one; `of(knot)` is what is interpolated.
+  template <class Knots, class Of>
+  static auto curve(const Knots& knots, double position, Decisions* decisions, Of of) {
+    std::size_t next = 0;
+    while (next < knots.size() && knots[next].position <= position) ++next;
+    decisions->note(next);
+    if (next == 0) return of(knots.front());
+    if (next == knots.size()) return of(knots.back());
+    const auto &a = knots[next - 1], &b = knots[next];
+    return of(a) + (of(b) - of(a)) * ((position - a.position) / (b.position - a.position));
+  }
+};
+
+double dot(const dvec3& a, const dvec3& b) { return glm::dot(a, b); }
+dvec3 unit(const dvec3& v) {
+  const double length = glm::length(v);
+  return length > 0 ? v / length : dvec3(0);
+}
+
+class Marcher {
+ public:
+  Marcher(const VolumeSource& source, const Scene& scene) : scene_(scene), grid_(source.grid) {
+    const glm::dmat3 linear(grid_.worldFromVoxel);
+    voxelFromWorld_ = glm::inverse(linear);
+    smallest_ = kInfinity;
+    for (int axis = 0; axis < 3; ++axis) smallest_ = std::min(smallest_, glm::length(linear[axis]));
+    for (std::size_t n = 0; n < source.channels.size(); ++n) {
+      const ChannelSource& channel = source.channels[n];
+      if (!scene.channels[n].visible) continue;
+      Matter matter{{}, grid_.dims, &scene.channels[n]};
+      visitScalarType(channel.voxels.type(), [&](auto zero) {
+        for (const auto voxel : channel.voxels.template as<decltype(zero)>())
+          matter.values.push_back(channel.slope * double(voxel) + channel.intercept);
+      });
+      matters_.push_back(std::move(matter));
+    }
+    lights_ = scene.lights;
+    if (lights_.empty()) lights_.emplace_back();  // a headlight
+    dvec3 light(0);
+    for (const Light& l : lights_) light += l.intensity * l.color;
+    for (const Matter& m : matters_) {
+      density_ += m.look->density;
+      dvec3 color(0);
+      for (const ColorKnot& knot : m.look->color) color = glm::max(color, knot.color);
+      dvec3 shown = color;
+      const Material& k = m.look->material;
+      if (scene.shadows) shown = color * std::fmax(1, k.ambient);
+      if (scene.shading)
+        shown = glm::max(shown, color * (k.ambient + k.diffuse * light)) + k.specular * light;
+      if (scene.blend == BlendMode::mix) shown *= m.look->weight;
+      for (int c = 0; c < 3; ++c) radiance_ = std::fmax(radiance_, shown[c]);
+    }
+    radiance_ = std::fmax(radiance_, 1);
+  }
+
+  /// The picture's ray: origin and direction of length 1, world space.
+  Marched pixel(int column, int row) const {
+    const Camera& camera = scene_.camera;
+    const dvec3 forward = unit(camera.target - camera.eye);
+    dvec3 right = glm::cross(forward, unit(camera.up));
+    if (!(glm::length(right) > 1e-6))  // up along the view
+      right = unit(glm::cross(forward, std::abs(forward.z) < 0.9 ? dvec3(0, 0, 1) : dvec3(0, 1, 0)));
+    right = unit(right);
+    const dvec3 up = glm::cross(right, forward);
+    const double height =
+        camera.orthoHeight ? *camera.orthoHeight : 2 * std::tan(camera.fovY * 3.14159265358979323846 / 360);
+    const dvec3 offset =
+        height / scene_.height *
+        ((column + 0.5 - 0.5 * scene_.width) * right + (0.5 * scene_.height - row - 0.5) * up);
+    const dvec3 origin = camera.orthoHeight ? camera.eye + offset : camera.eye;
+    const dvec3 direction = camera.orthoHeight ? forward : unit(forward + offset);
+    Marched all;
+    if (scene_.blend != BlendMode::composite) return ray(origin, direction, matters_);
+    for (const Matter& matter : matters_) {
+      const Marched alone = ray(origin, direction, {matter});
+      all.rgba = glm::dvec4(dvec3(all.rgba) + dvec3(alone.rgba), 1 - (1 - all.rgba.a) * (1 - alone.rgba.a));
+      all.error += alone.error;
+    }
+    return all;
+  }
+
+ private:
+  using Matters = std::vector<Matter>;
+  dvec3 toVoxel(const dvec3& world) const {
+    return voxelFromWorld_ * (world - dvec3(grid_.worldFromVoxel[3]));
+  }
+
+  /// 0 <= t <= `length` of a ray in voxel space, as far as it is inside the box; false when it is not.
+  bool clip(const dvec3& origin, const dvec3& direction, double length, double* begin, double* end) const {
+    *begin = 0;
+    *end = length;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double a = (-0.5 - origin[axis]) / direction[axis];
+      const double b = (grid_.dims[axis] - 0.5 - origin[axis]) / direction[axis];
+      if (direction[axis] == 0) {
+        if (origin[axis] < -0.5 || origin[axis] > grid_.dims[axis] - 0.5) return false;
+        continue;
+      }
+      *begin = std::fmax(*begin, std::fmin(a, b));
+      *end = std::fmin(*end, std::fmax(a, b));
+    }
+    return *begin < *end && std::isfinite(*end);
+  }
+
+  struct Classified {
+    double value = 0, extinction = 0;
+    dvec3 color{0};
+  };
+  /// What all channels are at a point; the extinction that counts, and each channel's share of the radiance.
+  struct Mixture {
+    std::vector<Classified> parts;
+    std::vector<double> share;
+    double extinction = 0;
+  };
+  Mixture mixtureAt(const dvec3& p, const Matters& matters, Decisions* decisions) const {
+    Mixture mixture;
+    mixture.share.assign(matters.size(), 0);
+    std::size_t largest = 0;
+    double sum = 0;
+    for (const Matter& m : matters) {
+      Classified c;
+      c.value = m.at(p);
+      decisions->note(std::isfinite(c.value));
+      if (std::isfinite(c.value)) {
+        const double position = m.position(c.value);
+        decisions->note(std::uint64_t((position > 0) + (position >= 1)));
+        c.extinction = m.look->density * Matter::curve(m.look->opacity, position, decisions,
+                                                       [](const OpacityKnot& k) { return k.value; });
+        c.color =
+            Matter::curve(m.look->color, position, decisions, [](const ColorKnot& k) { return k.color; });
+      }
+      sum += c.extinction;
+      mixture.parts.push_back(c);
+      if (c.extinction > mixture.parts[largest].extinction) largest = mixture.parts.size() - 1;
+    }
+    if (matters.empty()) return mixture;
+    const bool one = scene_.blend == BlendMode::max, several = scene_.blend == BlendMode::mix;
+    mixture.extinction = one || several ? mixture.parts[largest].extinction : sum;
+    if (one || several) decisions->note(largest);
+    if (!(mixture.extinction > 0)) return mixture;
+    for (std::size_t n = 0; n < matters.size(); ++n) {
+      if (one && n != largest) continue;
+      mixture.share[n] =
+          mixture.parts[n].extinction / mixture.extinction * (several ? matters[n].look->weight : 1);
+    }
+    return mixture;
+  }
+
+  /// Of a ray in voxel space.
+  double transmittance(const dvec3& p, const dvec3& direction, double length, const Matters& matters,
+                       double* error) const {
+    double begin, end;
+    if (!clip(p, direction, length, &begin, &end)) return 1;
+    const auto sampleAt = [&](double t) {
+      Decisions decisions;
+      const double extinction = mixtureAt(p + t * direction, matters, &decisions).extinction;
+      return PointSample{extinction, dvec3(0), decisions.hash()};
+    };
+    const auto decisionsAt = [&](double t) { return sampleAt(t).decisions; };
+    SteppedMarch march(sampleAt, decisionsAt,
+                       {stepsFor((end - begin) * direction, 12), 1e-7, density_, 1, kMostShadowSamples});
+    march.march(begin, end);
+    *error = std::fmax(*error, march.error());
+    return march.result().transmittance;
+  }
+
+  struct Arriving {
+    dvec3 direction, intensity;  // towards the light
+    double visible = 1;
+  };
+  std::vector<Arriving> lightsAt(const dvec3& p, const dvec3& eye, const Matters& matters, bool look,
+                                 double* error) const {
+    std::vector<Arriving> arriving;
+    const dvec3 world(grid_.worldFromVoxel * glm::dvec4(p, 1));
+    for (const Light& light : lights_) {
+      Arriving a{unit(-light.vector), light.intensity * light.color};
+      double distance = kInfinity;
+      if (light.type != LightType::directional) {
+        const dvec3 way = (light.type == LightType::point ? light.vector : eye) - world;
+        distance = glm::length(way);
+        a.direction = unit(way);
+      }
+      if (scene_.shadows && look && distance > 0 && a.intensity != dvec3(0))
+        a.visible = transmittance(p, voxelFromWorld_ * a.direction, distance, matters, error);
+      arriving.push_back(a);
+    }
+    return arriving;
+  }
+
+  dvec3 shown(const Matter& m, const Classified& c, const dvec3& p, const dvec3& viewer,
+              const std::vector<Arriving>& lights, Decisions* decisions) const {
+    const Material& k = m.look->material;
+    dvec3 all(0), seen(0), a(1);
+    for (const Arriving& l : lights) {
+      all += l.intensity;
+      seen += l.visible * l.intensity;
+    }
+    if (scene_.shadows)
+      for (int i = 0; i < 3; ++i)
+        if (all[i] > 0) a[i] = k.ambient + (1 - k.ambient) * seen[i] / all[i];
+    if (!scene_.shading) return c.color * a;
+    const dvec3 gradient = glm::transpose(voxelFromWorld_) * m.gradient(p);
+    const double steepness = glm::length(gradient) * smallest_;
+    decisions->note(steepness > 0);
+    if (!(steepness > 0)) return c.color * a;
+    const double g = std::fmin(1, steepness / std::abs(m.look->rangeHi - m.look->rangeLo));
+    const double s = 1 - (1 - g) * (1 - g);
+    decisions->note(g < 1);
+    dvec3 n = unit(gradient);
+    decisions->note(dot(n, viewer) < 0);
+    if (dot(n, viewer) < 0) n = -n;
+    dvec3 diffuse(0), specular(0);
+    for (const Arriving& l : lights) {
+      const double nl = dot(n, l.direction), nh = dot(n, unit(l.direction + viewer));
+      decisions->note(nl > 0);
+      decisions->note(nh > 0);
+      diffuse += l.visible * l.intensity * std::fmax(nl, 0);
+      specular += l.visible * l.intensity * std::pow(std::fmax(nh, 0), k.shininess);
+    }
+    return c.color * ((1 - s) * a + s * (k.ambient + k.diffuse * diffuse)) + s * k.specular * specular;
+  }
+
+  int stepsFor(const dvec3& wayInVoxels, int perVoxel) const {
+    const double voxels = std::abs(wayInVoxels.x) + std::abs(wayInVoxels.y) + std::abs(wayInVoxels.z);
+    return 8 + int(std::ceil(perVoxel * voxels));
+  }
+
+  Marched ray(const dvec3& eye, const dvec3& direction, const Matters& matters) const {
+    const dvec3 origin = toVoxel(eye), way = voxelFromWorld_ * direction;
+    const bool lit = scene_.shading || scene_.shadows;
+    double begin, end, shadowError = 0;
+    if (!clip(origin, way, kInfinity, &begin, &end)) return {};
+    const auto sample = [&](double t, bool look) {
+      Decisions decisions;
+      const dvec3 p = origin + t * way;
+      const Mixture mixture = mixtureAt(p, matters, &decisions);
+      PointSample result{mixture.extinction, dvec3(0), 0};
+      if (mixture.extinction > 0) {
+        std::vector<Arriving> lights;
+        if (lit) lights = lightsAt(p, eye, matters, look, &shadowError);
+        for (std::size_t n = 0; n < matters.size(); ++n)
+          if (mixture.share[n] > 0)
+            result.radiance += mixture.share[n] *
+                               (lit ? shown(matters[n], mixture.parts[n], p, -direction, lights, &decisions)
+                                    : mixture.parts[n].color);
+      }
+      result.decisions = decisions.hash();
+      return result;
+    };
+    const auto sampleAt = [&](double t) { return sample(t, true); };
+    const auto decisionsAt = [&](double t) { return sample(t, false).decisions; };
+    const int perVoxel = scene_.shadows ? 16 : lit ? 64 : 300;
+    const StepRules rules{stepsFor((end - begin) * way, perVoxel), lit ? 1e-6 : 1e-9, density_, radiance_,
+                          scene_.shadows ? kMostLitSamples : kMostSamples};
+    SteppedMarch march(sampleAt, decisionsAt, rules);
+    march.march(begin, end);
+    const Stretch& result = march.result();
+    return {glm::dvec4(result.light, 1 - result.transmittance),
+            (march.error() + double(lights_.size()) * shadowError) * radiance_};
+  }
+
+  static constexpr int kMostShadowSamples = 2000, kMostLitSamples = 2000, kMostSamples = 200000;
+
+  const Scene& scene_;
+  Grid grid_;
+  glm::dmat3 voxelFromWorld_;
+  double smallest_;
+  Matters matters_;
+  std::vector<Light> lights_;
+  double density_ = 0, radiance_ = 0;
+};
+
+}  // namespace
+
+Marched directMarch(const VolumeSource& source, const Scene& scene, int column, int row) {
+  return Marcher(source, scene).pixel(column, row);
+}
+
+}  // namespace scolopax::random_scenes

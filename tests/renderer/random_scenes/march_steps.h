@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// Marching with the midpoint rule in steps that are halved where halving changes the result, or where the
+// samples of a step came about by different decisions (knots, signs, holes), so that jumps are enclosed.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/vec3.hpp>
+
+namespace scolopax::random_scenes {
+
+/// What a point of a ray is, and a hash of all decisions on the way there.
+struct PointSample {
+  double extinction = 0;   ///< per world unit
+  glm::dvec3 radiance{0};  ///< of what is hit there
+  std::uint64_t decisions = 0;
+};
+
+/// A stretch of the ray seen from its beginning.
+struct Stretch {
+  double transmittance = 1;
+  glm::dvec3 light{0};
+};
+
+struct StepRules {
+  int steps;           ///< equal ones to begin with
+  double tolerance;    ///< of what a halving may change, per step
+  double largestRate;  ///< bound of the extinction: a step across a decision may be as thick as `tolerance`
+  double largestRadiance;  ///< relative to which light is told
+  int most;                ///< samples after which no step is halved any more
+};
+
+/// sampleAt(t) gives the PointSample, decisionsAt(t) only its hash.
+template <class SampleAt, class DecisionsAt>
+class SteppedMarch {
+ public:
+  SteppedMarch(const SampleAt& sampleAt, const DecisionsAt& decisionsAt, const StepRules& rules)
+      : sampleAt_(sampleAt), decisionsAt_(decisionsAt), rules_(rules) {}
+
+  void march(double begin, double end) {
+    const double width = (end - begin) / rules_.steps;
+    std::uint64_t before = decisionsAt_(begin);
+    for (int i = 0; i < rules_.steps && all_.transmittance > kOpaque; ++i) {
+      const double a = begin + i * width, b = i + 1 < rules_.steps ? a + width : end;
+      const std::uint64_t after = decisionsAt_(b);
+      step(a, b, before, after, sampleAt_(0.5 * (a + b)), 0);
+      before = after;
+    }
+  }
+  const Stretch& result() const { return all_; }
+  double error() const { return error_ + (all_.transmittance > kOpaque ? 0 : all_.transmittance); }
+
+ private:
+  static constexpr double kOpaque = 1e-9, kThin = 0.1;
+
+  static Stretch slab(const PointSample& sample, double length) {
+    const double alpha = -std::expm1(-sample.extinction * length);
+    return {1 - alpha, alpha * sample.radiance};
+  }
+  static Stretch joined(const Stretch& front, const Stretch& back) {
+    return {front.transmittance * back.transmittance, front.light + front.transmittance * back.light};
+  }
+
+  void step(double a, double b, std::uint64_t before, std::uint64_t after, const PointSample& middle,
+            int depth) {
+    if (!(all_.transmittance > kOpaque)) return;
+    const double half = 0.5 * (b - a), m = 0.5 * (a + b);
+    const PointSample left = sampleAt_(0.5 * (a + m)), right = sampleAt_(0.5 * (m + b));
+    const Stretch fine = joined(slab(left, half), slab(right, half)), coarse = slab(middle, 2 * half);
+    double change = std::abs(fine.transmittance - coarse.transmittance);
+    for (int c = 0; c < 3; ++c)
+      change = std::max(change, std::abs(fine.light[c] - coarse.light[c]) / rules_.largestRadiance);
+    change *= all_.transmittance;
+    const bool alike = before == left.decisions && left.decisions == middle.decisions &&
+                       middle.decisions == right.decisions && right.decisions == after;
+    const double most = alike ? change : all_.transmittance * -std::expm1(-rules_.largestRate * 2 * half);
+    // In a thick step all samples lie deep, and say nothing of what its front shows.
+    const bool thin = std::max({left.extinction, middle.extinction, right.extinction}) * 2 * half <= kThin;
+    const bool enough = change <= rules_.tolerance && most <= rules_.tolerance && thin;
+    samples_ += 2;
+    if (enough || samples_ > rules_.most || depth == kMaxDepth || !(a < m && m < b)) {
+      all_ = joined(all_, fine);
+      error_ += enough ? change : std::max(change, most);
+      return;
+    }
+    step(a, m, before, middle.decisions, left, depth + 1);
+    step(m, b, middle.decisions, after, right, depth + 1);
+  }
+  static constexpr int kMaxDepth = 45;
+
+  const SampleAt& sampleAt_;
+  const DecisionsAt& decisionsAt_;
+  StepRules rules_;
+  Stretch all_;
+  double error_ = 0;
+  int samples_ = 0;
+};
+
+}  // namespace scolopax::random_scenes
