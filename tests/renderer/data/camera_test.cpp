@@ -25,7 +25,8 @@ TEST(Camera, WhoseUpIsTheViewButForRoundingSeesWithoutDistortion) {
   Camera camera{{-6.725710453241779, 15.959062078250131, -31.561726230520883},
                 {-1.164896011352539, 0.18242764472961426, 3.6595970392227173},
                 {-0.14261469013567443, 0.40461336277855164, -0.9032989963564322},
-                60};
+                60,
+                std::nullopt};
   expectOrthonormal(camera);
   const glm::dvec3 view = camera.target - camera.eye;
   for (const double scale : {1.0, -1.0, 1e-3, 3.0, 1e5}) {
