@@ -8,7 +8,6 @@
 
 #include "protocol/problem.h"
 #include "renderer/core/short_text.h"
-#include "renderer/core/thread_priority.h"
 #include "server/api.h"
 
 namespace scolopax::server {
@@ -78,7 +77,6 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
     throw ProtocolError(422, "/stop/seconds",
                         "expected at most " + shortText(limit) + ", found " + shortText(scene->stop.seconds));
   const RenderPlace place(running, context.config.maxRenders);
-  lowerThreadPriority();  // sessions are edited by somebody who looks on
 
   const auto begin = std::chrono::steady_clock::now();
   const auto seconds = [&] {

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/problem.h"
-#include "renderer/core/thread_priority.h"
 #include "server/api.h"
 
 namespace scolopax::server {
@@ -121,7 +120,6 @@ net::Response frame(ApiContext& context, const net::Request& request) {
   const auto memory = MemoryBudget::takeShared(
       context.memory, MemoryUse::encodings,
       encoded ? found->jpeg->size() : (aov ? pixels * sizeof(glm::vec4) : 0) + imageMemory(pixels, format));
-  lowerThreadPriority();  // sessions are edited by somebody who looks on
   if (aov) {
     const AovValues& values = (*found->aovs)[std::size_t(*aov)];
     response.body = imageBytes(format == "exr" ? aovImage(values) : aovPicture(values), glm::vec3(0), format);

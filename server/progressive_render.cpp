@@ -392,11 +392,14 @@ void ProgressiveRender::pictureMade(PassResult&) {
 }
 
 void ProgressiveRender::turn(const RenderRequest& request, const Others& others, PassResult& result) {
-  if (job_) collect(result);
+  const bool collected = job_ != nullptr;
+  if (collected) collect(result);
   if (!request.wanted || job_) return;
   if ((sceneStale(request) && !keepsPass(request)) || lateForEdit(request))
     takeScene(request, others, result);
   if (job_ || !scene_) return;
+  // What was added in the background is shown before the next pass begins.
+  if (collected && !unfinished_ && showDue(request)) return show(request, result);
   if (!finished(request)) addSample(firstOfEdit(request), others.urgent, result);
   if (!job_ && !unfinished_ && showDue(request)) show(request, result);
 }

@@ -8,7 +8,7 @@ namespace scolopax {
 void lowerThreadPriority() {
 #ifdef __linux__
   // Linux counts niceness by thread: 0 is the calling one.
-  setpriority(PRIO_PROCESS, 0, 10);
+  setpriority(PRIO_PROCESS, 0, 4);
 #endif
 }
 

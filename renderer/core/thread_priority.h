@@ -4,8 +4,8 @@
 
 namespace scolopax {
 
-/// The calling thread gets a processor only when no thread of usual priority wants it, or nearly so. Where
-/// the system has no such thing, nothing happens.
+/// The calling thread gets about a third of a processor beside one of usual priority. Where the system has no
+/// such thing, nothing happens.
 void lowerThreadPriority();
 
 }  // namespace scolopax
