@@ -216,24 +216,26 @@ class Checks {
     return std::min({spacing.x, spacing.y, spacing.z});
   }
 
-  /// Pictures at three steps, each a quarter of the one before.
+  /// Pictures at steps that fall.
   struct Levels {
+    std::vector<double> step;
     std::vector<Estimates> at;
-    double finest;
-    /// What is left of an error that falls at least with the step: 1/3 of the last difference; all of it
-    /// here, as errors fall unevenly.
+    /// Twice what is left at the last step of an error that is proportional to it, by the difference that
+    /// says most: errors fall at least so, but unevenly.
     double bias(std::size_t i, int c) const {
-      double most = 0;
+      double slope = 0;
       for (std::size_t k = 1; k < at.size(); ++k)
-        most = std::max(most, std::abs(at[k].mean[i][c] - at[k - 1].mean[i][c]) *
-                                  std::pow(0.25, double(at.size() - 1 - k)));
-      return most;
+        slope = std::max(slope, std::abs(at[k].mean[i][c] - at[k - 1].mean[i][c]) / (step[k - 1] - step[k]));
+      return 2 * slope * step.back();
     }
   };
-  Levels levelsOf(Scene scene, double coarsest, double fetches, int most, std::uint32_t round) const {
+  Levels levelsOf(Scene scene, const std::vector<double>& steps, double fetches, int most,
+                  std::uint32_t round) const {
     Levels levels;
-    for (const double step : {coarsest, coarsest / 4, coarsest / 16}) {
-      scene.step = levels.finest = std::clamp(step, 0.01, 100.0);
+    for (const double step : steps) {
+      scene.step = std::clamp(step, 0.01, 100.0);
+      if (!levels.step.empty() && scene.step == levels.step.back()) break;
+      levels.step.push_back(scene.step);
       levels.at.push_back(estimate(drawn_.volume, scene, effortFor(scene, fetches, most), round));
     }
     return levels;
@@ -241,28 +243,49 @@ class Checks {
 
   void checkQuadrature(Scene scene) {
     valueSamples_ = scene.sampling == Sampling::independent ? 1 : 8;
-    const Levels quick = levelsOf(scene, scene.step, 1e5, isLit(scene) ? 1 << 12 : 512, 2);
-    scene.step = quick.finest;
+    const Levels quick =
+        levelsOf(scene, {scene.step, scene.step / 4, scene.step / 16}, 1e5, isLit(scene) ? 1 << 12 : 512, 2);
+    scene.step = quick.step.back();
     const Estimates& last = quick.at.back();
     const auto allowedQuick = [&](std::size_t i, int c) {
       return kQuickErrors * std::sqrt(last.variance[i][c] / last.count) + quick.bias(i, c) +
              quadratureFloor(scene, quick_, i);
     };
     if (!worstOf(last, quick_, allowedQuick).beyond()) return;
-    const Levels more = levelsOf(scene, scene.step, 2e7, isLit(scene) ? 1 << 17 : 1 << 13, 2000);
-    scene.step = more.finest;
+    const Levels more =
+        levelsOf(scene, {0.16, 0.08, 0.04, 0.02, 0.01}, 2e7, isLit(scene) ? 1 << 17 : 1 << 13, 2000);
+    scene.step = more.step.back();
     const Estimates& found = more.at.back();
+    const std::vector<double> hidden = hiddenFrom(scene.step);
     const Worst worst = worstOf(found, longTruth(), [&](std::size_t i, int c) {
       // The range that was seen: values are the same function of a few numbers, and none of them is rare.
       const double range = found.most[i][c] - found.least[i][c];
-      return longNoise(found, range, i, c) + more.bias(i, c) + quadratureFloor(scene, longTruth(), i);
+      return longNoise(found, range, i, c) + more.bias(i, c) + quadratureFloor(scene, longTruth(), i) +
+             hidden[i] * largest_;
     });
     if (!worst.beyond()) return;
     std::ostringstream text;
-    text << textOf(worst, found) << " at step " << more.finest << "; at 4 and 16 times that "
-         << more.at[1].mean[worst.pixel][worst.component] << ", "
-         << more.at[0].mean[worst.pixel][worst.component];
+    text << textOf(worst, found) << "; at steps";
+    for (std::size_t k = 0; k < more.step.size(); ++k)
+      text << " " << more.step[k] << ": " << more.at[k].mean[worst.pixel][worst.component];
     report(std::string(nameOf(scene.method)), text.str());
+  }
+
+  /// Of every pixel and the picture's mean: opacity of features that lie between two samples, in the corner
+  /// that a field's ray makes at a plane of voxels, and that no step tells as long as all of them are too
+  /// long.
+  std::vector<double> hiddenFrom(double step) const {
+    std::vector<double> hidden;
+    double sum = 0;
+    const int pixels = scene_.width * scene_.height;
+    for (int i = 0; i < pixels && scene_.filter == PixelFilter::point; ++i) {
+      const Marched marched = directMarch(drawn_.source, scene_, i % scene_.width, i / scene_.width);
+      hidden.push_back(-std::expm1(-marched.depthOfRunsBelow(step * smallestSpacing())));
+      sum += hidden.back();
+    }
+    if (hidden.empty()) return std::vector<double>(std::size_t(pixels) + 1, 0.0);
+    hidden.push_back(sum / pixels);
+    return hidden;
   }
 
   /// RMSE of the mean picture over RGB, less what noise explains.
@@ -280,19 +303,25 @@ class Checks {
     return std::sqrt(squares / (3.0 * double(pixels)));
   }
 
-  /// `auto` promises that bias stays below the error asked for.
-  void checkAutomatic(const Scene& scene) {
+  /// `auto` promises that bias stays below the error asked for, as a mean over pictures of some size: it
+  /// looks at 24 pixels across itself.
+  void checkAutomatic(Scene scene) {
+    const int side = scene.shadows ? 8 : 24, longer = std::max(scene.width, scene.height);
+    scene.width = std::max(1, scene.width * side / longer);
+    scene.height = std::max(1, scene.height * side / longer);
+    scene.filter = PixelFilter::point;
     const auto chooser = makeCpuRenderer(drawn_.volume, 1);
     chooser->setScene(scene);
     const Choice choice = chooser->choice();
+    if (!hasStep(choice.method)) return;  // checked as itself
     Scene chosen = scene;
     chosen.method = choice.method;
-    if (!hasStep(choice.method)) return;  // checked as itself
     chosen.step = choice.step;
-    const Estimates quick = estimate(drawn_.volume, chosen, effortFor(chosen, 1e5, 1 << 12), 3);
-    if (errorOf(quick, quick_, true) <= scene.targetError) return;
-    const Estimates more = estimate(drawn_.volume, chosen, effortFor(chosen, 2e7, 1 << 17), 3000);
-    const double error = errorOf(more, longTruth(), false);
+    const Truth truth = referenceOf(*drawn_.volume, scene, 1);
+    const Estimates quick = estimate(drawn_.volume, chosen, effortFor(chosen, 3e5, 1 << 10), 3);
+    if (errorOf(quick, truth, true) <= scene.targetError) return;
+    const Estimates more = estimate(drawn_.volume, chosen, effortFor(chosen, 2e7, 1 << 15), 3000);
+    const double error = errorOf(more, truth, false);
     if (error <= scene.targetError) return;
     std::ostringstream text;
     text << nameOf(choice.method) << " at step " << choice.step << " is off by " << error

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/renderer/random_scenes/direct_march.h"
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -156,6 +157,7 @@ class Marcher {
       const Marched alone = ray(origin, direction, {matter});
       all.rgba = glm::dvec4(dvec3(all.rgba) + dvec3(alone.rgba), 1 - (1 - all.rgba.a) * (1 - alone.rgba.a));
       all.error += alone.error;
+      all.runs.insert(all.runs.end(), alone.runs.begin(), alone.runs.end());
     }
     return all;
   }
@@ -238,9 +240,8 @@ class Marcher {
       return PointSample{extinction, dvec3(0), decisions.hash()};
     };
     const auto decisionsAt = [&](double t) { return sampleAt(t).decisions; };
-    SteppedMarch march(sampleAt, decisionsAt,
-                       {stepsFor((end - begin) * direction, 12), 1e-7, density_, 1, kMostShadowSamples});
-    march.march(begin, end);
+    SteppedMarch march(sampleAt, decisionsAt, {stepOf(direction, 12), 1e-7, density_, 1, kMostShadowSamples});
+    marchCells(p, direction, begin, end, march);
     *error = std::fmax(*error, march.error());
     return march.result().transmittance;
   }
@@ -301,9 +302,21 @@ class Marcher {
     return c.color * ((1 - s) * a + s * (k.ambient + k.diffuse * diffuse)) + s * k.specular * specular;
   }
 
-  int stepsFor(const dvec3& wayInVoxels, int perVoxel) const {
-    const double voxels = std::abs(wayInVoxels.x) + std::abs(wayInVoxels.y) + std::abs(wayInVoxels.z);
-    return 8 + int(std::ceil(perVoxel * voxels));
+  /// World length of a step that takes the n-th part of a voxel.
+  static double stepOf(const dvec3& way, int n) {
+    return 1 / (n * (std::abs(way.x) + std::abs(way.y) + std::abs(way.z)));
+  }
+  /// Marches from plane to plane of voxel centres, where the field has kinks.
+  template <class March>
+  void marchCells(const dvec3& origin, const dvec3& way, double begin, double end, March& march) const {
+    std::vector<double> cuts{begin, end};
+    for (int axis = 0; axis < 3; ++axis)
+      for (int k = 0; k < grid_.dims[axis] && way[axis] != 0; ++k) {
+        const double t = (k - origin[axis]) / way[axis];
+        if (t > begin && t < end) cuts.push_back(t);
+      }
+    std::sort(cuts.begin(), cuts.end());
+    for (std::size_t i = 0; i + 1 < cuts.size(); ++i) march.march(cuts[i], cuts[i + 1]);
   }
 
   Marched ray(const dvec3& eye, const dvec3& direction, const Matters& matters) const {
@@ -331,13 +344,13 @@ class Marcher {
     const auto sampleAt = [&](double t) { return sample(t, true); };
     const auto decisionsAt = [&](double t) { return sample(t, false).decisions; };
     const int perVoxel = scene_.shadows ? 16 : lit ? 64 : 300;
-    const StepRules rules{stepsFor((end - begin) * way, perVoxel), lit ? 1e-6 : 1e-9, density_, radiance_,
+    const StepRules rules{stepOf(way, perVoxel), lit ? 1e-6 : 1e-9, density_, radiance_,
                           scene_.shadows ? kMostLitSamples : kMostSamples};
     SteppedMarch march(sampleAt, decisionsAt, rules);
-    march.march(begin, end);
+    marchCells(origin, way, begin, end, march);
     const Stretch& result = march.result();
     return {glm::dvec4(result.light, 1 - result.transmittance),
-            (march.error() + double(lights_.size()) * shadowError) * radiance_};
+            (march.error() + double(lights_.size()) * shadowError) * radiance_, march.runs()};
   }
 
   static constexpr int kMostShadowSamples = 2000, kMostLitSamples = 2000, kMostSamples = 200000;
@@ -352,6 +365,18 @@ class Marcher {
 };
 
 }  // namespace
+
+double Marched::depthOfRunsBelow(double step) const {
+  double depth = 0;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (runs[i].length >= 2 * step) continue;
+    double rate = runs[i].largestExtinction;
+    if (i > 0) rate = std::max(rate, runs[i - 1].largestExtinction);
+    if (i + 1 < runs.size()) rate = std::max(rate, runs[i + 1].largestExtinction);
+    depth += rate * runs[i].length;
+  }
+  return depth;
+}
 
 Marched directMarch(const VolumeSource& source, const Scene& scene, int column, int row) {
   return Marcher(source, scene).pixel(column, row);

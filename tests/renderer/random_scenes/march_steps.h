@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <vector>
 
 namespace scolopax::random_scenes {
 
@@ -22,8 +23,14 @@ struct Stretch {
   glm::dvec3 light{0};
 };
 
+/// A part of the ray in which all decisions are the same.
+struct Run {
+  std::uint64_t decisions;
+  double length, largestExtinction;
+};
+
 struct StepRules {
-  int steps;           ///< equal ones to begin with
+  double step;         ///< length of those to begin with, at most
   double tolerance;    ///< of what a halving may change, per step
   double largestRate;  ///< bound of the extinction: a step across a decision may be as thick as `tolerance`
   double largestRadiance;  ///< relative to which light is told
@@ -37,17 +44,21 @@ class SteppedMarch {
   SteppedMarch(const SampleAt& sampleAt, const DecisionsAt& decisionsAt, const StepRules& rules)
       : sampleAt_(sampleAt), decisionsAt_(decisionsAt), rules_(rules) {}
 
+  /// One stretch of the ray after the other; cuts between them lie where the field has a kink.
   void march(double begin, double end) {
-    const double width = (end - begin) / rules_.steps;
+    if (!(begin < end)) return;
+    const int steps = int(std::ceil((end - begin) / rules_.step));
+    const double width = (end - begin) / steps;
     std::uint64_t before = decisionsAt_(begin);
-    for (int i = 0; i < rules_.steps && all_.transmittance > kOpaque; ++i) {
-      const double a = begin + i * width, b = i + 1 < rules_.steps ? a + width : end;
+    for (int i = 0; i < steps && all_.transmittance > kOpaque; ++i) {
+      const double a = begin + i * width, b = i + 1 < steps ? a + width : end;
       const std::uint64_t after = decisionsAt_(b);
       step(a, b, before, after, sampleAt_(0.5 * (a + b)), 0);
       before = after;
     }
   }
   const Stretch& result() const { return all_; }
+  const std::vector<Run>& runs() const { return runs_; }
   double error() const { return error_ + (all_.transmittance > kOpaque ? 0 : all_.transmittance); }
 
  private:
@@ -59,6 +70,13 @@ class SteppedMarch {
   }
   static Stretch joined(const Stretch& front, const Stretch& back) {
     return {front.transmittance * back.transmittance, front.light + front.transmittance * back.light};
+  }
+
+  void extend(const PointSample& sample, double length) {
+    if (runs_.empty() || runs_.back().decisions != sample.decisions)
+      runs_.push_back({sample.decisions, 0, 0});
+    runs_.back().length += length;
+    runs_.back().largestExtinction = std::max(runs_.back().largestExtinction, sample.extinction);
   }
 
   void step(double a, double b, std::uint64_t before, std::uint64_t after, const PointSample& middle,
@@ -80,6 +98,7 @@ class SteppedMarch {
     samples_ += 2;
     if (enough || samples_ > rules_.most || depth == kMaxDepth || !(a < m && m < b)) {
       all_ = joined(all_, fine);
+      extend(middle, 2 * half);
       error_ += enough ? change : std::max(change, most);
       return;
     }
@@ -92,6 +111,7 @@ class SteppedMarch {
   const DecisionsAt& decisionsAt_;
   StepRules rules_;
   Stretch all_;
+  std::vector<Run> runs_;
   double error_ = 0;
   int samples_ = 0;
 };
