@@ -172,14 +172,14 @@ class CpuRenderer final : public Renderer {
     chosen.step = automatic_.step;
     RebuildStats stats = plan_.update(chosen, stop);
     if (!stats.filmReset && scene.targetError == target_) return stats;
-    // Half of the error is left to noise; light, with which this is not tried, may add to the bias.
-    const double margin = scene.shading || scene.shadows ? 1.5 : 1;
-    const auto found = largestStep(plan_, scene.targetError / 2 / margin);
     // Shadow rays are what costs most where there are any.
     const Method quadrature = scene.shadows ? Method::hybrid : Method::raymarch;
+    // Half of the error is left to noise.
+    const auto found = largestStep(plan_, quadrature, scene.targetError / 2, stop);
     automatic_ = found ? Choice{quadrature, found->step} : Choice{Method::superposed, Scene().step};
-    automaticBias_ = found ? found->bias * margin : 0;
-    target_ = scene.targetError;
+    automaticBias_ = found ? found->bias : 0;
+    // Too late to leave all as it was: a choice that has been given up is none, and made again.
+    target_ = stop.stop_requested() ? 0 : scene.targetError;
     if (automatic_.method == chosen.method && automatic_.step == chosen.step) return stats;
     chosen.method = automatic_.method;
     chosen.step = automatic_.step;

@@ -18,101 +18,136 @@ namespace {
 
 constexpr double kSteps[] = {4, 2, 1, 0.5, 0.25, 0.125};
 
-/// Pictures of independent samples at one step.
-using Pictures = std::vector<std::vector<glm::vec4>>;
-/// Lighting has noise, which more samples tell from bias.
-constexpr std::uint32_t kSamples = 2, kLitSamples = 8;
+/// Independent samples at one step. Sample s of every step has the same random numbers, and so nearly the
+/// same noise.
+struct Pictures {
+  double step;  ///< smallest spacings
+  std::vector<std::vector<glm::vec4>> samples;
+};
+/// Where one has noise that another step has not, more samples tell it from bias: up to so many.
+constexpr std::size_t kSamples = 4, kMostSamples = 32;
 
 class Thumbnails {
  public:
-  /// `scene` says what of the plan's scene is looked at: with its light or without.
-  Thumbnails(const RenderPlan& plan, const Scene& scene, int side)
-      : view_(plan.view()), render_(quadratureTileFunction(scene, view_)) {
+  Thumbnails(const RenderPlan& plan, Scene scene) : view_(plan.view()) {
+    scene.shadows = scene.shadows && view_.lightCount > 0;
+    const bool lit = scene.shading || scene.shadows;
     const double longer = std::max(scene.width, scene.height);
-    view_.width = std::max(1, int(std::lround(side * scene.width / longer)));
-    view_.height = std::max(1, int(std::lround(side * scene.height / longer)));
+    const double scale = (lit ? kLitThumbnailSide : kThumbnailSide) / longer;
+    view_.width = std::max(1, int(std::lround(scene.width * scale)));
+    view_.height = std::max(1, int(std::lround(scene.height * scale)));
     view_.rays = makeCameraRays(scene.camera, plan.grid(), view_.width, view_.height);
-    view_.filterBox = false;  // both pictures of a pair through the same points
+    view_.filterBox = false;  // all steps through the same points
     view_.seed = 0;
     view_.sampleBatch = sampleBatchFor(fastestInstructionSet());
-    step_ = view_.step / float(plan.scene().step);
-    stratum_ = view_.stratum;
+    view_.stratum = stratumOf(scene.method);
+    render_ = quadratureTileFunction(scene, view_);
   }
 
-  /// `step` in smallest spacings; strata are `finer` times thinner.
-  Pictures render(double step, float finer, std::uint32_t samples) {
-    Pictures pictures(samples);
-    view_.step = step_ * float(step);
-    view_.stratum = stratum_ / finer;
-    const std::atomic<bool> never = false;
-    const int tilesX = (view_.width + kTile - 1) / kTile, tilesY = (view_.height + kTile - 1) / kTile;
-    for (std::uint32_t sample = 0; sample < samples; ++sample) {
-      pictures[sample].resize(pixels());
-      std::vector<std::uint8_t> done(pixels(), 0);
-      const Pass pass{view_,
-                      sampleNumber(Sampling::independent, sample),
-                      pictures[sample].data(),
-                      nullptr,
-                      nullptr,
-                      done.data(),
-                      &never,
-                      std::chrono::steady_clock::time_point::max()};
-      tbb::parallel_for(0, tilesX * tilesY, [&](int i) { render_(pass, i % tilesX, i / tilesX); });
-    }
+  Pictures render(double step) {
+    Pictures pictures{step, {}};
+    addSamples(pictures, kSamples);
     return pictures;
   }
-  std::size_t pixels() const { return std::size_t(view_.width) * std::size_t(view_.height); }
+  void addSamples(Pictures& pictures, std::size_t count) {
+    view_.step = view_.smallestSpacing * float(pictures.step);
+    const std::size_t pixels = std::size_t(view_.width) * std::size_t(view_.height);
+    const std::atomic<bool> never = false;
+    const int tilesX = (view_.width + kTile - 1) / kTile, tilesY = (view_.height + kTile - 1) / kTile;
+    while (pictures.samples.size() < count) {
+      const auto number = sampleNumber(Sampling::independent, std::uint32_t(pictures.samples.size()));
+      std::vector<glm::vec4>& sample = pictures.samples.emplace_back(pixels);
+      std::vector<std::uint8_t> done(pixels, 0);
+      const Pass pass{view_,   number,      sample.data(), nullptr,
+                      nullptr, done.data(), &never,        std::chrono::steady_clock::time_point::max()};
+      tbb::parallel_for(0, tilesX * tilesY, [&](int i) { render_(pass, i % tilesX, i / tilesX); });
+      rays_ += pixels;
+    }
+  }
+  std::uint64_t rays() const { return rays_; }
 
  private:
   kernel::SceneView view_;
   TileFunction render_;
-  float step_, stratum_;
+  std::uint64_t rays_ = 0;
 };
 
-/// RMSE of the coarse pictures' expected value, from that of an error of order 2 halving the step takes 3/4
-/// away. Noise, of which each sample has its own, counts for nothing; or, `withNoise`, as it is in their
-/// mean.
-double errorOf(const Pictures& coarse, const Pictures& fine, bool withNoise) {
-  const double n = double(coarse.size());
-  double sum = 0;
-  for (std::size_t i = 0; i < coarse[0].size(); ++i) {
+/// An estimate, and the standard deviation that its pixels' spread gives it.
+struct Estimate {
+  double value, deviation;
+  double upper() const { return std::max(0.0, value) + kDeviations * deviation; }
+};
+
+/// Mean squared difference of the expected pictures of two steps: from products of different samples, in
+/// which noise cancels out.
+Estimate squaredDifference(const Pictures& a, const Pictures& b) {
+  const std::size_t count = std::min(a.samples.size(), b.samples.size()), pixels = a.samples[0].size();
+  const double n = double(count);
+  double sum = 0, squares = 0;
+  for (std::size_t i = 0; i < pixels; ++i) {
     glm::dvec4 all(0);
-    double squares = 0;
-    for (std::size_t s = 0; s < coarse.size(); ++s) {
-      const glm::dvec4 difference = glm::dvec4(coarse[s][i]) - glm::dvec4(fine[s][i]);
+    double own = 0;
+    for (std::size_t s = 0; s < count; ++s) {
+      const glm::dvec4 difference = glm::dvec4(a.samples[s][i]) - glm::dvec4(b.samples[s][i]);
       all += difference;
-      squares += glm::dot(difference, difference);
+      own += glm::dot(difference, difference);
     }
-    sum += withNoise ? glm::dot(all, all) / (n * n) : (glm::dot(all, all) - squares) / (n * (n - 1));
+    const double product = (glm::dot(all, all) - own) / (n * (n - 1)) / 4;
+    sum += product;
+    squares += product * product;
   }
-  return 4.0 / 3.0 * std::sqrt(std::max(0.0, sum / (4.0 * double(coarse[0].size()))));
+  const double mean = sum / double(pixels), variance = std::max(0.0, squares / double(pixels) - mean * mean);
+  return {mean, std::sqrt(variance / double(pixels))};
+}
+
+/// RMS difference of the coarse pictures from those of an infinitely fine step: what is seen of it, and what
+/// is left as halving the step goes on to take away the same share.
+double biasOf(const Pictures& coarse, const Pictures& middle, const Pictures& fine) {
+  const Estimate first = squaredDifference(coarse, middle), second = squaredDifference(middle, fine);
+  // 4 where the error is of order 2, as quadrature's is of smooth fields.
+  double ratio = 4;
+  if (second.value > second.deviation)
+    ratio = std::clamp(std::sqrt(std::max(0.0, first.value) / second.value), 1.5, 4.0);
+  return std::sqrt(squaredDifference(coarse, fine).upper()) + std::sqrt(second.upper()) / (ratio - 1);
 }
 
 }  // namespace
 
 double estimateBias(const RenderPlan& plan) {
   const Scene& scene = plan.scene();
-  const bool lit = scene.shading || scene.shadows;
-  Thumbnails thumbnails(plan, scene, lit ? kLitThumbnailSide : kThumbnailSide);
-  const std::uint32_t samples = lit ? kLitSamples : kSamples;
-  return errorOf(thumbnails.render(scene.step, 1, samples), thumbnails.render(scene.step / 2, 2, samples),
-                 false);
+  Thumbnails thumbnails(plan, scene);
+  return biasOf(thumbnails.render(scene.step), thumbnails.render(scene.step / 2),
+                thumbnails.render(scene.step / 4));
 }
 
-std::optional<BiasedStep> largestStep(const RenderPlan& plan, double target) {
-  Scene unlit = plan.scene();
-  unlit.shading = unlit.shadows = false;
-  unlit.method = Method::raymarch;
-  Thumbnails thumbnails(plan, unlit, kThumbnailSide);
-  Pictures coarse = thumbnails.render(kSteps[0], 1, kSamples);
+std::optional<BiasedStep> largestStep(const RenderPlan& plan, Method method, double target,
+                                      const std::stop_token& stop, std::uint64_t* rays) {
+  Scene scene = plan.scene();
+  scene.method = method;
+  Thumbnails thumbnails(plan, scene);
+  std::optional<BiasedStep> found;
+  Pictures coarse = thumbnails.render(kSteps[0]), middle = thumbnails.render(kSteps[0] / 2);
   for (const double step : kSteps) {
-    Pictures fine = thumbnails.render(step / 2, 1, kSamples);
-    // Where bias is far below noise, its estimate may be 0 by chance.
-    const double bias = errorOf(coarse, fine, true);
-    if (bias <= target) return BiasedStep{step, bias};
-    coarse = std::move(fine);
+    if (stop.stop_requested()) break;
+    Pictures fine = thumbnails.render(step / 4);
+    const auto tooLarge = [&] {
+      return std::sqrt(std::max(0.0, squaredDifference(coarse, fine).value)) > target;
+    };
+    double bias = biasOf(coarse, middle, fine);
+    while (bias > target && !tooLarge() && coarse.samples.size() < kMostSamples) {
+      const std::size_t more = 2 * coarse.samples.size();
+      for (Pictures* pictures : {&coarse, &middle, &fine}) thumbnails.addSamples(*pictures, more);
+      bias = biasOf(coarse, middle, fine);
+    }
+    if (bias <= target) {
+      found = BiasedStep{step, bias};
+      break;
+    }
+    coarse = std::move(middle);
+    middle = std::move(fine);
   }
-  return std::nullopt;
+  if (rays) *rays = thumbnails.rays();
+  return found;
 }
 
 }  // namespace scolopax

@@ -2,19 +2,22 @@
 // Small pictures of a plan's scene by quadrature, to learn how far its step is from small enough.
 #pragma once
 #include <optional>
-#include <vector>
+#include <stop_token>
 
 #include "renderer/data/render_plan.h"
 
 namespace scolopax {
 
 /// Side of the pictures, pixels: the longer one.
-inline constexpr int kThumbnailSide = 24, kLitThumbnailSide = 12;
+inline constexpr int kThumbnailSide = 24, kLitThumbnailSide = 16;
+/// What is claimed for a bias is this many standard deviations above what was found: were the pictures' rays
+/// drawn from the scene's at random, and many enough for the law of large numbers, too little would be
+/// claimed for one scene in 44.
+inline constexpr double kDeviations = 2;
 
 /// RMSE, over linear premultiplied RGBA, of the expected picture of the plan's scene by quadrature at its
-/// step: what half the step, and strata half as thick, change of it, as an error of order 2 has it (4/3 of
-/// that). Two pictures of each, with random numbers of their own, tell it from noise. Takes the threads of
-/// the caller's arena.
+/// step, with all its light: what a quarter of the step changes of it, and what still smaller ones would as
+/// the differences from half to a quarter foretell. Takes the threads of the caller's arena.
 double estimateBias(const RenderPlan& plan);
 
 /// A step, and the bias that was found for it.
@@ -23,8 +26,10 @@ struct BiasedStep {
   double bias;
 };
 
-/// The largest of 4, 2, 1, ... 1/8 at which the bias without light is at most `target`; none when it is at
-/// none. The same for the same scene and volume, whatever the picture's size.
-std::optional<BiasedStep> largestStep(const RenderPlan& plan, double target);
+/// The largest of 4, 2, 1, ... 1/8 at which the bias of `method` is at most `target`; none when it is at
+/// none, or `stop` was requested in between. The same for the same scene and volume, whatever the picture's
+/// size. `rays`: how many it took, at most 32 times kThumbnailSide^2 for each of eight steps.
+std::optional<BiasedStep> largestStep(const RenderPlan& plan, Method method, double target,
+                                      const std::stop_token& stop = {}, std::uint64_t* rays = nullptr);
 
 }  // namespace scolopax

@@ -110,6 +110,8 @@ void placeLights(const Scene& scene, const Grid& grid, kernel::SceneView* view) 
 }
 }  // namespace
 
+float stratumOf(Method method) { return method == Method::hybrid ? 1.0f / 8.0f : 1.0f / 64.0f; }
+
 void checkImageSize(const Scene& scene) {
   if (scene.width < 1 || scene.height < 1 || scene.width > kMaxImageSide || scene.height > kMaxImageSide)
     throw Error(ErrorCode::badInput, "image: width and height must be from 1 to " +
@@ -181,7 +183,7 @@ RebuildStats RenderPlan::update(const Scene& scene, const std::stop_token& stop)
   view_.channelCount = int(channelViews_.size());
   view_.channels = channelViews_.data();
   view_.step = view_.smallestSpacing * float(scene.step);
-  view_.stratum = scene.method == Method::hybrid ? 1.0f / 8.0f : 1.0f / 64.0f;
+  view_.stratum = stratumOf(scene.method);
   view_.majorants = majorants_.view();
   stats.rebuildMs =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();

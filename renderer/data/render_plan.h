@@ -13,6 +13,8 @@
 
 namespace scolopax {
 
+/// Share of a ray's light for which a method that has a step works out lighting once.
+float stratumOf(Method method);
 /// Throws Error(badInput) when a side is not in 1..kMaxImageSide.
 void checkImageSize(const Scene& scene);
 /// Throws Error(badInput) for a light whose numbers cannot be worked with.

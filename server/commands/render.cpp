@@ -127,11 +127,13 @@ void render(const Options& options) {
   // A rule on the command line replaces the scene's: what is asked for last is what is meant.
   if (options.samples || options.seconds || options.error)
     stop = {options.samples.value_or(0), options.seconds.value_or(0), options.error.value_or(0)};
+  Scene scene = resolved->render;
+  if (scene.method == Method::automatic && options.error) scene.targetError = *options.error;
 
   const auto renderer = makeCpuRenderer(resolved->dataset->volume, options.threads);
   if (!options.stats.empty()) renderer->countCosts();
   if (!aovs.empty()) renderer->recordAovs();
-  const RebuildStats rebuild = renderer->setScene(resolved->render);
+  const RebuildStats rebuild = renderer->setScene(scene);
   const std::atomic<bool>& cancel = catchInterrupts();
   ProgressBar bar(stop);
   const auto start = Clock::now();
