@@ -63,7 +63,8 @@ TEST(Blend, OfTwoNoisyPicturesIsBetterThanBothByTheLawOfIndependentErrors) {
       std::normal_distribution<float> noiseBefore(0, float(errorBefore)), noise(0, float(error));
       Image before{200, 200, {}}, image{200, 200, {}};  // the truth is 0
       for (int i = 0; i < 200 * 200; ++i) {
-        before.pixels.emplace_back(noiseBefore(random), noiseBefore(random), noiseBefore(random), noiseBefore(random));
+        before.pixels.emplace_back(noiseBefore(random), noiseBefore(random), noiseBefore(random),
+                                   noiseBefore(random));
         image.pixels.emplace_back(noise(random), noise(random), noise(random), noise(random));
       }
       mixIn(before, error, &image);
