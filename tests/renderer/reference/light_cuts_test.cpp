@@ -93,6 +93,7 @@ struct Lines {
               EXPECT_LT(cuts[k], cuts[k + 1]);
               if (cuts[k + 1] - cuts[k] < 1e-5 * (end - begin)) continue;
               std::vector<Place> places;
+              places.reserve(20);
               for (int i = 0; i < 20; ++i)
                 places.push_back(at(channel.field,
                                     stretch.point(std::lerp(cuts[k], cuts[k + 1], (i + 0.5) / 20)),
