@@ -381,8 +381,8 @@ TEST(RenderLoop, MixesTheSmallPictureIntoTheNoisyWholeOneInTheProportionOfLeastE
   workshop.step();
   session->patch(seedPatch(1), {});
   workshop.steps(8);
-  // Green is the number of samples: the difference between two pictures, a third of it in the mean of r, g
-  // and b.
+  // Green is the number of samples: the difference between two pictures, a quarter of it in the mean of r, g,
+  // b and alpha.
   const auto green = [&] { return double(session->latestFrame()->image->pixels[0].g); };
   ASSERT_EQ(viewer->frames.back().info.samples, 8u);
   ASSERT_TRUE(viewer->frames.back().info.interactive);
@@ -391,7 +391,7 @@ TEST(RenderLoop, MixesTheSmallPictureIntoTheNoisyWholeOneInTheProportionOfLeastE
   EXPECT_EQ(viewer->frames.back().width, 400);
   EXPECT_DOUBLE_EQ(green(), 8);  // one sample has an error of 1.5 sqrt(8), more than it differs
   workshop.step();
-  const double share = 1 - 1.5 * 1.5 / (6 * 6 / 3.0);
+  const double share = 1 - 1.5 * 1.5 / (6 * 6 / 4.0);
   EXPECT_NEAR(green(), 8 * (1 - share) + 2 * share, 1e-5);
   EXPECT_FALSE(viewer->frames.back().info.interactive);
   EXPECT_EQ(session->waitForFrame({}, 0ms), nullptr);  // a script gets samples alone
