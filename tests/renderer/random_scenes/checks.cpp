@@ -320,7 +320,7 @@ class Checks {
   /// `auto` promises that bias stays below the error asked for, as a mean over pictures of some size: it
   /// looks at 24 pixels across itself.
   void checkAutomatic(Scene scene) {
-    const int side = scene.shadows ? 8 : 24, longer = std::max(scene.width, scene.height);
+    const int side = scene.shadows ? 5 : 24, longer = std::max(scene.width, scene.height);
     scene.width = std::max(1, scene.width * side / longer);
     scene.height = std::max(1, scene.height * side / longer);
     scene.filter = PixelFilter::point;
