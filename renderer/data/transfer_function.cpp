@@ -180,19 +180,9 @@ float TransferFunction::majorant(ValueInterval interval) const {
   channel.scale = scale_;
   channel.offset = offset_;
   channel.gamma = gamma_;
-  float a = kernel::curvePosition(channel, interval.lo);
-  float b = kernel::curvePosition(channel, interval.hi);
-  if (a > b) std::swap(a, b);
-  if (gamma_ != 1.0f) {  // the power function is within 2e-6 of monotone
-    a = kernel::clamp(a * (1.0f - 4e-6f), 0.0f, 1.0f);
-    b = kernel::clamp(b * (1.0f + 4e-6f), 0.0f, 1.0f);
-  }
-  const auto curve = opacity_.view();
-  float largest = std::max(kernel::evaluate(curve, a), kernel::evaluate(curve, b));
-  // Knots inside, and both sides of a jump at either end.
-  for (int i = kernel::knotBefore(curve, a) + 1; i < curve.count && curve.positions[i] <= b; ++i)
-    largest = std::max(largest, curve.values[i]);
-  return largest * density_;
+  channel.density = density_;
+  channel.opacity = opacity_.view();
+  return kernel::largestExtinction(channel, interval.lo, interval.hi);
 }
 
 bool TransferFunction::invisible() const {

@@ -43,4 +43,24 @@ SCOLOPAX_HD inline float extinctionAt(const ChannelView& channel, float position
   return evaluate(channel.opacity, position) * channel.density;
 }
 
+/// Largest extinction over an interval of stored values, lo <= hi.
+SCOLOPAX_HD inline float largestExtinction(const ChannelView& channel, float lo, float hi) {
+  float a = curvePosition(channel, lo), b = curvePosition(channel, hi);
+  if (a > b) {
+    const float other = a;
+    a = b;
+    b = other;
+  }
+  if (channel.gamma != 1.0f) {  // the power function is within 2e-6 of monotone
+    a = clamp(a * (1.0f - 4e-6f), 0.0f, 1.0f);
+    b = clamp(b * (1.0f + 4e-6f), 0.0f, 1.0f);
+  }
+  const CurveView<float>& curve = channel.opacity;
+  float largest = maximum(evaluate(curve, a), evaluate(curve, b));
+  // Knots inside, and both sides of a jump at either end.
+  for (int i = knotBefore(curve, a) + 1; i < curve.count && curve.positions[i] <= b; ++i)
+    largest = maximum(largest, curve.values[i]);
+  return largest * channel.density;
+}
+
 }  // namespace scolopax::kernel

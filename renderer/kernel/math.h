@@ -17,6 +17,7 @@ inline constexpr float kLeastNormal = 0x1p-126f;
 SCOLOPAX_HD inline float squareRoot(float x) { return __builtin_sqrtf(x); }
 SCOLOPAX_HD inline float minimum(float a, float b) { return a < b ? a : b; }
 SCOLOPAX_HD inline float maximum(float a, float b) { return a > b ? a : b; }
+SCOLOPAX_HD inline float magnitude(float x) { return maximum(x, -x); }
 /// NaN becomes lo.
 SCOLOPAX_HD inline float clamp(float x, float lo, float hi) { return x > lo ? (x < hi ? x : hi) : lo; }
 SCOLOPAX_HD inline int clampInt(int x, int lo, int hi) { return x < lo ? lo : (x > hi ? hi : x); }

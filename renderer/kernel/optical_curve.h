@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Both curves of a channel as one, integrated over a stretch of a ray: between two samples the scalar is
 // taken to be linear, and a piecewise-linear curve of it is integrated exactly (pre-integration: Engel, Kraus
-// and Ertl 2001), so that no feature of a curve is too narrow for a step.
+// and Ertl 2001). What a stretch hides of itself is left out: colours count by their extinction alone.
 #pragma once
 #include "renderer/kernel/math.h"
 #include "renderer/kernel/views.h"

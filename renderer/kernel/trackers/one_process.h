@@ -4,13 +4,28 @@
 #pragma once
 #include <type_traits>
 
-#include "renderer/kernel/collision.h"
+#include "renderer/kernel/trackers/close_look.h"
 
 namespace scolopax::kernel {
 
+/// Bound of all channels together ahead of a point, as boundAhead gives it of one.
+template <bool kSums>
+SCOLOPAX_HD float boundAheadOfAll(const SceneView& scene, std::size_t macrocell, const Ray& ray,
+                                  const VoxelCell& cell, glm::vec3 point, float least, float* way,
+                                  SampleCost* cost) {
+  float all = 0.0f;
+  for (int n = 0; n < scene.channelCount; ++n) {
+    if (!(scene.majorants.bound(macrocell, n) > 0.0f)) continue;
+    const float bound = boundAhead(scene, n, ray, cell, point, least, way, cost);
+    all = kSums ? all + bound : maximum(all, bound);
+  }
+  return all;
+}
+
 /// Independent Poisson processes add up to one: ONE optical depth is drawn per tentative collision and
-/// carried across macrocells, so that a cell costs a multiplication and no logarithm.
-template <class Test>
+/// carried across macrocells, so that a cell costs a multiplication and no logarithm. Where a cell is looked
+/// at closely, TestClosely, which needs no bounds of single channels, takes the place of Test.
+template <class Test, class TestClosely, bool kSums>
 SCOLOPAX_HD std::optional<Collision> trackOneProcess(const SceneView& scene, const Ray& ray, Interval inside,
                                                      Sampler& sampler, SampleCost* cost) {
   RandomBlock random = sampler.next();
@@ -25,6 +40,7 @@ SCOLOPAX_HD std::optional<Collision> trackOneProcess(const SceneView& scene, con
     // t still makes progress.
     const float total = bound * (walk.exit() - walk.enter());
     float passed = 0.0f;
+    int nulls = 0;
     while (depth < total - passed) {
       passed += depth;
       const Place place{walk.enter(), passed / bound};
@@ -37,6 +53,21 @@ SCOLOPAX_HD std::optional<Collision> trackOneProcess(const SceneView& scene, con
       }
       random = sampler.next();
       depth = opticalDepth(uniformOf(random.x));
+      if (++nulls == kPatience && total - passed > kManyCollisions) {
+        std::optional<Collision> hit;
+        const CellOutcome outcome = trackClosely(
+            scene, ray, walk, passed / bound, walk.exit() - walk.enter(), sampler, &random, &depth,
+            &tentative, &hit,
+            [&](const VoxelCell& cell, glm::vec3 point, float least, float* way) {
+              return boundAheadOfAll<kSums>(scene, walk.index(), ray, cell, point, least, way, cost);
+            },
+            [&](float all, Place at, glm::vec3 point, const RandomBlock& numbers) {
+              return TestClosely::test(scene, walk.index(), all, at, point, numbers, cost);
+            });
+        if (outcome == CellOutcome::exhausted) cost->truncated = 1;
+        if (outcome != CellOutcome::nothing) return hit;
+        passed = total;  // what is left of `depth` lies behind the cell
+      }
     }
     depth -= total - passed;
   } while (walk.advance());
@@ -49,7 +80,8 @@ struct Superposed {
   SCOLOPAX_HD static std::optional<Collision> track(const SceneView& scene, const Ray& ray, Interval inside,
                                                     Sampler& sampler, SampleCost* cost) {
     using Test = std::conditional_t<Blend::kSums, PickOneChannel, TestLargest>;
-    return trackOneProcess<Test>(scene, ray, inside, sampler, cost);
+    using TestClosely = std::conditional_t<Blend::kSums, TestAllChannels, TestLargest>;
+    return trackOneProcess<Test, TestClosely, Blend::kSums>(scene, ray, inside, sampler, cost);
   }
 };
 
@@ -59,7 +91,7 @@ struct Cumulative {
   SCOLOPAX_HD static std::optional<Collision> track(const SceneView& scene, const Ray& ray, Interval inside,
                                                     Sampler& sampler, SampleCost* cost) {
     using Test = std::conditional_t<Blend::kSums, TestAllChannels, TestLargest>;
-    return trackOneProcess<Test>(scene, ray, inside, sampler, cost);
+    return trackOneProcess<Test, Test, Blend::kSums>(scene, ray, inside, sampler, cost);
   }
 };
 

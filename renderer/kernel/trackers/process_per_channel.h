@@ -2,23 +2,33 @@
 // Tracking with a Poisson process per channel, the paper's two methods: n-dda walks the macrocells once per
 // channel, sync-dda once for all. The nearest accepted collision wins.
 #pragma once
-#include "renderer/kernel/collision.h"
+#include "renderer/kernel/trackers/close_look.h"
 
 namespace scolopax::kernel {
 
-enum class CellOutcome { nothing, hit, exhausted };
-
 /// Tracks channel n through the walk's current cell, as far as `nearest`, which a hit replaces.
 template <class Blend>
-SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, int n, const CellWalk& walk, Sampler& sampler,
-                                  std::optional<Collision>* nearest, std::uint32_t* tentative,
-                                  SampleCost* cost) {
+SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, int n, const Ray& ray, const CellWalk& walk,
+                                  Sampler& sampler, std::optional<Collision>* nearest,
+                                  std::uint32_t* tentative, SampleCost* cost) {
   const float bound = scene.majorants.bound(walk.index(), n);
   if (!(bound > 0.0f)) return CellOutcome::nothing;
   const float total = bound * (walk.exit() - walk.enter());
   float passed = 0.0f;
-  while (true) {
-    const RandomBlock random = sampler.next();
+  for (int nulls = 0;; ++nulls) {
+    RandomBlock random = sampler.next();
+    if (nulls == kPatience && total - passed > kManyCollisions) {
+      float depth = opticalDepth(uniformOf(random.x)), end = walk.exit() - walk.enter();
+      if (*nearest && (*nearest)->place.enter == walk.enter()) end = minimum(end, (*nearest)->place.past);
+      return trackClosely(
+          scene, ray, walk, passed / bound, end, sampler, &random, &depth, tentative, nearest,
+          [&](const VoxelCell& cell, glm::vec3 point, float least, float* way) {
+            return boundAhead(scene, n, ray, cell, point, least, way, cost);
+          },
+          [&](float own, Place place, glm::vec3 point, const RandomBlock& numbers) {
+            return testChannel<Blend>(scene, n, own, place, point, numbers, cost);
+          });
+    }
     passed += opticalDepth(uniformOf(random.x));
     // The cell's end first: a step that leaves a thin cell says nothing about what lies behind it, also when
     // it overshoots the nearest collision so far. (Listing 3 prints the other order, and loses collisions by
@@ -43,7 +53,7 @@ SCOLOPAX_HD void trackChannel(const SceneView& scene, int n, const Ray& ray, Int
   do {
     if (*nearest && nearer((*nearest)->place, {walk.enter(), 0.0f})) return;
     ++cost->cellSteps;
-    const CellOutcome outcome = trackCell<Blend>(scene, n, walk, sampler, nearest, &tentative, cost);
+    const CellOutcome outcome = trackCell<Blend>(scene, n, ray, walk, sampler, nearest, &tentative, cost);
     if (outcome == CellOutcome::exhausted) cost->truncated = 1;
     if (outcome != CellOutcome::nothing) return;
   } while (walk.advance());
@@ -73,7 +83,8 @@ struct SyncDda {
       if (!(scene.majorants.total(walk.index()) > 0.0f)) continue;
       std::optional<Collision> nearest;
       for (int n = 0; n < scene.channelCount; ++n)
-        if (trackCell<Blend>(scene, n, walk, sampler, &nearest, &tentative, cost) == CellOutcome::exhausted) {
+        if (trackCell<Blend>(scene, n, ray, walk, sampler, &nearest, &tentative, cost) ==
+            CellOutcome::exhausted) {
           cost->truncated = 1;
           return std::nullopt;
         }

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "tests/renderer/hard_cases/hard_scenes.h"
+#include "tests/support/agreement.h"
+#include "tests/support/estimator_scenes.h"
 
 namespace scolopax {
 namespace {
@@ -101,6 +103,31 @@ TEST(Thickness, OfBoxesAndStepsIsTheirWidthAtAnyMacrocellSize) {
       scene.channels[0] = ramp(0, n - 1, 1.5 / width, kRed);
       scene.channels[0].opacity = opacity;
       expectThickness(volume, scene, 1.5, kRed, 100);
+    }
+}
+
+TEST(Thickness, OfCellsThatTrackersLookAtCloselyIsThatOfTheReference) {
+  // Noise between 8-bit voxels, most of it empty: dense matter and nothing in every macrocell.
+  const glm::ivec3 dims(9, 8, 7);
+  std::uint32_t state = 3;
+  const auto noise = [&](int, int, int) { return (state = state * 1664525u + 1013904223u) >> 24; };
+  const auto volume = volumeOf(gridOf(dims, {1, 1.3, 0.8}), channelOf<std::uint8_t>(dims, noise),
+                               channelOf<float>(dims, noise));
+  for (const BlendMode blend : kBlends)
+    for (const double density : {60.0, 2000.0}) {
+      Scene scene = framed(*volume, 8);
+      scene.blend = blend;
+      scene.shadows = density < 100;
+      for (ChannelAppearance& channel : scene.channels) {
+        channel.rangeHi = 255;
+        channel.density = density;
+      }
+      scene.channels[0].opacity = {{0, 0}, {0.7, 0}, {1, 1}};
+      scene.channels[1].opacity = {{0, 0}, {0.8, 0}, {0.8, 1}, {0.82, 1}, {0.82, 0}};
+      const auto expected = reference::renderReference(*volume, scene, 1);
+      for (const Method method : kTrackers)
+        EXPECT_TRUE(haveMean(replicate(volume, scene, method), scene, expected))
+            << nameOf(method) << " " << nameOf(blend) << " " << density;
     }
 }
 

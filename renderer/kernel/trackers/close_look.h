@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// Thick macrocells from near: bounds of the extinction over short stretches of a ray, from the voxels around
+// it. Without them a ray would cross what is empty beside dense matter by one null collision after another.
+#pragma once
+#include "renderer/kernel/collision.h"
+
+namespace scolopax::kernel {
+
+/// A tracker looks closer at the rest of a macrocell after this many null collisions in it, if the bound
+/// promises this many more.
+inline constexpr int kPatience = 8;
+inline constexpr float kManyCollisions = 32.0f;
+/// Tentative collisions per stretch and channel that are few enough for its bound.
+inline constexpr float kFewCollisions = 2.0f;
+
+enum class CellOutcome { nothing, hit, exhausted };
+
+/// The cell between eight voxels that a ray goes on through from a point, and how far, in world units. Outer
+/// cells reach to the faces of the box.
+struct VoxelCell {
+  glm::ivec3 low;
+  float way;
+
+  SCOLOPAX_HD VoxelCell(const Ray& ray, glm::ivec3 dims, glm::vec3 point) : low(0), way(kInfinity) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const int last = dims[axis] > 1 ? dims[axis] - 2 : 0;
+      const float direction = ray.direction[axis];
+      const float inside = clamp(point[axis], 0.0f, float(dims[axis] - 1));
+      int whole = int(inside);
+      if (direction < 0.0f && float(whole) == inside) --whole;
+      low[axis] = clampInt(whole, 0, last);
+      if (direction == 0.0f || low[axis] == (direction > 0.0f ? last : 0)) continue;
+      const int plane = direction > 0.0f ? low[axis] + 1 : low[axis];
+      way = minimum(way, (float(plane) - point[axis]) / direction);
+    }
+  }
+  /// The point, moved into the cell where rounding has put it outside: the cell's bounds hold there.
+  SCOLOPAX_HD glm::vec3 inside(glm::ivec3 dims, glm::vec3 point) const {
+    for (int axis = 0; axis < 3; ++axis)
+      point[axis] = clamp(point[axis], low[axis] == 0 ? -0.5f : float(low[axis]),
+                          low[axis] + 2 >= dims[axis] ? float(dims[axis]) - 0.5f : float(low[axis] + 1));
+    return point;
+  }
+};
+
+/// Stored values of one channel: at a point of a voxel cell, and the least and largest of its corners.
+struct CellValues {
+  float value, lo, hi;
+};
+SCOLOPAX_HD inline CellValues valuesIn(const ChannelView& channel, glm::ivec3 dims, const VoxelCell& cell,
+                                       glm::vec3 point) {
+  const auto axisOf = [&](int axis, std::size_t stride) {
+    const int low = cell.low[axis], high = low + 1 < dims[axis] ? low + 1 : low;
+    return AxisWeight{std::size_t(low) * stride, std::size_t(high) * stride,
+                      clamp(point[axis] - float(low), 0.0f, float(high - low))};
+  };
+  const auto stride = std::size_t(channel.stride);
+  const AxisWeight x = axisOf(0, stride), y = axisOf(1, stride * std::size_t(dims.x)),
+                   z = axisOf(2, stride * std::size_t(dims.x) * std::size_t(dims.y));
+  return visitScalarType(channel.type, [&](auto zero) {
+    const auto* v = static_cast<const decltype(zero)*>(channel.voxels) + channel.lane;
+    CellValues values{trilinear(v, x, y, z), kInfinity, -kInfinity};
+    for (const std::size_t k : {z.low, z.high})
+      for (const std::size_t j : {y.low, y.high})
+        for (const std::size_t i : {x.low, x.high}) {
+          values.lo = minimum(values.lo, float(v[i + j + k]));
+          values.hi = maximum(values.hi, float(v[i + j + k]));
+        }
+    return values;
+  });
+}
+
+/// Bound of channel n's extinction from `point` on, for at most `*way`, which becomes shorter where the bound
+/// would be loose, down to `least`. The scalar's slope along the ray is bounded by the corners' range.
+SCOLOPAX_HD inline float boundAhead(const SceneView& scene, int n, const Ray& ray, const VoxelCell& cell,
+                                    glm::vec3 point, float least, float* way, SampleCost* cost) {
+  const ChannelView& channel = scene.channels[n];
+  ++cost->fetches;
+  const CellValues values = valuesIn(channel, scene.dims, cell, point);
+  if (!isFinite(values.value)) return 0.0f;  // and so is no sample of this cell
+  const float slope = (values.hi - values.lo) *
+                      (magnitude(ray.direction.x) + magnitude(ray.direction.y) + magnitude(ray.direction.z));
+  // As much as rounding may bring a sample beyond the corners; an end at 0 is exact.
+  const float slack =
+      values.lo < values.hi ? maximum(magnitude(values.lo), magnitude(values.hi)) * 0x1p-20f : 0.0f;
+  const float lo = values.lo == 0.0f ? 0.0f : values.lo - slack;
+  const float hi = values.hi == 0.0f ? 0.0f : values.hi + slack;
+  const float here = extinctionAt(channel, curvePosition(channel, values.value));
+  for (;; *way *= 0.5f) {
+    const float reach = slope * *way + slack;
+    const float bound =
+        largestExtinction(channel, maximum(lo, values.value - reach), minimum(hi, values.value + reach));
+    if (bound * *way <= kFewCollisions || bound <= 2.0f * here || !(*way > least)) return bound;
+  }
+}
+
+/// Goes on through the walk's macrocell, from `past` its entry to `end`, in stretches that have bounds of
+/// their own. `random` and `depth` are of the next tentative collision, and stay so. `bound(cell, point,
+/// least, &way)` is that of a stretch, as boundAhead gives it; `test(bound, place, point, random)` tests.
+template <class Bound, class Test>
+SCOLOPAX_HD CellOutcome trackClosely(const SceneView& scene, const Ray& ray, const CellWalk& walk, float past,
+                                     float end, Sampler& sampler, RandomBlock* random, float* depth,
+                                     std::uint32_t* tentative, std::optional<Collision>* hit, Bound&& boundOf,
+                                     Test&& test) {
+  float way = end - past;
+  while (past < end) {
+    const float t = walk.enter() + past;
+    const glm::vec3 point = walk.pointAt(t);
+    const VoxelCell cell(ray, scene.dims, point);
+    // Shorter ones may get nowhere for rounding.
+    const float least = maximum(t * 0x1p-21f, end * 0x1p-20f);
+    way = minimum(maximum(minimum(4.0f * way, cell.way), least), end - past);
+    const float bound = boundOf(cell, cell.inside(scene.dims, point), least, &way);
+    const float total = bound * way;
+    float passed = 0.0f;
+    while (*depth < total - passed) {
+      passed += *depth;
+      const Place place{walk.enter(), past + passed / bound};
+      if (const auto found = test(bound, place, cell.inside(scene.dims, walk.pointAt(place.t())), *random)) {
+        *hit = found;
+        return CellOutcome::hit;
+      }
+      if (++*tentative >= kMaxTentativeCollisions) return CellOutcome::exhausted;
+      *random = sampler.next();
+      *depth = opticalDepth(uniformOf(random->x));
+    }
+    *depth -= total - passed;
+    past += way;
+    if (++*tentative >= kMaxTentativeCollisions) return CellOutcome::exhausted;
+  }
+  return CellOutcome::nothing;
+}
+
+}  // namespace scolopax::kernel

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// The bounds that trackers take from the voxels around a stretch of a ray hold, to the last bit, wherever a
+// tentative collision can be tested.
+#include "renderer/kernel/trackers/close_look.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "renderer/data/render_plan.h"
+#include "tests/support/volumes.h"
+
+namespace scolopax::kernel {
+namespace {
+
+using namespace test;
+
+std::vector<OpacityKnot> randomCurve(std::mt19937& random) {
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const double a = uniform(random) * 0.9, width = std::pow(10, -6 * uniform(random)) * 0.1;
+  switch (random() % 4) {
+    case 0:
+      return {{0, 0}, {1, 1}};
+    case 1:
+      return {{a, 0}, {a, 1}, {a + width, 1}, {a + width, 0}};
+    case 2:
+      return {{a, 0}, {a + width / 2, 1}, {a + width, 0}};
+    default:
+      return {{0, 1}, {a, 1}, {a, 0.1}, {1, 0}};
+  }
+}
+
+template <class T>
+void expectBounds(double largest, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> uniform(0, 1);
+  int short_ = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const glm::ivec3 dims(1 + int(random() % 6), 1 + int(random() % 6), 1 + int(random() % 6));
+    const bool holes = trial % 5 == 0 && !std::is_integral_v<T>;
+    const auto volume = volumeOf(gridOf(dims), channelOf<T>(dims, [&](int, int, int) {
+                                   if (holes && random() % 8 == 0)
+                                     return std::numeric_limits<double>::quiet_NaN();
+                                   return random() % 3 == 0 ? 0.0 : largest * double(uniform(random));
+                                 }));
+    Scene scene = frontScene(*volume, 1, 1);
+    ChannelAppearance& a = scene.channels[0];
+    a.opacity = randomCurve(random);
+    a.density = std::pow(10, 1 + 5 * double(uniform(random)));
+    a.rangeLo = trial % 3 == 0 ? largest : 0;
+    a.rangeHi = trial % 3 == 0 ? 0 : largest;
+    a.gamma = trial % 7 == 0 ? 1.7 : 1;
+    RenderPlan plan(volume);
+    plan.update(scene);
+    if (plan.view().channelCount == 0) continue;
+    for (int i = 0; i < 20; ++i) {
+      Ray ray{glm::vec3(dims) * glm::vec3(uniform(random), uniform(random), uniform(random)) - 0.5f,
+              glm::vec3(uniform(random), uniform(random), uniform(random)) * 2.0f - 1.0f};
+      if (random() % 3 == 0) ray.direction[int(random() % 3)] = 0;
+      if (random() % 3 == 0) ray.origin = glm::vec3(glm::ivec3(ray.origin));  // on faces and edges
+      const VoxelCell cell(ray, dims, ray.origin);
+      ASSERT_GT(cell.way, 0.0f);
+      SampleCost cost;
+      float way = std::min(cell.way, 4.0f);
+      const float before = way;
+      const float bound =
+          boundAhead(plan.view(), 0, ray, cell, cell.inside(dims, ray.origin), 1e-6f, &way, &cost);
+      short_ += way < before;
+      for (int k = 0; k <= 64; ++k) {
+        const float t = way * float(k) / 64.0f;
+        const glm::vec3 point = cell.inside(dims, ray.origin + t * ray.direction);
+        ASSERT_LE(classify(plan.view(), 0, point, &cost).extinction, bound) << trial << " " << i << " " << k;
+      }
+    }
+  }
+  EXPECT_GT(short_, 300);  // stretches that end before the cell does are among them
+}
+
+TEST(CloseLook, BoundsTheExtinctionOfIntegers) {
+  expectBounds<std::uint8_t>(255, 1);
+  expectBounds<std::int16_t>(30000, 2);
+}
+TEST(CloseLook, BoundsTheExtinctionOfFloats) {
+  expectBounds<float>(1, 3);
+  expectBounds<float>(1e-20, 4);
+  expectBounds<float>(1e20, 5);
+}
+
+TEST(CloseLook, NeedsNoShortStretchWhereNothingChanges) {
+  const glm::ivec3 dims(4);
+  const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, [](int x, int, int) { return x < 2; }));
+  Scene scene = frontScene(*volume, 1, 1);
+  scene.channels[0].density = 1e9;
+  RenderPlan plan(volume);
+  plan.update(scene);
+  for (const float x : {0.5f, 2.5f}) {
+    const Ray ray{{x, 1, 1.25f}, {0, 0, 1}};
+    const VoxelCell cell(ray, dims, ray.origin);
+    EXPECT_EQ(cell.way, 0.75f);
+    SampleCost cost;
+    float way = cell.way;
+    EXPECT_EQ(boundAhead(plan.view(), 0, ray, cell, ray.origin, 1e-6f, &way, &cost), x < 1 ? 1e9f : 0.0f);
+    EXPECT_EQ(way, 0.75f);
+  }
+}
+
+}  // namespace
+}  // namespace scolopax::kernel
