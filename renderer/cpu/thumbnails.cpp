@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <map>
 
 #include "renderer/cpu/pass.h"
 #include "renderer/cpu/ray_packets.h"
@@ -26,6 +27,8 @@ struct Pictures {
 };
 /// Where one has noise that another step has not, more samples tell it from bias: up to so many.
 constexpr std::size_t kSamples = 4, kMostSamples = 32;
+/// Of a ray, at a step that others are compared with.
+constexpr double kMostSegments = 1 << 16;
 
 class Thumbnails {
  public:
@@ -100,53 +103,76 @@ Estimate squaredDifference(const Pictures& a, const Pictures& b) {
   return {mean, std::sqrt(variance / double(pixels))};
 }
 
-/// RMS difference of the coarse pictures from those of an infinitely fine step: what is seen of it, and what
-/// is left as halving the step goes on to take away the same share.
-double biasOf(const Pictures& coarse, const Pictures& middle, const Pictures& fine) {
-  const Estimate first = squaredDifference(coarse, middle), second = squaredDifference(middle, fine);
-  // 4 where the error is of order 2, as quadrature's is of smooth fields.
-  double ratio = 4;
-  if (second.value > second.deviation)
-    ratio = std::clamp(std::sqrt(std::max(0.0, first.value) / second.value), 1.5, 4.0);
-  return std::sqrt(squaredDifference(coarse, fine).upper()) + std::sqrt(second.upper()) / (ratio - 1);
-}
+/// Small pictures at all steps that somebody has asked for.
+class Steps {
+ public:
+  Steps(const RenderPlan& plan, const Scene& scene)
+      : thumbnails_(plan, scene),
+        finest_(plan.grid().diagonal() / double(plan.view().smallestSpacing) / kMostSegments) {}
+
+  /// Whether a step that is small enough beside this one is not too small to be marched with.
+  bool canTell(double step) const { return step / 4 >= finest_; }
+
+  /// RMS difference of the expected picture at `step` from that of an infinitely fine one: what a fine step
+  /// changes of it, and what finer ones would as halving the step goes on to take away the same share. Steps
+  /// that all leap over the same voxels look alike: the fine one does not.
+  double bias(double step) {
+    const double finest = fineStep(step);
+    const Pictures& fine = at(finest);
+    const Estimate last = squaredDifference(at(2 * finest), fine);
+    const Estimate before = squaredDifference(at(4 * finest), at(2 * finest));
+    // 4 where the error is of order 2, as quadrature's is of smooth fields.
+    double ratio = 4;
+    if (last.value > last.deviation)
+      ratio = std::clamp(std::sqrt(std::max(0.0, before.value) / last.value), 1.5, 4.0);
+    return std::sqrt(squaredDifference(at(step), fine).upper()) + std::sqrt(last.upper()) / (ratio - 1);
+  }
+  /// The same without what is added for noise.
+  double leastBias(double step) {
+    return std::sqrt(std::max(0.0, squaredDifference(at(step), at(fineStep(step))).value));
+  }
+  /// Doubles the samples of what is known of `step`; false when there are as many as there may be.
+  bool lookAgain(double step) {
+    const std::size_t more = 2 * at(step).samples.size();
+    if (more > kMostSamples) return false;
+    const double finest = fineStep(step);
+    for (const double s : {step, 4 * finest, 2 * finest, finest}) thumbnails_.addSamples(at(s), more);
+    return true;
+  }
+  std::uint64_t rays() const { return thumbnails_.rays(); }
+
+ private:
+  double fineStep(double step) const { return std::min(step / 4, std::max(0.25, finest_)); }
+  Pictures& at(double step) {
+    const auto found = pictures_.find(step);
+    return found != pictures_.end() ? found->second
+                                    : pictures_.emplace(step, thumbnails_.render(step)).first->second;
+  }
+
+  Thumbnails thumbnails_;
+  double finest_;  // smallest spacings
+  std::map<double, Pictures> pictures_;
+};
 
 }  // namespace
 
-double estimateBias(const RenderPlan& plan) {
-  const Scene& scene = plan.scene();
-  Thumbnails thumbnails(plan, scene);
-  return biasOf(thumbnails.render(scene.step), thumbnails.render(scene.step / 2),
-                thumbnails.render(scene.step / 4));
-}
+double estimateBias(const RenderPlan& plan) { return Steps(plan, plan.scene()).bias(plan.scene().step); }
 
 std::optional<BiasedStep> largestStep(const RenderPlan& plan, Method method, double target,
                                       const std::stop_token& stop, std::uint64_t* rays) {
   Scene scene = plan.scene();
   scene.method = method;
-  Thumbnails thumbnails(plan, scene);
+  Steps steps(plan, scene);
   std::optional<BiasedStep> found;
-  Pictures coarse = thumbnails.render(kSteps[0]), middle = thumbnails.render(kSteps[0] / 2);
   for (const double step : kSteps) {
-    if (stop.stop_requested()) break;
-    Pictures fine = thumbnails.render(step / 4);
-    const auto tooLarge = [&] {
-      return std::sqrt(std::max(0.0, squaredDifference(coarse, fine).value)) > target;
-    };
-    double bias = biasOf(coarse, middle, fine);
-    while (bias > target && !tooLarge() && coarse.samples.size() < kMostSamples) {
-      const std::size_t more = 2 * coarse.samples.size();
-      for (Pictures* pictures : {&coarse, &middle, &fine}) thumbnails.addSamples(*pictures, more);
-      bias = biasOf(coarse, middle, fine);
-    }
-    if (bias <= target) {
-      found = BiasedStep{step, bias};
-      break;
-    }
-    coarse = std::move(middle);
-    middle = std::move(fine);
+    if (stop.stop_requested() || !steps.canTell(step)) break;
+    double bias = steps.bias(step);
+    while (bias > target && steps.leastBias(step) <= target && steps.lookAgain(step)) bias = steps.bias(step);
+    if (bias > target) continue;
+    found = BiasedStep{step, bias};
+    break;
   }
-  if (rays) *rays = thumbnails.rays();
+  if (rays) *rays = steps.rays();
   return found;
 }
 

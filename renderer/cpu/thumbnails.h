@@ -16,8 +16,8 @@ inline constexpr int kThumbnailSide = 24, kLitThumbnailSide = 16;
 inline constexpr double kDeviations = 2;
 
 /// RMSE, over linear premultiplied RGBA, of the expected picture of the plan's scene by quadrature at its
-/// step, with all its light: what a quarter of the step changes of it, and what still smaller ones would as
-/// the differences from half to a quarter foretell. Takes the threads of the caller's arena.
+/// step, with all its light: what a quarter of the step, and of a voxel, changes of it, and what still
+/// smaller steps would as the last differences foretell. Takes the threads of the caller's arena.
 double estimateBias(const RenderPlan& plan);
 
 /// A step, and the bias that was found for it.

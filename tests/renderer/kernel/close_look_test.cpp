@@ -66,7 +66,8 @@ void expectBounds(double largest, unsigned seed) {
       const float bound =
           boundAhead(plan.view(), 0, ray, cell, cell.inside(dims, ray.origin), 1e-6f, &way, &cost);
       short_ += way < before;
-      for (int k = 0; k <= 64; ++k) {
+      // Where a voxel is not finite, a face of the cell has the value that the cell beyond it gives it.
+      for (int k = holes ? 1 : 0; k <= (holes ? 63 : 64); ++k) {
         const float t = way * float(k) / 64.0f;
         const glm::vec3 point = cell.inside(dims, ray.origin + t * ray.direction);
         ASSERT_LE(classify(plan.view(), 0, point, &cost).extinction, bound) << trial << " " << i << " " << k;

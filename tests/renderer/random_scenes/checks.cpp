@@ -256,7 +256,7 @@ class Checks {
         levelsOf(scene, {0.16, 0.08, 0.04, 0.02, 0.01}, 2e7, isLit(scene) ? 1 << 17 : 1 << 13, 2000);
     scene.step = more.step.back();
     const Estimates& found = more.at.back();
-    const std::vector<double> hidden = hiddenFrom(scene.step);
+    const std::vector<double> hidden = hiddenFrom(scene);
     const Worst worst = worstOf(found, longTruth(), [&](std::size_t i, int c) {
       // The range that was seen: values are the same function of a few numbers, and none of them is rare.
       const double range = found.most[i][c] - found.least[i][c];
@@ -288,13 +288,13 @@ class Checks {
   /// Of every pixel and the picture's mean: opacity of features that lie between two samples, in the corner
   /// that a field's ray makes at a plane of voxels, and that no step tells as long as all of them are too
   /// long.
-  std::vector<double> hiddenFrom(double step) const {
+  std::vector<double> hiddenFrom(const Scene& scene) const {
     std::vector<double> hidden;
     double sum = 0;
-    const int pixels = scene_.width * scene_.height;
-    for (int i = 0; i < pixels && scene_.filter == PixelFilter::point; ++i) {
-      const Marched marched = directMarch(drawn_.source, scene_, i % scene_.width, i / scene_.width);
-      hidden.push_back(-std::expm1(-marched.depthOfRunsBelow(step * smallestSpacing())));
+    const int pixels = scene.width * scene.height;
+    for (int i = 0; i < pixels && scene.filter == PixelFilter::point; ++i) {
+      const Marched marched = directMarch(drawn_.source, scene, i % scene.width, i / scene.width);
+      hidden.push_back(-std::expm1(-marched.depthOfRunsBelow(scene.step * smallestSpacing())));
       sum += hidden.back();
     }
     if (hidden.empty()) return std::vector<double>(std::size_t(pixels) + 1, 0.0);
@@ -302,19 +302,21 @@ class Checks {
     return hidden;
   }
 
-  /// RMSE of the mean picture over RGB, less what noise explains.
-  double errorOf(const Estimates& found, const Truth& truth, bool quick) const {
+  /// RMSE of the mean picture over RGBA, less what noise and features that no step sees explain.
+  double errorOf(const Estimates& found, const Truth& truth, const std::vector<double>& hidden,
+                 bool quick) const {
     double squares = 0;
     const std::size_t pixels = found.mean.size() - 1;
     for (std::size_t i = 0; i < pixels; ++i)
-      for (int c = 0; c < 3; ++c) {
+      for (int c = 0; c < 4; ++c) {
         const double range = found.most[i][c] - found.least[i][c];
         const double noise = quick ? kQuickErrors * std::sqrt(found.variance[i][c] / found.count)
                                    : longNoise(found, range, i, c);
-        const double off = std::abs(found.mean[i][c] - truth.mean[i][c]) - noise - truth.slack[i][c];
+        const double off = std::abs(found.mean[i][c] - truth.mean[i][c]) - noise - truth.slack[i][c] -
+                           hidden[i] * (c < 3 ? largest_ : 1);
         if (off > 0) squares += off * off;
       }
-    return std::sqrt(squares / (3.0 * double(pixels)));
+    return std::sqrt(squares / (4.0 * double(pixels)));
   }
 
   /// `auto` promises that bias stays below the error asked for, as a mean over pictures of some size: it
@@ -333,9 +335,10 @@ class Checks {
     chosen.step = choice.step;
     const Truth truth = referenceOf(*drawn_.volume, scene, 1);
     const Estimates quick = estimate(drawn_.volume, chosen, effortFor(chosen, 3e5, 1 << 10), 3);
-    if (errorOf(quick, truth, true) <= scene.targetError) return;
+    const std::vector<double> nothing(truth.mean.size(), 0.0);
+    if (errorOf(quick, truth, nothing, true) <= scene.targetError) return;
     const Estimates more = estimate(drawn_.volume, chosen, effortFor(chosen, 2e7, 1 << 15), 3000);
-    const double error = errorOf(more, truth, false);
+    const double error = errorOf(more, truth, hiddenFrom(chosen), false);
     if (error <= scene.targetError) return;
     std::ostringstream text;
     text << nameOf(choice.method) << " at step " << choice.step << " is off by " << error

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`scolopax render`: what its options ask for."""
+import json
+import unittest
+
+from serving import CommandTest
+
+SMALL = ["--set", "image.width=24", "--set", "image.height=20"]
+
+
+class Render(CommandTest):
+    def stats(self, *options):
+        done = self.run_command("render", "--data", *self.data, *SMALL, "-o", self.path("p.exr"), "--stats",
+                                self.path("s.json"), *options)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with open(self.path("s.json"), encoding="utf-8") as file:
+            return json.load(file)
+
+    def test_takes_a_step_that_the_error_asked_for_allows(self):
+        # With a step for another error the estimate, bias and all, would stay above this one for ever.
+        steps = []
+        for error in (2e-2, 1e-4):
+            told = self.stats("--error", str(error), "--seconds", "60")
+            self.assertEqual(told["method"], "raymarch")
+            self.assertLessEqual(told["estimatedError"], error)
+            steps.append(told["step"])
+            # A scene that asks for it gets the same.
+            self.assertEqual(self.stats("--samples", "1", "--set", f"stop.error={error}")["step"], steps[-1])
+        self.assertLess(steps[1], steps[0])
+
+
+if __name__ == "__main__":
+    unittest.main()
