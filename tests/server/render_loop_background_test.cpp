@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the render loop has others do: building scenes, and adding up and encoding large pictures.
+#include "server/render_loop.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/server/fakes.h"
+
+namespace scolopax::server {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+using testing::FakeViewer;
+using testing::seedPatch;
+using testing::Workshop;
+
+TEST(RenderLoop, RefusesAFilmThatTheMemoryForAllSessionsDoesNotHoldUntilItIsAskedForAgain) {
+  Workshop workshop;
+  workshop.control->memory = std::make_shared<MemoryBudget>(4 * 64 * 48 + 10);
+  const json large = {{"image", {{"width", 64}, {"height", 48}}}};
+  std::vector<std::shared_ptr<Session>> sessions;
+  std::vector<std::shared_ptr<FakeViewer>> viewers;
+  for (int i = 0; i < 5; ++i) {
+    sessions.push_back(workshop.store.create(large));
+    viewers.push_back(std::make_shared<FakeViewer>());
+    sessions.back()->addViewer(viewers.back());
+  }
+  workshop.steps(10);
+  int failed = 0;
+  for (const auto& viewer : viewers) failed += !viewer->failures.empty();
+  EXPECT_EQ(failed, 1);
+  ASSERT_FALSE(viewers[4]->failures.empty());
+  EXPECT_TRUE(workshop.store.remove(sessions[0]->id()));
+  EXPECT_EQ(sessions[4]->waitForFrame({}, 0ms), nullptr);
+  workshop.clock.advance(std::chrono::seconds(1));
+  workshop.steps(20);
+  EXPECT_FALSE(viewers[4]->frames.empty());
+}
+
+TEST(RenderLoop, BuildsInTheBackgroundWhileOthersHaveTheirTurns) {
+  Workshop workshop;
+  const auto calm = workshop.store.create(seedPatch(1)), other = workshop.store.create(seedPatch(2));
+  const auto calmViewer = std::make_shared<FakeViewer>(), otherViewer = std::make_shared<FakeViewer>();
+  calm->addViewer(calmViewer);
+  workshop.steps(2);
+  workshop.background.atOnce = false;
+  other->addViewer(otherViewer);
+  workshop.steps(10);
+  EXPECT_EQ(workshop.background.waiting.size(), 1u);
+  EXPECT_EQ(workshop.control->passes, std::vector<std::uint32_t>(11, 1));  // one turn began the build
+  EXPECT_TRUE(otherViewer->frames.empty());
+  const int wakes = workshop.renderWakes;
+  workshop.background.finish();
+  EXPECT_EQ(workshop.renderWakes, wakes + 1);
+  workshop.steps(2);
+  EXPECT_FALSE(otherViewer->frames.empty());
+}
+
+TEST(RenderLoop, SleepsWhileThereIsNothingButABuild) {
+  Workshop workshop;
+  workshop.background.atOnce = false;
+  const auto session = workshop.store.create(json::object());
+  session->addViewer(std::make_shared<FakeViewer>());
+  workshop.step();
+  EXPECT_GE(*workshop.render.step(), workshop.hooks.now() + 300s);
+}
+
+TEST(RenderLoop, GivesUpABuildThatNobodyWaitsForAnyMore) {
+  Workshop workshop;
+  workshop.background.atOnce = false;
+  bool stopped = false;
+  workshop.control->building = [&](const std::stop_token& stop) { stopped = stop.stop_requested(); };
+  const auto session = workshop.store.create(json::object());
+  const auto viewer = std::make_shared<FakeViewer>();
+  const ViewerId id = session->addViewer(viewer);
+  workshop.step();
+  session->removeViewer(id);
+  workshop.step();
+  workshop.background.finish();
+  EXPECT_TRUE(stopped);
+  workshop.step();
+  EXPECT_TRUE(workshop.last.abandoned);
+  EXPECT_TRUE(viewer->failures.empty());
+  // Whoever comes next begins it anew.
+  workshop.background.atOnce = true;
+  session->addViewer(viewer);
+  workshop.steps(2);
+  EXPECT_FALSE(viewer->frames.empty());
+}
+
+TEST(RenderLoop, GivesUpABuildForAnEditThatNeedsAnotherAndGoesOnForOneThatDoesNot) {
+  for (const bool needsAnother : {false, true}) {
+    Workshop workshop;
+    workshop.background.atOnce = false;
+    bool stopped = false;
+    workshop.control->building = [&](const std::stop_token& stop) {
+      stopped = stopped || stop.stop_requested();
+    };
+    const auto session = workshop.store.create(json::object());
+    const auto viewer = std::make_shared<FakeViewer>();
+    session->addViewer(viewer);
+    workshop.step();
+    session->patch(needsAnother ? json{{"integrator", {{"macrocell", 2}}}} : seedPatch(5), {});
+    workshop.step();
+    workshop.background.finish();
+    EXPECT_EQ(stopped, needsAnother);
+    workshop.background.atOnce = true;
+    workshop.steps(2);
+    ASSERT_FALSE(viewer->frames.empty());
+    EXPECT_EQ(viewer->frames.front().info.revision, 2u);
+    EXPECT_EQ(workshop.control->renderersMade, needsAnother ? 2 : 1);
+  }
+}
+
+TEST(RenderLoop, LetsGoOfADeletedSessionWhoseSceneIsBeingBuilt) {
+  Workshop workshop;
+  workshop.background.atOnce = false;
+  std::weak_ptr<Session> session = workshop.store.create(json::object());
+  session.lock()->addViewer(std::make_shared<FakeViewer>());
+  workshop.step();
+  EXPECT_TRUE(workshop.store.remove(session.lock()->id()));
+  workshop.step();
+  EXPECT_TRUE(session.expired());
+  workshop.background.finish();
+}
+
+TEST(RenderLoop, AddsUpAndMakesLargePicturesInTheBackground) {
+  Workshop workshop;
+  const auto large = workshop.store.create({{"image", {{"width", 1024}, {"height", 1024}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  large->addViewer(viewer);
+  workshop.steps(2);
+  const auto small = workshop.store.create(seedPatch(7));
+  const auto smallViewer = std::make_shared<FakeViewer>();
+  small->addViewer(smallViewer);
+  workshop.steps(4);
+  workshop.background.atOnce = false;
+  const auto before = viewer->frames.size(), smallBefore = smallViewer->frames.size();
+  workshop.steps(8);
+  EXPECT_EQ(workshop.background.waiting.size(), 1u);
+  EXPECT_EQ(viewer->frames.size(), before);
+  EXPECT_GT(smallViewer->frames.size(), smallBefore);
+  // A sample is added, its picture made and encoded, before the next pass, which takes long, is at its end.
+  workshop.clock.advance(600ms);
+  small->close("");
+  workshop.control->incompletePasses = 1000;
+  for (int i = 0; i < 3; ++i) {
+    workshop.background.finish();
+    workshop.step();
+  }
+  EXPECT_EQ(viewer->frames.size(), before + 1);
+}
+
+TEST(EncodeLoop, EncodesALargePictureInTheBackgroundAndTheSmallOneAfterAnEditAtOnce) {
+  Workshop workshop;
+  const auto session = workshop.store.create({{"image", {{"width", 1024}, {"height", 1024}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.control->secondsPerPixel = 1e-6;
+  workshop.render.step();
+  workshop.background.atOnce = false;
+  workshop.encode.step();
+  EXPECT_EQ(workshop.background.waiting.size(), 1u);
+  EXPECT_TRUE(viewer->frames.empty());
+  session->patch(seedPatch(1), {});
+  for (int i = 0; i < 4; ++i) {
+    workshop.render.step();
+    workshop.encode.step();
+  }
+  ASSERT_FALSE(viewer->frames.empty());
+  EXPECT_EQ(viewer->frames.front().info.revision, 2u);
+  // The one before comes too late.
+  const auto count = viewer->frames.size();
+  workshop.background.finish();
+  workshop.encode.step();
+  for (const auto& frame : viewer->frames) EXPECT_EQ(frame.info.revision, 2u);
+  EXPECT_GE(viewer->frames.size(), count);
+}
+
+}  // namespace
+}  // namespace scolopax::server
