@@ -11,9 +11,7 @@ template <class Tracker, class Blend>
 SCOLOPAX_HD bool isBlocked(const SceneView& scene, const Ray& ray, Interval inside, int channel,
                            Sampler& sampler, SampleCost* cost) {
   if constexpr (Blend::kSeparate) {
-    std::optional<Collision> hit;
-    trackChannel<Blend>(scene, channel, ray, inside, sampler, &hit, cost);
-    return hit.has_value();
+    return trackChannel<Blend>(scene, channel, {}, ray, inside, sampler, cost).has_value();
   } else {
     return Tracker::template track<Blend>(scene, ray, inside, sampler, cost).has_value();
   }
@@ -61,8 +59,8 @@ struct Analog {
       // alpha_n).
       glm::vec4 sum(0.0f);
       for (int n = 0; n < scene.channelCount; ++n) {
-        std::optional<Collision> hit;
-        trackChannel<Blend>(scene, n, ray, inside, sampler, &hit, cost);
+        const auto hit = trackChannel<Blend>(scene, n, {}, ray, inside, sampler, cost);
+
         if (!hit) continue;
         if (first) keepNearer(first, {hit->place.t(), n});
         sum = glm::vec4(glm::vec3(sum) + radiance<Tracker, Blend, Features>(scene, ray, *hit, sampler, cost),

@@ -8,3 +8,13 @@
 #else
 #define SCOLOPAX_HD
 #endif
+
+// What most of the time is spent in, with all that it calls; and what is seldom called, out of its way. On a
+// device everything is inlined.
+#if defined(__CUDACC__)
+#define SCOLOPAX_HOT SCOLOPAX_HD
+#define SCOLOPAX_APART SCOLOPAX_HD
+#else
+#define SCOLOPAX_HOT __attribute__((flatten))
+#define SCOLOPAX_APART __attribute__((noinline))
+#endif

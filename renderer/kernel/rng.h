@@ -95,7 +95,9 @@ class Sampler {
     return {owenScramble(point[0], scrambling.x), owenScramble(point[1], scrambling.y),
             owenScramble(point[2], scrambling.z), scrambling.w};
   }
+  /// How many next() has given.
   SCOLOPAX_HD std::uint32_t blocks() const { return block_; }
+  SCOLOPAX_HD void skipTo(std::uint32_t block) { block_ = block; }
   /// Numbers apart from these, for a purpose whose need for them must not change what the others are. Pixels
   /// stay below 2^31.
   SCOLOPAX_HD Sampler aside() const { return Sampler(pixel_ | 0x80000000u, number_, seed_); }

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""How much faster or slower one build is than another: paired.py OLD NEW [--scenes a,b] [--lights unlit,both]
+"""How much faster or slower one build is than another: paired.py OLD NEW [--scenes a,b] [--lights emission-absorption,both]
 
 The two programs take turns at `scolopax bench --times-only`. Of every scene, light and method it prints the median of
 the ratios new / old of neighbouring runs, and their smallest and largest. Reads SCOLOPAX_DATA_DIR."""

@@ -8,12 +8,13 @@ namespace scolopax::kernel {
 
 /// A tracker looks closer at the rest of a macrocell after this many null collisions in it, if the bound
 /// promises this many more.
-inline constexpr int kPatience = 8;
-inline constexpr float kManyCollisions = 32.0f;
+inline constexpr std::uint32_t kPatience = 32;
+inline constexpr float kManyCollisions = 128.0f;
 /// Tentative collisions per stretch and channel that are few enough for its bound.
 inline constexpr float kFewCollisions = 2.0f;
 
-enum class CellOutcome { nothing, hit, exhausted };
+/// `stuck`: the cell is to be looked at closely.
+enum class CellOutcome { nothing, hit, exhausted, stuck };
 
 /// The cell between eight voxels that a ray goes on through from a point, and how far, in world units. Outer
 /// cells reach to the faces of the box.
@@ -98,10 +99,10 @@ SCOLOPAX_HD inline float boundAhead(const SceneView& scene, int n, const Ray& ra
 /// their own. `random` and `depth` are of the next tentative collision, and stay so. `bound(cell, point,
 /// least, &way)` is that of a stretch, as boundAhead gives it; `test(bound, place, point, random)` tests.
 template <class Bound, class Test>
-SCOLOPAX_HD CellOutcome trackClosely(const SceneView& scene, const Ray& ray, const CellWalk& walk, float past,
-                                     float end, Sampler& sampler, RandomBlock* random, float* depth,
-                                     std::uint32_t* tentative, std::optional<Collision>* hit, Bound&& boundOf,
-                                     Test&& test) {
+SCOLOPAX_HD CellOutcome trackCellClosely(const SceneView& scene, const Ray& ray, const CellWalk& walk,
+                                         float past, float end, Sampler& sampler, RandomBlock* random,
+                                         float* depth, std::uint32_t* tentative,
+                                         std::optional<Collision>* hit, Bound&& boundOf, Test&& test) {
   float way = end - past;
   while (past < end) {
     const float t = walk.enter() + past;
@@ -129,6 +130,52 @@ SCOLOPAX_HD CellOutcome trackClosely(const SceneView& scene, const Ray& ray, con
     if (++*tentative >= kMaxTentativeCollisions) return CellOutcome::exhausted;
   }
   return CellOutcome::nothing;
+}
+
+/// The number of tentative collisions at which a tracker asks whether to go on through a cell as before.
+SCOLOPAX_HD inline std::uint32_t patienceAfter(std::uint32_t tentative) {
+  return tentative + kPatience < kMaxTentativeCollisions ? tentative + kPatience : kMaxTentativeCollisions;
+}
+
+struct CloselyTracked {
+  std::optional<Collision> hit;
+  std::uint32_t blocks;  ///< random numbers that were drawn before and by it
+  SampleCost cost;
+};
+template <class Track>
+SCOLOPAX_APART CloselyTracked trackClosely(Track track, const SceneView& scene, Ray ray, Interval inside,
+                                           Sampler sampler) {
+  SampleCost cost;
+  bool stuck = false;
+  const auto hit = track.template along<true>(scene, ray, inside, sampler, &cost, &stuck);
+  return {hit, sampler.blocks(), cost};
+}
+
+/// Track::along<kClosely> tracks along a ray. With kClosely false it stops and says that it is stuck where it
+/// ought to look closer. Then the ray is tracked once more: the random numbers are the same, and so is all
+/// that happens on the way to that place. Looking closer is thus apart from the code that most rays run,
+/// which is slower by a fifth when the two share variables.
+template <class Track>
+SCOLOPAX_HOT std::optional<Collision> trackWithPatience(const Track& track, const SceneView& scene,
+                                                        const Ray& ray, Interval inside, Sampler& sampler,
+                                                        SampleCost* cost) {
+  const std::uint32_t begin = sampler.blocks();
+  bool stuck = false;
+  const auto hit = track.template along<false>(scene, ray, inside, sampler, cost, &stuck);
+  if (!stuck) [[likely]]
+    return hit;
+  Sampler rewound = sampler;
+  rewound.skipTo(begin);
+  const CloselyTracked again = trackClosely(track, scene, ray, inside, rewound);
+  sampler.skipTo(again.blocks);
+  cost->fetches += again.cost.fetches;
+  cost->cellSteps += again.cost.cellSteps;
+  cost->truncated |= again.cost.truncated;
+  if (!again.hit) return std::nullopt;
+  // Number by number: a copy of the whole would keep every ray's collision in memory.
+  const Collision& met = *again.hit;
+  return Collision{
+      {met.place.enter, met.place.past}, {met.point.x, met.point.y, met.point.z}, met.channel, met.position};
 }
 
 }  // namespace scolopax::kernel

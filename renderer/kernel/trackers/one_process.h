@@ -26,53 +26,63 @@ SCOLOPAX_HD float boundAheadOfAll(const SceneView& scene, std::size_t macrocell,
 /// carried across macrocells, so that a cell costs a multiplication and no logarithm. Where a cell is looked
 /// at closely, TestClosely, which needs no bounds of single channels, takes the place of Test.
 template <class Test, class TestClosely, bool kSums>
-SCOLOPAX_HD std::optional<Collision> trackOneProcess(const SceneView& scene, const Ray& ray, Interval inside,
-                                                     Sampler& sampler, SampleCost* cost) {
-  RandomBlock random = sampler.next();
-  float depth = opticalDepth(uniformOf(random.x));
-  CellWalk walk(ray, inside, scene.majorants);
-  std::uint32_t tentative = 0;
-  do {
-    ++cost->cellSteps;
-    const float bound = scene.majorants.total(walk.index());
-    if (!(bound > 0.0f)) continue;
-    // Optical depth since the cell's entry: kept instead of t, so that a step shorter than the resolution of
-    // t still makes progress.
-    const float total = bound * (walk.exit() - walk.enter());
-    float passed = 0.0f;
-    int nulls = 0;
-    while (depth < total - passed) {
-      passed += depth;
-      const Place place{walk.enter(), passed / bound};
-      if (const auto hit =
-              Test::test(scene, walk.index(), bound, place, walk.pointAt(place.t()), random, cost))
-        return hit;
-      if (++tentative >= kMaxTentativeCollisions) {
-        cost->truncated = 1;
-        return std::nullopt;
+struct OneProcess {
+  template <bool kClosely>
+  SCOLOPAX_HD std::optional<Collision> along(const SceneView& scene, const Ray& ray, Interval inside,
+                                             Sampler& sampler, SampleCost* cost, bool* stuck) const {
+    RandomBlock random = sampler.next();
+    float depth = opticalDepth(uniformOf(random.x));
+    CellWalk walk(ray, inside, scene.majorants);
+    std::uint32_t tentative = 0;
+    do {
+      ++cost->cellSteps;
+      const float bound = scene.majorants.total(walk.index());
+      if (!(bound > 0.0f)) continue;
+      // Optical depth since the cell's entry: kept instead of t, so that a step shorter than the resolution
+      // of t still makes progress.
+      const float total = bound * (walk.exit() - walk.enter());
+      float passed = 0.0f;
+      std::uint32_t limit = patienceAfter(tentative);
+      while (depth < total - passed) {
+        passed += depth;
+        const Place place{walk.enter(), passed / bound};
+        if (const auto hit =
+                Test::test(scene, walk.index(), bound, place, walk.pointAt(place.t()), random, cost))
+          return hit;
+        random = sampler.next();
+        depth = opticalDepth(uniformOf(random.x));
+        if (++tentative >= limit) {
+          if (tentative >= kMaxTentativeCollisions) {
+            cost->truncated = 1;
+            return std::nullopt;
+          }
+          limit = patienceAfter(tentative);
+          if (!(total - passed > kManyCollisions)) continue;
+          if constexpr (!kClosely) {
+            *stuck = true;
+            return std::nullopt;
+          } else {
+            std::optional<Collision> hit;
+            const CellOutcome outcome = trackCellClosely(
+                scene, ray, walk, passed / bound, walk.exit() - walk.enter(), sampler, &random, &depth,
+                &tentative, &hit,
+                [&](const VoxelCell& cell, glm::vec3 point, float least, float* way) {
+                  return boundAheadOfAll<kSums>(scene, walk.index(), ray, cell, point, least, way, cost);
+                },
+                [&](float all, Place at, glm::vec3 point, const RandomBlock& numbers) {
+                  return TestClosely::test(scene, walk.index(), all, at, point, numbers, cost);
+                });
+            if (outcome == CellOutcome::exhausted) cost->truncated = 1;
+            if (outcome != CellOutcome::nothing) return hit;
+            passed = total;  // what is left of `depth` lies behind the cell
+          }
+        }
       }
-      random = sampler.next();
-      depth = opticalDepth(uniformOf(random.x));
-      if (++nulls == kPatience && total - passed > kManyCollisions) {
-        std::optional<Collision> hit;
-        const CellOutcome outcome = trackClosely(
-            scene, ray, walk, passed / bound, walk.exit() - walk.enter(), sampler, &random, &depth,
-            &tentative, &hit,
-            [&](const VoxelCell& cell, glm::vec3 point, float least, float* way) {
-              return boundAheadOfAll<kSums>(scene, walk.index(), ray, cell, point, least, way, cost);
-            },
-            [&](float all, Place at, glm::vec3 point, const RandomBlock& numbers) {
-              return TestClosely::test(scene, walk.index(), all, at, point, numbers, cost);
-            });
-        if (outcome == CellOutcome::exhausted) cost->truncated = 1;
-        if (outcome != CellOutcome::nothing) return hit;
-        passed = total;  // what is left of `depth` lies behind the cell
-      }
-    }
-    depth -= total - passed;
-  } while (walk.advance());
-  return std::nullopt;
-}
+      depth -= total - passed;
+    } while (walk.advance());
+    return std::nullopt;
+  }
+};
 
 /// A drawn channel is fetched and tested.
 struct Superposed {
@@ -81,7 +91,8 @@ struct Superposed {
                                                     Sampler& sampler, SampleCost* cost) {
     using Test = std::conditional_t<Blend::kSums, PickOneChannel, TestLargest>;
     using TestClosely = std::conditional_t<Blend::kSums, TestAllChannels, TestLargest>;
-    return trackOneProcess<Test, TestClosely, Blend::kSums>(scene, ray, inside, sampler, cost);
+    return trackWithPatience(OneProcess<Test, TestClosely, Blend::kSums>{}, scene, ray, inside, sampler,
+                             cost);
   }
 };
 
@@ -91,7 +102,7 @@ struct Cumulative {
   SCOLOPAX_HD static std::optional<Collision> track(const SceneView& scene, const Ray& ray, Interval inside,
                                                     Sampler& sampler, SampleCost* cost) {
     using Test = std::conditional_t<Blend::kSums, TestAllChannels, TestLargest>;
-    return trackOneProcess<Test, Test, Blend::kSums>(scene, ray, inside, sampler, cost);
+    return trackWithPatience(OneProcess<Test, Test, Blend::kSums>{}, scene, ray, inside, sampler, cost);
   }
 };
 

@@ -7,28 +7,16 @@
 namespace scolopax::kernel {
 
 /// Tracks channel n through the walk's current cell, as far as `nearest`, which a hit replaces.
-template <class Blend>
-SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, int n, const Ray& ray, const CellWalk& walk,
-                                  Sampler& sampler, std::optional<Collision>* nearest,
+template <bool kClosely, class Blend>
+SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, int n, [[maybe_unused]] const Ray& ray,
+                                  const CellWalk& walk, Sampler& sampler, std::optional<Collision>* nearest,
                                   std::uint32_t* tentative, SampleCost* cost) {
   const float bound = scene.majorants.bound(walk.index(), n);
   if (!(bound > 0.0f)) return CellOutcome::nothing;
   const float total = bound * (walk.exit() - walk.enter());
   float passed = 0.0f;
-  for (int nulls = 0;; ++nulls) {
+  for (std::uint32_t limit = patienceAfter(*tentative);;) {
     RandomBlock random = sampler.next();
-    if (nulls == kPatience && total - passed > kManyCollisions) {
-      float depth = opticalDepth(uniformOf(random.x)), end = walk.exit() - walk.enter();
-      if (*nearest && (*nearest)->place.enter == walk.enter()) end = minimum(end, (*nearest)->place.past);
-      return trackClosely(
-          scene, ray, walk, passed / bound, end, sampler, &random, &depth, tentative, nearest,
-          [&](const VoxelCell& cell, glm::vec3 point, float least, float* way) {
-            return boundAhead(scene, n, ray, cell, point, least, way, cost);
-          },
-          [&](float own, Place place, glm::vec3 point, const RandomBlock& numbers) {
-            return testChannel<Blend>(scene, n, own, place, point, numbers, cost);
-          });
-    }
     passed += opticalDepth(uniformOf(random.x));
     // The cell's end first: a step that leaves a thin cell says nothing about what lies behind it, also when
     // it overshoots the nearest collision so far. (Listing 3 prints the other order, and loses collisions by
@@ -40,23 +28,59 @@ SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, int n, const Ray& ray,
       *nearest = hit;
       return CellOutcome::hit;
     }
-    if (++*tentative >= kMaxTentativeCollisions) return CellOutcome::exhausted;
+    if (++*tentative < limit) continue;
+    if (*tentative >= kMaxTentativeCollisions) return CellOutcome::exhausted;
+    limit = patienceAfter(*tentative);
+    if (!(total - passed > kManyCollisions)) continue;
+    if constexpr (!kClosely) {
+      return CellOutcome::stuck;
+    } else {
+      random = sampler.next();
+      float depth = opticalDepth(uniformOf(random.x)), end = walk.exit() - walk.enter();
+      if (*nearest && (*nearest)->place.enter == walk.enter()) end = minimum(end, (*nearest)->place.past);
+      return trackCellClosely(
+          scene, ray, walk, passed / bound, end, sampler, &random, &depth, tentative, nearest,
+          [&](const VoxelCell& cell, glm::vec3 point, float least, float* way) {
+            return boundAhead(scene, n, ray, cell, point, least, way, cost);
+          },
+          [&](float own, Place at, glm::vec3 point, const RandomBlock& numbers) {
+            return testChannel<Blend>(scene, n, own, at, point, numbers, cost);
+          });
+    }
   }
 }
 
-/// One channel along the ray, no further than `nearest`, which a hit replaces.
+/// One channel, no further than `nearest`, which a hit replaces.
 template <class Blend>
-SCOLOPAX_HD void trackChannel(const SceneView& scene, int n, const Ray& ray, Interval inside,
-                              Sampler& sampler, std::optional<Collision>* nearest, SampleCost* cost) {
-  CellWalk walk(ray, inside, scene.majorants);
-  std::uint32_t tentative = 0;
-  do {
-    if (*nearest && nearer((*nearest)->place, {walk.enter(), 0.0f})) return;
-    ++cost->cellSteps;
-    const CellOutcome outcome = trackCell<Blend>(scene, n, ray, walk, sampler, nearest, &tentative, cost);
-    if (outcome == CellOutcome::exhausted) cost->truncated = 1;
-    if (outcome != CellOutcome::nothing) return;
-  } while (walk.advance());
+struct AlongChannel {
+  int n;
+  std::optional<Collision> nearest;
+
+  template <bool kClosely>
+  SCOLOPAX_HD std::optional<Collision> along(const SceneView& scene, const Ray& ray, Interval inside,
+                                             Sampler& sampler, SampleCost* cost, bool* stuck) const {
+    CellWalk walk(ray, inside, scene.majorants);
+    std::optional<Collision> hit = nearest;
+    std::uint32_t tentative = 0;
+    do {
+      if (hit && nearer(hit->place, {walk.enter(), 0.0f})) return hit;
+      ++cost->cellSteps;
+      const CellOutcome outcome =
+          trackCell<kClosely, Blend>(scene, n, ray, walk, sampler, &hit, &tentative, cost);
+      if (outcome == CellOutcome::exhausted) cost->truncated = 1;
+      if (outcome == CellOutcome::stuck) *stuck = true;
+      if (outcome != CellOutcome::nothing) return hit;
+    } while (walk.advance());
+    return hit;
+  }
+};
+
+/// The nearest of `nearest` and what channel n meets along the ray.
+template <class Blend>
+SCOLOPAX_HD std::optional<Collision> trackChannel(const SceneView& scene, int n,
+                                                  const std::optional<Collision>& nearest, const Ray& ray,
+                                                  Interval inside, Sampler& sampler, SampleCost* cost) {
+  return trackWithPatience(AlongChannel<Blend>{n, nearest}, scene, ray, inside, sampler, cost);
 }
 
 /// Listing 3, with the order of its two tests mended.
@@ -66,8 +90,33 @@ struct NDda {
                                                     Sampler& sampler, SampleCost* cost) {
     std::optional<Collision> nearest;
     for (int n = 0; n < scene.channelCount; ++n)
-      trackChannel<Blend>(scene, n, ray, inside, sampler, &nearest, cost);
+      nearest = trackChannel<Blend>(scene, n, nearest, ray, inside, sampler, cost);
     return nearest;
+  }
+};
+
+/// All channels, macrocell by macrocell.
+template <class Blend>
+struct AlongCells {
+  template <bool kClosely>
+  SCOLOPAX_HD std::optional<Collision> along(const SceneView& scene, const Ray& ray, Interval inside,
+                                             Sampler& sampler, SampleCost* cost, bool* stuck) const {
+    CellWalk walk(ray, inside, scene.majorants);
+    std::uint32_t tentative = 0;
+    do {
+      ++cost->cellSteps;
+      if (!(scene.majorants.total(walk.index()) > 0.0f)) continue;
+      std::optional<Collision> nearest;
+      for (int n = 0; n < scene.channelCount; ++n) {
+        const CellOutcome outcome =
+            trackCell<kClosely, Blend>(scene, n, ray, walk, sampler, &nearest, &tentative, cost);
+        if (outcome == CellOutcome::exhausted) cost->truncated = 1;
+        if (outcome == CellOutcome::stuck) *stuck = true;
+        if (outcome == CellOutcome::exhausted || outcome == CellOutcome::stuck) return std::nullopt;
+      }
+      if (nearest) return nearest;
+    } while (walk.advance());
+    return std::nullopt;
   }
 };
 
@@ -76,21 +125,7 @@ struct SyncDda {
   template <class Blend>
   SCOLOPAX_HD static std::optional<Collision> track(const SceneView& scene, const Ray& ray, Interval inside,
                                                     Sampler& sampler, SampleCost* cost) {
-    CellWalk walk(ray, inside, scene.majorants);
-    std::uint32_t tentative = 0;
-    do {
-      ++cost->cellSteps;
-      if (!(scene.majorants.total(walk.index()) > 0.0f)) continue;
-      std::optional<Collision> nearest;
-      for (int n = 0; n < scene.channelCount; ++n)
-        if (trackCell<Blend>(scene, n, ray, walk, sampler, &nearest, &tentative, cost) ==
-            CellOutcome::exhausted) {
-          cost->truncated = 1;
-          return std::nullopt;
-        }
-      if (nearest) return nearest;
-    } while (walk.advance());
-    return std::nullopt;
+    return trackWithPatience(AlongCells<Blend>{}, scene, ray, inside, sampler, cost);
   }
 };
 

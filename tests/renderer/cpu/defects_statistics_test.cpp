@@ -51,7 +51,7 @@ struct ShadowsWithoutTheLastChannel {
     std::optional<kernel::Collision> nearest;
     const int count = scene.channelCount - (isShadowRay(inside) ? 1 : 0);
     for (int n = 0; n < count; ++n)
-      kernel::trackChannel<Blend>(scene, n, ray, inside, sampler, &nearest, cost);
+      nearest = kernel::trackChannel<Blend>(scene, n, nearest, ray, inside, sampler, cost);
     return nearest;
   }
 };
