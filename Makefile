@@ -33,18 +33,18 @@ web: deps
 test: test-deps web
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null
 	cmake --build --preset release -j $(JOBS)
-	$(CTEST) --test-dir build/release -LE hostile --output-on-failure
+	$(CTEST) --test-dir build/release -j $(JOBS) -LE hostile --output-on-failure
 
 check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
 	$(CTEST) --test-dir build/release -L hostile --output-on-failure
-	SCOLOPAX_STATISTICS=4 $(CTEST) --test-dir build/release -L statistics --output-on-failure
-	SCOLOPAX_RANDOM_SCENES=3000 $(CTEST) --test-dir build/release -L random-scenes --output-on-failure
+	SCOLOPAX_STATISTICS=4 $(CTEST) --test-dir build/release -j $(JOBS) -L statistics --output-on-failure
+	SCOLOPAX_RANDOM_SCENES=3000 $(CTEST) --test-dir build/release -j $(JOBS) -L random-scenes --output-on-failure
 
 check-asan-ubsan: test-deps
 	cmake --preset asan-ubsan > /dev/null
 	cmake --build --preset asan-ubsan -j $(JOBS)
 	SCOLOPAX_RANDOM_SCENES=20 $(CTEST) --test-dir build/asan-ubsan -j $(JOBS) -LE 'web|statistics|hostile' --output-on-failure
-	$(CTEST) --test-dir build/asan-ubsan -L hard --output-on-failure
+	$(CTEST) --test-dir build/asan-ubsan -j $(JOBS) -L hard --output-on-failure
 
 # The server's threads, with renderers that tests make up: those of the true ones are TBB's, which is not instrumented.
 check-tsan: test-deps
