@@ -250,7 +250,7 @@ class CpuRenderer final : public Renderer {
 
 std::unique_ptr<Renderer> makeCpuRenderer(std::shared_ptr<const Volume> volume, int threads,
                                           std::shared_ptr<MemoryBudget> memory) {
-  return std::make_unique<CpuRenderer>(std::move(volume), threads, memory);
+  return std::make_unique<CpuRenderer>(std::move(volume), threads, std::move(memory));
 }
 
 }  // namespace scolopax

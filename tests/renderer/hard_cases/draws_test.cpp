@@ -18,6 +18,8 @@ namespace scolopax::kernel {
 struct ScriptedSampler {
   RandomBlock block;
   RandomBlock next() { return block; }
+  static std::uint32_t blocks() { return 0; }
+  static void skipTo(std::uint32_t) {}
 };
 }  // namespace scolopax::kernel
 // The trackers themselves, drawing from the script instead.
