@@ -33,9 +33,9 @@ TileFunction chooseKernel(Scene scene, const kernel::SceneView& view, bool recor
 
 class CpuRenderer final : public Renderer {
  public:
-  CpuRenderer(std::shared_ptr<const Volume> volume, int threads, const std::shared_ptr<MemoryBudget>& memory)
+  CpuRenderer(std::shared_ptr<const Volume> volume, int threads, std::shared_ptr<MemoryBudget> memory)
       : memory_(MemoryBudget::take(memory, MemoryUse::films)),
-        plan_(std::move(volume), memory),
+        plan_(std::move(volume), std::move(memory)),
         arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
 
   std::string_view backendName() const override { return "cpu"; }
