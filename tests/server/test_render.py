@@ -19,7 +19,7 @@ class Render(CommandTest):
     def test_takes_a_step_that_the_error_asked_for_allows(self):
         # With a step for another error the estimate, bias and all, would stay above this one for ever.
         steps = []
-        for error in (2e-2, 1e-4):
+        for error in (2e-2, 5e-4):
             told = self.stats("--error", str(error), "--seconds", "60")
             self.assertEqual(told["method"], "raymarch")
             self.assertLessEqual(told["estimatedError"], error)
