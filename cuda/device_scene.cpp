@@ -38,7 +38,6 @@ DeviceScene::DeviceScene(const kernel::SceneView& host) : view_(host) {
     moveToDevice(&channel.optical.knots, std::size_t(channel.optical.count));
     moveToDevice(&channel.optical.buckets, std::size_t(kernel::kCurveBuckets + 1));
   }
-  view_.sampleBatch = nullptr;
   view_.channels = channels.data();
   moveToDevice(&view_.channels, channels.size());
   kernel::MajorantView& majorants = view_.majorants;

@@ -13,7 +13,6 @@
 #include "renderer/core/error.h"
 #include "renderer/cpu/pass.h"
 #include "renderer/cpu/ray_packets.h"
-#include "renderer/cpu/sample_batch.h"
 #include "renderer/cpu/thumbnails.h"
 #include "renderer/data/film.h"
 #include "renderer/data/instances.h"
@@ -24,9 +23,9 @@
 namespace scolopax {
 namespace {
 
-TileFunction chooseKernel(Scene scene, const kernel::SceneView& view, bool recording) {
+TileFunction chooseKernel(Scene scene, const kernel::SceneView& view) {
   scene.shadows = scene.shadows && view.lightCount > 0;  // without light there is nothing to take away
-  if (hasStep(scene.method) && !recording) return quadratureTileFunction(scene, view);
+  if (hasStep(scene.method)) return quadratureTileFunction(scene, view);
   return visitIntegrator(scene,
                          [&](auto type) { return chooseTileFunction<typename decltype(type)::type>(scene); });
 }
@@ -75,8 +74,7 @@ class CpuRenderer final : public Renderer {
   }
 
   bool renderPixels(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
-    kernel::SceneView scene = plan_.view();
-    scene.sampleBatch = sampleBatchFor(fastestInstructionSet());
+    const kernel::SceneView& scene = plan_.view();
     const Pass pass{scene,
                     sampleNumber(plan_.scene().sampling, film_.samples()),
                     film_.pass(),
@@ -85,7 +83,7 @@ class CpuRenderer final : public Renderer {
                     done_.data(),
                     &cancel,
                     std::chrono::steady_clock::now() + budget};
-    const TileFunction renderTileAt = chooseKernel(plan_.scene(), scene, recording_);
+    const TileFunction renderTileAt = chooseKernel(plan_.scene(), scene);
     const int tilesX = (scene.width + kTile - 1) / kTile, tilesY = (scene.height + kTile - 1) / kTile;
     bool complete = false;
     arena_.execute([&] {

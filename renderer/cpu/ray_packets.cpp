@@ -9,11 +9,8 @@ namespace scolopax {
 
 TileFunction packetTileFunction(const Scene& scene, const kernel::SceneView& view, InstructionSet set) {
   const auto cells = glm::dvec3(view.majorants.cells);
+  // The walk of a packet counts cells in 32 bits.
   if (!hasStep(scene.method) || cells.x * cells.y * cells.z >= 0x1p30) return nullptr;
-  // Without bits of channels, rays take segments for each other, and between voxels that are not finite a
-  // segment may cross values that are nowhere.
-  for (int n = 0; n < view.channelCount; ++n)
-    if (!view.majorants.active && !view.channels[n].finite) return nullptr;
   switch (set) {
     case InstructionSet::avx512:
       return avx512PacketTiles(scene);

@@ -7,11 +7,12 @@
 
 namespace scolopax {
 
-/// The fastest there is for quadrature; packets record no first collisions.
+/// The fastest there is for quadrature.
 TileFunction quadratureTileFunction(const Scene& scene, const kernel::SceneView& view);
 
-/// Packets alone, by a set that the processor has; null where it has none or the scene needs kernels that go
-/// ray by ray.
+/// Packets alone, by a set that the processor has. Null, and left to single rays, are processors with no
+/// other set than the baseline; methods other than quadrature, whose rays diverge; and volumes of 2^30
+/// macrocells or more, which a packet's walk cannot count.
 TileFunction packetTileFunction(const Scene& scene, const kernel::SceneView& view, InstructionSet set);
 
 /// Those of an instruction set, each compiled in a file of its own: of 8 and 16 rays.

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#define SCOLOPAX_SIMD_AVX512
+#if defined(__x86_64__)
+#include "renderer/cpu/lanes_avx512.h"
+// The lane type comes first.
 #include "renderer/cpu/packet_tiles.h"
+#endif
 #include "renderer/cpu/ray_packets.h"
 
 namespace scolopax {

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// kernel::sampleStored at a point in every lane, bit by bit: of one channel by gathering, of neighbouring
-// channels four at once.
+// kernel/sample_volume.h at a point a lane, with the same bits: one channel by gathering, neighbouring
+// channels four at once. After lanes_*.h.
 #pragma once
 #include <cstring>
 
-#include "renderer/cpu/lanes.h"
 #include "renderer/kernel/sample_volume.h"
-#if defined(__x86_64__)
 
 namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
@@ -17,54 +15,55 @@ struct Axis {
   Mask swapped;  ///< at the last voxel, where the neighbour is the one before
 };
 /// The axis has two voxels or more.
-SCOLOPAX_SIMD Axis axisOf(Float x, int size) {
-  const Float inside = clamp(x, floats(0.0f), floats(float(size - 1)));
-  const Int whole = truncated(inside), last = ints(size - 2);
+SCOLOPAX_LANES Axis axisOf(Float x, int size) {
+  const Float inside = clamp(x, 0.0f, float(size - 1));
+  const Int whole = truncated(inside), last = Int(size - 2);
   const Mask swapped = whole > last;
   const Float t = inside - toFloat(whole);
-  return {whole, select(swapped, last, whole + ints(1)), select(swapped, floats(0.0f), t), swapped};
+  return {whole, select(swapped, last, whole + Int(1)), select(swapped, Float(0.0f), t), swapped};
 }
 
 /// Points among voxels.
 struct Points {
   glm::ivec3 dims;
-  Float place[3];
+  Vec place;
   Axis x, y, z;
   std::size_t first;  ///< the slice that gathers' indices, which are of 32 bits, count from: that of lane 0
   float slices;       ///< at most so many are between them
 };
-SCOLOPAX_SIMD Points pointsAt(glm::ivec3 dims, Float x, Float y, Float z) {
+SCOLOPAX_LANES Points pointsAt(glm::ivec3 dims, const Vec& point) {
   Points points;
   points.dims = dims;
-  points.place[0] = x, points.place[1] = y, points.place[2] = z;
-  points.x = axisOf(x, dims.x), points.y = axisOf(y, dims.y), points.z = axisOf(z, dims.z);
+  points.place = point;
+  points.x = axisOf(point[0], dims.x), points.y = axisOf(point[1], dims.y),
+  points.z = axisOf(point[2], dims.z);
   points.first = std::size_t(firstOf(points.z.low));
-  const Int away = points.z.low - ints(int(points.first));
-  points.slices = float(largestOf(maximum(away, ints(0) - away)) + 3);
+  const Int away = points.z.low - Int(int(points.first));
+  points.slices = float(largestOf(maximum(away, Int(0) - away)) + 3);
   return points;
 }
 /// Lanes need a neighbour on every axis.
-SCOLOPAX_SIMD bool isFlat(glm::ivec3 dims) { return dims.x < 2 || dims.y < 2 || dims.z < 2; }
+SCOLOPAX_LANES bool isFlat(glm::ivec3 dims) { return dims.x < 2 || dims.y < 2 || dims.z < 2; }
 
-SCOLOPAX_SIMD Float lerp(Float a, Float b, Float t) { return a + t * (b - a); }
-SCOLOPAX_SIMD __m128 lerp4(__m128 a, __m128 b, float t) {
+SCOLOPAX_LANES Float lerp(Float a, Float b, Float t) { return a + t * (b - a); }
+SCOLOPAX_LANES __m128 lerp4(__m128 a, __m128 b, float t) {
   return _mm_add_ps(a, _mm_mul_ps(_mm_set1_ps(t), _mm_sub_ps(b, a)));
 }
 
 /// Voxels at these indices.
 template <class T>
-SCOLOPAX_SIMD Float voxelsAt(const T* voxels, Int index) {
+SCOLOPAX_LANES Float voxelsAt(const T* voxels, Int index) {
   if constexpr (std::is_same_v<T, float>) return gather(voxels, index);
   const Int word = gatherWords<int(sizeof(T))>(voxels, index);
-  if constexpr (std::is_same_v<T, std::uint8_t>) return toFloat(word & ints(0xff));
-  if constexpr (std::is_same_v<T, std::uint16_t>) return toFloat(word & ints(0xffff));
+  if constexpr (std::is_same_v<T, std::uint8_t>) return toFloat(word & 0xff);
+  if constexpr (std::is_same_v<T, std::uint16_t>) return toFloat(word & 0xffff);
   return toFloat(rightSigned<16>(left<16>(word)));
 }
 
 /// Interpolates along x from the voxels at `index` to the neighbours, `stride` further; of small ones that
 /// are next to each other one read gets both.
 template <class T>
-SCOLOPAX_SIMD Float alongX(const T* voxels, Int index, int stride, const Axis& x) {
+SCOLOPAX_LANES Float alongX(const T* voxels, Int index, int stride, const Axis& x) {
   Float a, b;
   if (sizeof(T) == 4 || stride != 1) {
     a = voxelsAt(voxels, index);
@@ -72,9 +71,9 @@ SCOLOPAX_SIMD Float alongX(const T* voxels, Int index, int stride, const Axis& x
   } else {
     const Int pair = gatherWords<int(sizeof(T))>(voxels, index);
     if constexpr (std::is_same_v<T, std::uint8_t>)
-      a = toFloat(pair & ints(0xff)), b = toFloat(right<8>(pair) & ints(0xff));
+      a = toFloat(pair & 0xff), b = toFloat(right<8>(pair) & 0xff);
     else if constexpr (std::is_same_v<T, std::uint16_t>)
-      a = toFloat(pair & ints(0xffff)), b = toFloat(right<16>(pair));
+      a = toFloat(pair & 0xffff), b = toFloat(right<16>(pair));
     else
       a = toFloat(rightSigned<16>(left<16>(pair))), b = toFloat(rightSigned<16>(pair));
   }
@@ -83,13 +82,13 @@ SCOLOPAX_SIMD Float alongX(const T* voxels, Int index, int stride, const Axis& x
 
 /// One channel.
 template <class T>
-SCOLOPAX_SIMD Float sampleOne(const Points& at, const kernel::ChannelView& channel) {
+SCOLOPAX_LANES Float sampleOne(const Points& at, const kernel::ChannelView& channel) {
   const int stride = channel.stride;
   const T* base = static_cast<const T*>(channel.voxels) + channel.lane +
                   at.first * std::size_t(at.dims.x) * std::size_t(at.dims.y) * std::size_t(stride);
-  const Int row = ints(at.dims.x * stride), slice = ints(at.dims.x * at.dims.y * stride);
-  const Int start = ints(int(at.first));
-  const Int column = minimum(at.x.low, ints(at.dims.x - 2)) * ints(stride);
+  const Int row = Int(at.dims.x * stride), slice = Int(at.dims.x * at.dims.y * stride);
+  const Int start = Int(int(at.first));
+  const Int column = minimum(at.x.low, Int(at.dims.x - 2)) * Int(stride);
   const Int yLow = at.y.low * row + column, yHigh = at.y.high * row + column;
   const Int zLow = (at.z.low - start) * slice, zHigh = (at.z.high - start) * slice;
   const Float c00 = alongX(base, yLow + zLow, stride, at.x);
@@ -99,21 +98,17 @@ SCOLOPAX_SIMD Float sampleOne(const Points& at, const kernel::ChannelView& chann
   return lerp(lerp(c00, c10, at.y.t), lerp(c01, c11, at.y.t), at.z.t);
 }
 
-/// One point after the other.
-inline void sampleByPoint(const kernel::ChannelView& channel, glm::ivec3 dims, const float (*places)[kLanes],
-                          float* values) {
-  for (int i = 0; i < kLanes; ++i)
-    values[i] = kernel::sampleStored(channel, dims, {places[0][i], places[1][i], places[2][i]});
-}
-
 /// One channel, whatever its type.
-SCOLOPAX_SIMD Float sampleChannel(const Points& at, const kernel::ChannelView& channel) {
+SCOLOPAX_LANES Float sampleChannel(const Points& at, const kernel::ChannelView& channel) {
   if (isFlat(at.dims) ||
       !(at.slices * float(at.dims.x) * float(at.dims.y) * float(channel.stride) < 0x1p29f)) {
-    float places[3][kLanes], values[kLanes];
-    for (int axis = 0; axis < 3; ++axis) store(at.place[axis], places[axis]);
-    sampleByPoint(channel, at.dims, places, values);
-    return load(values);
+    Float values;
+    const float* place[] = {reinterpret_cast<const float*>(&at.place[0]),
+                            reinterpret_cast<const float*>(&at.place[1]),
+                            reinterpret_cast<const float*>(&at.place[2])};
+    for (int i = 0; i < kLanes; ++i)
+      put(kernel::sampleStored(channel, at.dims, {place[0][i], place[1][i], place[2][i]}), i, &values);
+    return values;
   }
   switch (channel.type) {
     case ScalarType::u8:
@@ -129,24 +124,24 @@ SCOLOPAX_SIMD Float sampleChannel(const Points& at, const kernel::ChannelView& c
 }
 
 /// Four channels of a voxel.
-SCOLOPAX_SIMD __m128 load4(const std::uint8_t* v) {
+SCOLOPAX_LANES __m128 load4(const std::uint8_t* v) {
   int bytes;
   std::memcpy(&bytes, v, sizeof bytes);
   return _mm_cvtepi32_ps(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(bytes)));
 }
-SCOLOPAX_SIMD __m128 load4(const std::uint16_t* v) {
+SCOLOPAX_LANES __m128 load4(const std::uint16_t* v) {
   return _mm_cvtepi32_ps(_mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(v))));
 }
-SCOLOPAX_SIMD __m128 load4(const std::int16_t* v) {
+SCOLOPAX_LANES __m128 load4(const std::int16_t* v) {
   return _mm_cvtepi32_ps(_mm_cvtepi16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(v))));
 }
-SCOLOPAX_SIMD __m128 load4(const float* v) { return _mm_loadu_ps(v); }
+SCOLOPAX_LANES __m128 load4(const float* v) { return _mm_loadu_ps(v); }
 
 /// Four neighbouring channels; members[lane - first lane] is where a channel's values go, or
 /// null.
 template <class T>
-SCOLOPAX_SIMD_ONLY void sampleFour(const Points& at, const kernel::ChannelView& channel, int lane,
-                                   float* const* members) {
+SCOLOPAX_SIMD void sampleFour(const Points& at, const kernel::ChannelView& channel, int lane,
+                              float* const* members) {
   const auto stride = std::size_t(channel.stride), row = stride * std::size_t(at.dims.x),
              slice = row * std::size_t(at.dims.y);
   const T* base = static_cast<const T*>(channel.voxels) + lane;
@@ -174,10 +169,14 @@ SCOLOPAX_SIMD_ONLY void sampleFour(const Points& at, const kernel::ChannelView& 
   }
 }
 
+SCOLOPAX_LANES Float sampleStored(const kernel::ChannelView& channel, glm::ivec3 dims, const Vec& point) {
+  return sampleChannel(pointsAt(dims, point), channel);
+}
+
 /// Channels by their bits; the values of channel n come into values[n].
-SCOLOPAX_SIMD void sampleLanes(const kernel::SceneView& scene, std::uint32_t channels, Float x, Float y,
-                               Float z, float (*values)[kLanes]) {
-  const Points at = pointsAt(scene.dims, x, y, z);
+SCOLOPAX_LANES void sampleChannels(const kernel::SceneView& scene, std::uint32_t channels, const Vec& point,
+                                   Float* values) {
+  const Points at = pointsAt(scene.dims, point);
   for (int n = 0; n < scene.channelCount; ++n) {
     if (!(channels >> n & 1)) continue;
     const kernel::ChannelView& channel = scene.channels[n];
@@ -188,17 +187,16 @@ SCOLOPAX_SIMD void sampleLanes(const kernel::SceneView& scene, std::uint32_t cha
     for (int m = n; m < scene.channelCount; ++m)
       if ((channels >> m & 1) && scene.channels[m].voxels == channel.voxels &&
           (scene.channels[m].lane & ~3) == lane) {
-        members[scene.channels[m].lane - lane] = values[m];
+        members[scene.channels[m].lane - lane] = reinterpret_cast<float*>(&values[m]);
         found |= 1u << m;
       }
     if ((found & (found - 1)) != 0 && !isFlat(scene.dims))
       visitScalarType(channel.type,
                       [&](auto zero) { sampleFour<decltype(zero)>(at, channel, lane, members); });
     else
-      found = 1u << n, store(sampleChannel(at, channel), values[n]);
+      found = 1u << n, values[n] = sampleChannel(at, channel);
     channels &= ~found;
   }
 }
 
 }  // namespace scolopax::SCOLOPAX_SIMD_SPACE
-#endif

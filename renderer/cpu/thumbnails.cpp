@@ -10,7 +10,6 @@
 
 #include "renderer/cpu/pass.h"
 #include "renderer/cpu/ray_packets.h"
-#include "renderer/cpu/sample_batch.h"
 #include "renderer/data/camera.h"
 #include "renderer/data/sampling.h"
 
@@ -42,7 +41,6 @@ class Thumbnails {
     view_.rays = makeCameraRays(scene.camera, plan.grid(), view_.width, view_.height);
     view_.filterBox = false;  // all steps through the same points
     view_.seed = 0;
-    view_.sampleBatch = sampleBatchFor(fastestInstructionSet());
     view_.stratum = stratumOf(scene.method);
     render_ = quadratureTileFunction(scene, view_);
   }

@@ -98,8 +98,10 @@ std::size_t MajorantGrid::sizeBytes(const MacrocellGrid& macrocells) {
 }
 
 std::size_t MajorantGrid::update(std::shared_ptr<const MacrocellGrid> macrocells,
-                                 std::vector<BoundTable> tables, bool sums) {
-  const bool newCells = macrocells != macrocells_, all = newCells || sums != sums_;
+                                 std::vector<BoundTable> tables, bool sums, bool apart) {
+  apart = apart || macrocells->levels.size() > kFewColumns;
+  const bool newCells = macrocells != macrocells_;
+  const bool all = newCells || sums != sums_ || apart == active_.empty();
   const CellBlocks blocks(macrocells->cells);
   std::vector<Change> changes;
   for (int column = 0; column < int(macrocells->levels.size()); ++column)
@@ -109,14 +111,14 @@ std::size_t MajorantGrid::update(std::shared_ptr<const MacrocellGrid> macrocells
     return 0;
   }
   std::vector<std::uint8_t> radii(blocks.count()), scratch(blocks.count()), stale(blocks.count());
+  std::vector<std::uint32_t> active(all && apart ? macrocells->cellCount() : 0);
   if (newCells) {
     std::vector<std::uint8_t> noRadii(blocks.count());
     std::vector<TotalCode> totals(macrocells->cellCount() + 2);  // processors gather pairs of them
-    active_ =
-        std::vector<std::uint32_t>(macrocells->levels.size() > kFewColumns ? macrocells->cellCount() : 0);
     totals_ = std::move(totals);
     radii_ = std::move(noRadii);
   }
+  if (all) active_ = std::move(active);
   macrocells_ = std::move(macrocells);
   tables_ = std::move(tables);
   sums_ = sums;

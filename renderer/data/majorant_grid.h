@@ -17,10 +17,11 @@ kernel::BoundTable buildBounds(const ValueLevels& levels, const TransferFunction
 class MajorantGrid {
  public:
   /// Takes over the visible channels' tables, in the order of the channels, and the macrocells they belong
-  /// to. `sums`: the channels' extinctions add up; else the largest hides the others. Returns in how many
-  /// cells the total was worked out again. Nothing has changed when this throws.
+  /// to. `sums`: the channels' extinctions add up; else the largest hides the others. `apart`: kernels need
+  /// to know of every cell which channels are active. Returns in how many cells the total was worked out
+  /// again. Nothing has changed when this throws.
   std::size_t update(std::shared_ptr<const MacrocellGrid> macrocells, std::vector<kernel::BoundTable> tables,
-                     bool sums);
+                     bool sums, bool apart = false);
   /// Memory that it takes for these macrocells, without theirs.
   static std::size_t sizeBytes(const MacrocellGrid& macrocells);
   /// Valid until the next update.
@@ -38,7 +39,7 @@ class MajorantGrid {
   std::vector<std::uint32_t> active_;
   glm::ivec3 filledLow_{0}, filledHigh_{0};
 
-  /// Of so many channels all are looked at where one may be something.
+  /// Of so many channels all are looked at where one may be something, if that gives the same picture.
   static constexpr std::size_t kFewColumns = 4;
 };
 

@@ -164,7 +164,14 @@ RebuildStats RenderPlan::update(const Scene& scene, const std::stop_token& stop)
   for (const int i : visible)
     views.push_back(plans[std::size_t(i)]->transfer.view(volume_->channels()[std::size_t(i)]));
   std::optional<Scene> next = scene;
-  stats.majorantCells = majorants_.update(macrocells, std::move(bounds), sumsExtinction(scene.blend));
+  // Where channels hide each other, or segments may cross values that are nowhere, rays that are marched
+  // together must not take segments for each other.
+  const auto& all = volume_->channels();
+  const bool sums = sumsExtinction(scene.blend);
+  const bool apart = (!sums && all.size() > 1) || std::any_of(all.begin(), all.end(), [](const Channel& c) {
+                       return c.histogram.nonFiniteCount > 0;
+                     });
+  stats.majorantCells = majorants_.update(macrocells, std::move(bounds), sums, apart);
 
   scene_ = std::move(next);
   macrocells_ = macrocells;

@@ -22,14 +22,15 @@ SCOLOPAX_HD bool isBlocked(const SceneView& scene, const Ray& ray, Interval insi
 template <class Tracker, class Blend, class Features>
 SCOLOPAX_HD glm::vec3 radiance(const SceneView& scene, const Ray& ray, const Collision& hit, Sampler& sampler,
                                SampleCost* cost) {
-  Visibility visibility;
+  const LitPoint<One> at{ray, hit.place.t(), hit.point};
+  Visibility<One> visibility;
   if constexpr (Features::kAny)
-    visibility = visibilityAt<Features>(scene, ray, hit, [&](const Ray& shadowRay, Interval part) {
+    visibility = visibilityAt<Features>(scene, at, true, [&](const Ray& shadowRay, Interval part) {
       return isBlocked<Tracker, Blend>(scene, shadowRay, part, hit.channel, sampler, cost) ? 0.0f : 1.0f;
     });
   const auto show = [&](const ChannelView& channel, float position) {
     const glm::vec3 color = evaluate(channel.color, position);
-    if constexpr (Features::kAny) return lit<Features>(scene, channel, color, ray, hit, visibility, cost);
+    if constexpr (Features::kAny) return lit<Features>(scene, channel, color, at, visibility, true, cost);
     return color;
   };
   if constexpr (Blend::kMixes) {

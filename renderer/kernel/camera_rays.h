@@ -10,10 +10,11 @@
 namespace scolopax::kernel {
 
 /// origin + t * direction in voxel coordinates, t >= 0 in WORLD units of length.
-struct Ray {
-  glm::vec3 origin;
-  glm::vec3 direction;
+template <class L>
+struct RayOf {
+  typename L::Vec origin, direction;
 };
+using Ray = RayOf<One>;
 
 /// With film coordinates s = (x - width/2, height/2 - y) * pixelSize, in units of the view's height:
 /// origin = origin0 + s.x * originX + s.y * originY, the same for the direction, which is then divided by
@@ -27,17 +28,21 @@ struct CameraRays {
   float start;  ///< distance of the plane in which rays start from the eye, along the view, world units
 
   /// Ray through the point (x, y) of the image plane, in pixels from the top left corner.
-  SCOLOPAX_HD Ray operator()(float x, float y) const {
-    const float sx = (x - halfSize.x) * pixelSize;
-    const float sy = (halfSize.y - y) * pixelSize;
-    const float inverseLength = 1.0f / squareRoot(1.0f + perspective * (sx * sx + sy * sy));
-    return {origin0 + sx * originX + sy * originY,
-            (direction0 + sx * directionX + sy * directionY) * inverseLength};
+  SCOLOPAX_HD Ray operator()(float x, float y) const { return through<One>(x, y); }
+  template <class L>
+  SCOLOPAX_LANES RayOf<L> through(typename L::Float x, typename L::Float y) const {
+    using Vec = typename L::Vec;
+    const auto sx = (x - halfSize.x) * pixelSize;
+    const auto sy = (halfSize.y - y) * pixelSize;
+    const auto inverseLength = 1.0f / squareRoot(1.0f + perspective * (sx * sx + sy * sy));
+    return {Vec(origin0) + sx * Vec(originX) + sy * Vec(originY),
+            (Vec(direction0) + sx * Vec(directionX) + sy * Vec(directionY)) * inverseLength};
   }
   /// Depth of the point t along the ray through (x, y): its distance from the eye along the view direction.
-  SCOLOPAX_HD float depth(float x, float y, float t) const {
-    const float sx = (x - halfSize.x) * pixelSize;
-    const float sy = (halfSize.y - y) * pixelSize;
+  template <class Float>
+  SCOLOPAX_LANES Float depth(Float x, Float y, Float t) const {
+    const Float sx = (x - halfSize.x) * pixelSize;
+    const Float sy = (halfSize.y - y) * pixelSize;
     return start + t / squareRoot(1.0f + perspective * (sx * sx + sy * sy));
   }
 };

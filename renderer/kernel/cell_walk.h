@@ -7,28 +7,32 @@
 
 namespace scolopax::kernel {
 
-struct Interval {
-  float enter, exit;  ///< along the ray; empty when enter >= exit
+template <class L>
+struct IntervalOf {
+  typename L::Float enter, exit;  ///< along the ray; empty when enter >= exit
 };
+using Interval = IntervalOf<One>;
 
-/// The part of the ray with t >= 0 inside the box [-1/2, dims - 1/2]; faces belong to the box.
-SCOLOPAX_HD inline Interval clipToBox(const Ray& ray, glm::ivec3 dims) {
-  Interval inside{0.0f, kInfinity};
+/// The part of the ray with t >= 0 inside the box [-1/2, dims - 1/2]; faces belong to the box. A ray that is
+/// not finite, or has no direction at all, sees nothing.
+template <class L>
+SCOLOPAX_LANES IntervalOf<L> clipToBox(const RayOf<L>& ray, glm::ivec3 dims) {
+  using Float = typename L::Float;
+  using Mask = typename L::Mask;
+  IntervalOf<L> inside{Float(0.0f), Float(kInfinity)};
+  Mask meets = L::everywhere();
   for (int axis = 0; axis < 3; ++axis) {
     const float lo = -0.5f, hi = float(dims[axis]) - 0.5f;
-    const float o = ray.origin[axis], d = ray.direction[axis];
-    if (d == 0.0f) {
-      if (!(o >= lo && o <= hi)) return {0.0f, 0.0f};
-      continue;
-    }
-    const float a = (lo - o) / d, b = (hi - o) / d;
-    const float near = minimum(a, b), far = maximum(a, b);
-    if (!(near <= far)) return {0.0f, 0.0f};  // not finite: such a ray sees nothing
-    inside.enter = maximum(inside.enter, near);
-    inside.exit = minimum(inside.exit, far);
+    const Float o = ray.origin[axis], d = ray.direction[axis];
+    const Mask along = d == 0.0f;
+    const Float a = (lo - o) / d, b = (hi - o) / d;
+    const Float near = minimum(a, b), far = maximum(a, b);
+    meets = meets & (without(near <= far, along) | (along & (o >= lo) & (o <= hi)));
+    inside.enter = select(along, inside.enter, maximum(inside.enter, near));
+    inside.exit = select(along, inside.exit, minimum(inside.exit, far));
   }
-  if (!(inside.exit < kInfinity)) return {0.0f, 0.0f};  // no direction at all
-  return inside;
+  meets = meets & (inside.exit < kInfinity);
+  return {where(meets, inside.enter), where(meets, inside.exit)};
 }
 
 /// Cell after cell along a ray; but where blocks of cells are empty, many cells are one step: from the entry

@@ -8,83 +8,210 @@
 
 namespace scolopax::kernel {
 
-/// Opacity and colour at one position.
+/// Where a stored value lies on the curves, beyond [0,1] too: linear in the stored value, so that a stretch
+/// that leaves the range is cut where it does. With gamma it is clamped. NaN where the value is not finite.
+template <class Float>
+SCOLOPAX_LANES Float stretchPosition(const ChannelView& channel, Float stored) {
+  constexpr float kFar = 1e6f;
+  Float position = clamp((stored - channel.origin) * channel.scale + channel.offset, -kFar, kFar);
+  if (channel.gamma != 1.0f) position = power(clamp(position, 0.0f, 1.0f), channel.gamma);
+  return select(isFinite(stored), position, Float(kNaN));
+}
+
+/// Knots of the curves.
+template <class L>
+struct Knots {
+  typename L::Float position, inverseWidth, opacity;
+  typename L::Vec color;
+};
+
+/// A knot a lane.
+template <class L>
+SCOLOPAX_LANES Knots<L> knotsAt(const OpticalCurveView& curve, typename L::Int index) {
+  if constexpr (L::kLanes == 1) {
+    const OpticalKnot& knot = curve.knots[index];
+    return {knot.position, knot.inverseWidth, knot.opacity, knot.color};
+  } else {
+    const auto at = index * kKnotFloats;
+    const OpticalKnot& knot = curve.knots[0];
+    return {gather(&knot.position, at),
+            gather(&knot.inverseWidth, at),
+            gather(&knot.opacity, at),
+            {gather(&knot.color.x, at), gather(&knot.color.y, at), gather(&knot.color.z, at)}};
+  }
+}
+/// The same in all lanes.
+template <class L>
+SCOLOPAX_LANES Knots<L> knotAt(const OpticalCurveView& curve, int index) {
+  using Float = typename L::Float;
+  const OpticalKnot& knot = curve.knots[index];
+  return {Float(knot.position), Float(knot.inverseWidth), Float(knot.opacity), typename L::Vec(knot.color)};
+}
+template <class L>
+SCOLOPAX_LANES typename L::Float knotPositions(const OpticalCurveView& curve, typename L::Int index) {
+  if constexpr (L::kLanes == 1)
+    return curve.knots[index].position;
+  else
+    return gather(&curve.knots[0].position, index * kKnotFloats);
+}
+
+/// A position on the curves, and the piece that it is on: piece k lies between knots k and k + 1; before the
+/// first knot and after the last the curve is constant.
+template <class L>
+struct CurvePoint {
+  typename L::Float position;
+  typename L::Int piece;
+};
+
+template <class L>
+SCOLOPAX_LANES CurvePoint<L> pointOn(const OpticalCurveView& curve, typename L::Float position) {
+  using Int = typename L::Int;
+  using Mask = typename L::Mask;
+  const Mask above = position >= 0.0f, inside = above & (position < 1.0f);
+  Int k = gather(curve.buckets, truncated(where(inside, position) * float(kCurveBuckets)));
+  for (;;) {
+    const Int following = minimum(k + 1, Int(curve.count - 1));
+    const Mask on = inside & (knotPositions<L>(curve, following) <= position);
+    if (!any(on)) break;  // before the last knot, which is at 1
+    k = k + onesOf(on);
+  }
+  return {position, select(inside, k, select(above, Int(curve.count - 1), Int(-1)))};
+}
+template <class L>
+SCOLOPAX_LANES CurvePoint<L> select(typename L::Mask m, const CurvePoint<L>& a, const CurvePoint<L>& b) {
+  return {select(m, a.position, b.position), select(m, a.piece, b.piece)};
+}
+
+/// Opacity and colour.
+template <class L>
 struct Optical {
-  float opacity;
-  glm::vec3 color;
+  typename L::Float opacity;
+  typename L::Vec color;
 };
 
-/// Piece k lies between knots k and k + 1; before the first knot and after the last the curve is constant.
-SCOLOPAX_HD inline int pieceAt(const OpticalCurveView& curve, float position) {
-  if (!(position >= 0.0f)) return -1;
-  if (position >= 1.0f) return curve.count - 1;
-  int k = curve.buckets[int(position * float(kCurveBuckets))];
-  while (curve.knots[k + 1].position <= position) ++k;  // the last knot's is 1
-  return k;
+/// How much is wanted of what channels do on a segment.
+enum class Detail { extinction, emission, moment };
+
+/// Values of the line from knot a to knot b, which is piece `piece`; at its right end the limit from the
+/// left.
+template <Detail kDetail, class L>
+SCOLOPAX_LANES Optical<L> opticalIn(const Knots<L>& a, const Knots<L>& b, typename L::Int piece,
+                                    typename L::Float position) {
+  using Float = typename L::Float;
+  const Float t = where(piece > -1, minimum((position - a.position) * a.inverseWidth, Float(1.0f)));
+  Optical<L> optical;
+  optical.opacity = a.opacity + t * (b.opacity - a.opacity);
+  if constexpr (kDetail >= Detail::emission) optical.color = a.color + t * (b.color - a.color);
+  return optical;
 }
 
-/// Value of the line of piece k; at its right end the limit from the left.
-SCOLOPAX_HD inline Optical opticalIn(const OpticalCurveView& curve, int k, float position) {
-  const OpticalKnot& a = curve.knots[k < 0 ? 0 : k];
-  if (k < 0 || k + 1 >= curve.count) return {a.opacity, a.color};
-  const OpticalKnot& b = curve.knots[k + 1];
-  const float t = minimum((position - a.position) * a.inverseWidth, 1.0f);
-  return {a.opacity + t * (b.opacity - a.opacity), a.color + t * (b.color - a.color)};
+/// Both knots of a piece in every lane, by reading one pair where all lanes in the mask are on the same
+/// piece.
+template <class L>
+SCOLOPAX_LANES void knotsOf(const OpticalCurveView& curve, typename L::Int piece, typename L::Mask which,
+                            Knots<L>* a, Knots<L>* b) {
+  using Int = typename L::Int;
+  if constexpr (L::kLanes > 1) {
+    const Int same = firstIn(which, piece);
+    if (!any(without(which, piece == same))) {
+      const int k = at(same, 0);
+      *a = knotAt<L>(curve, k < 0 ? 0 : k);
+      *b = knotAt<L>(curve, k < 0 ? 0 : k + 1 < curve.count ? k + 1 : k);
+      return;
+    }
+  }
+  const Int last = curve.count - 1;
+  *a = knotsAt<L>(curve, maximum(piece, Int(0)));
+  *b = knotsAt<L>(curve, maximum(minimum(piece + 1, last), Int(0)));
 }
 
-SCOLOPAX_HD inline Optical opticalAt(const OpticalCurveView& curve, float position) {
-  return opticalIn(curve, pieceAt(curve, position), position);
+template <Detail kDetail, class L>
+SCOLOPAX_LANES Optical<L> opticalAt(const OpticalCurveView& curve, const CurvePoint<L>& point,
+                                    typename L::Mask which) {
+  Knots<L> a, b;
+  knotsOf<L>(curve, point.piece, which, &a, &b);
+  return opticalIn<kDetail, L>(a, b, point.piece, point.position);
 }
 
-/// Means over a stretch: of opacity, opacity times colour, and opacity times the place on the stretch, in
-/// [0,1].
-struct StretchMeans {
-  float opacity = 0.0f;
-  glm::vec3 emission{0.0f};
-  float moment = 0.0f;
+/// What a channel does on a segment: means over it of its part in the extinction that is seen, of that times
+/// its colour, and of that times the place in [0,1]. Per world unit; 0 beyond the detail.
+template <class L>
+struct PartOf {
+  typename L::Float opacity;
+  typename L::Vec emission;
+  typename L::Float moment;
 };
+template <class L>
+SCOLOPAX_LANES PartOf<L> noPart() {
+  using Float = typename L::Float;
+  return {Float(0.0f), typename L::Vec(0.0f), Float(0.0f)};
+}
+template <class L>
+SCOLOPAX_LANES PartOf<L> scaled(const PartOf<L>& part, typename L::Float factor) {
+  return {part.opacity * factor, part.emission * factor, part.moment * factor};
+}
+template <class L>
+SCOLOPAX_LANES PartOf<L> sum(const PartOf<L>& a, const PartOf<L>& b) {
+  return {a.opacity + b.opacity, a.emission + b.emission, a.moment + b.moment};
+}
 
 namespace detail {
 /// Adds a part of a stretch, from place s to place e of it, on which both curves are linear; exact.
-SCOLOPAX_HD inline void addLinear(const Optical& a, const Optical& b, float s, float e, StretchMeans* means) {
-  const float width = e - s;
-  means->opacity += width * 0.5f * (a.opacity + b.opacity);
-  means->emission += width * 0.166666667f *
-                     ((2.0f * a.opacity + b.opacity) * a.color + (a.opacity + 2.0f * b.opacity) * b.color);
-  means->moment +=
-      width * 0.166666667f * ((2.0f * a.opacity + b.opacity) * s + (a.opacity + 2.0f * b.opacity) * e);
+template <Detail kDetail, class L>
+SCOLOPAX_LANES void addLinear(const Optical<L>& a, const Optical<L>& b, typename L::Float s,
+                              typename L::Float e, typename L::Mask which, PartOf<L>* means) {
+  using Float = typename L::Float;
+  const Float width = e - s, sixth = width * 0.166666667f;
+  const Float left = 2.0f * a.opacity + b.opacity, right = a.opacity + 2.0f * b.opacity;
+  means->opacity = means->opacity + where(which, width * 0.5f * (a.opacity + b.opacity));
+  if constexpr (kDetail >= Detail::emission)
+    for (int c = 0; c < 3; ++c)
+      means->emission[c] =
+          means->emission[c] + where(which, sixth * (left * a.color[c] + right * b.color[c]));
+  if constexpr (kDetail >= Detail::moment)
+    means->moment = means->moment + where(which, sixth * (left * s + right * e));
 }
 }  // namespace detail
 
-/// Over positions from p to q, not NaN; they may lie outside [0,1], where the curve is constant.
-SCOLOPAX_HD inline StretchMeans meansBetween(const OpticalCurveView& curve, float p, float q) {
-  StretchMeans means;
-  const int first = pieceAt(curve, p), last = pieceAt(curve, q);
-  if (first == last) {
-    detail::addLinear(opticalIn(curve, first, p), opticalIn(curve, first, q), 0.0f, 1.0f, &means);
+/// Means over positions from p to q, not NaN, of some lanes, the others having 0; positions may lie outside
+/// [0,1], where the curve is constant.
+template <Detail kDetail, class L>
+SCOLOPAX_LANES PartOf<L> meansBetween(const OpticalCurveView& curve, const CurvePoint<L>& p,
+                                      const CurvePoint<L>& q, typename L::Mask which) {
+  using Float = typename L::Float;
+  using Int = typename L::Int;
+  using Mask = typename L::Mask;
+  PartOf<L> means = noPart<L>();
+  const Int same = firstIn(which, p.piece);
+  if (!any(without(which, (p.piece == same) & (q.piece == same)))) {
+    const int k = at(same, 0);
+    const Knots<L> a = knotAt<L>(curve, k < 0 ? 0 : k);
+    const Knots<L> b = knotAt<L>(curve, k < 0 ? 0 : k + 1 < curve.count ? k + 1 : k);
+    detail::addLinear<kDetail, L>(opticalIn<kDetail, L>(a, b, p.piece, p.position),
+                                  opticalIn<kDetail, L>(a, b, p.piece, q.position), Float(0.0f), Float(1.0f),
+                                  which, &means);
     return means;
   }
-  const float scale = 1.0f / (q - p);
-  const int way = first < last ? 1 : -1;
-  float from = p, place = 0.0f;
-  for (int k = first; k != last + way; k += way) {
-    const float to = k == last ? q : curve.knots[way > 0 ? k + 1 : k].position;
-    const float next = k == last ? 1.0f : clamp((to - p) * scale, place, 1.0f);
-    if (place < next)
-      detail::addLinear(opticalIn(curve, k, from), opticalIn(curve, k, to), place, next, &means);
+  const Int last = curve.count - 1;
+  const Float scale = 1.0f / (q.position - p.position);
+  const Mask up = q.piece > p.piece;
+  const Int way = select(up, Int(1), Int(-1));
+  Float from = p.position, place(0.0f);
+  Int k = p.piece;
+  for (Mask on = which; any(on);) {
+    const Mask ends = k == q.piece;
+    const Knots<L> a = knotsAt<L>(curve, minimum(maximum(k, Int(0)), last));
+    const Knots<L> b = knotsAt<L>(curve, minimum(maximum(k + 1, Int(0)), last));
+    const Float to = select(ends, q.position, select(up, b.position, a.position));
+    const Float next = select(ends, Float(1.0f), clamp((to - p.position) * scale, place, 1.0f));
+    detail::addLinear<kDetail, L>(opticalIn<kDetail, L>(a, b, k, from), opticalIn<kDetail, L>(a, b, k, to),
+                                  place, next, on & (place < next), &means);
     from = to;
     place = next;
+    k = k + way;
+    on = without(on, ends);
   }
   return means;
-}
-
-/// Where a stored value lies on the curves, beyond [0,1] too: linear in the stored value, so that a stretch
-/// that leaves the range is cut where it does. With gamma it is clamped. NaN where the value is not finite.
-SCOLOPAX_HD inline float stretchPosition(const ChannelView& channel, float stored) {
-  constexpr float kFar = 1e6f;
-  if (!isFinite(stored)) return __builtin_nanf("");
-  const float position = clamp((stored - channel.origin) * channel.scale + channel.offset, -kFar, kFar);
-  return channel.gamma == 1.0f ? position : power(clamp(position, 0.0f, 1.0f), channel.gamma);
 }
 
 }  // namespace scolopax::kernel

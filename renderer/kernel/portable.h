@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What marks code that runs on host and device alike. Kernels use only + - * /, comparisons and the
-// functions of math.h in this folder, so that every compiler and device computes the same bits.
+// What marks code that runs on host and device alike, and code that runs on one lane or many. Kernels use
+// only
+// + - * /, comparisons and the functions of this folder, so that every compiler and device computes the same
+// bits.
 #pragma once
 
 #if defined(__CUDACC__)
@@ -17,4 +19,18 @@
 #else
 #define SCOLOPAX_HOT __attribute__((flatten))
 #define SCOLOPAX_APART __attribute__((noinline))
+#endif
+
+// For everything that is a template over a lane type (lanes.h). A file that is compiled for an instruction
+// set includes cpu/lanes_*.h first, which defines SCOLOPAX_SIMD: its instances are of that set's lane type,
+// and are inlined into functions that have the set. Functions, not files, have it: an inline function that a
+// file compiled for AVX2 might be the one that the linker keeps for everybody.
+#if defined(SCOLOPAX_SIMD)
+#define SCOLOPAX_LANES SCOLOPAX_SIMD_INLINE inline
+#define SCOLOPAX_LANES_LAMBDA SCOLOPAX_SIMD_INLINE
+#define SCOLOPAX_LANES_APART SCOLOPAX_SIMD __attribute__((noinline))
+#else
+#define SCOLOPAX_LANES SCOLOPAX_HD inline
+#define SCOLOPAX_LANES_LAMBDA
+#define SCOLOPAX_LANES_APART SCOLOPAX_HD
 #endif

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Quadrature along a ray: equal segments from a jittered start, over each of which the scalars are linear and
-// the curves exact (the paper's baseline of 5.2-5.3 takes one point instead). Lighting is worked out once for
-// every stratum of absorbed light. Biased; of order 2 in the step.
+// Quadrature along a ray a lane: equal segments from a jittered start, over each of which the scalars are
+// linear and the curves exact (the paper's baseline of 5.2-5.3 takes one point instead). Lighting is worked
+// out once for every stratum of absorbed light. Biased; of order 2 in the step.
 #pragma once
+#include "renderer/kernel/collision.h"
 #include "renderer/kernel/strata.h"
 
 namespace scolopax::kernel {
@@ -10,82 +11,133 @@ namespace scolopax::kernel {
 /// Transmittance below which what lies behind no longer shows, not even in float pictures of high contrast.
 inline constexpr float kOpaqueTransmittance = 1e-4f;
 
-/// The channel that a collision on a segment happens in; `pick` in [0,1) decides where extinctions add up.
-template <class Blend>
-SCOLOPAX_HD int channelOf(const SegmentParts<Blend>& parts, float extinction, float pick) {
-  float left = pick * extinction, most = -1.0f;
-  int channel = 0;
-  bool found = false;
-  parts.visit([&](int n, const Part& part) {
-    if (Blend::kMixes ? part.opacity > most : !found) channel = n, most = part.opacity;
-    left -= part.opacity;
-    found = found || left < 0.0f;
-  });
-  return channel;
+/// Linear premultiplied RGBA.
+template <class L>
+struct Radiance {
+  typename L::Vec color;
+  typename L::Float opacity;
+};
+
+/// Collisions on a segment; `pick` in [0,1) decides about the channel where extinctions add up.
+template <class L>
+struct SegmentCollision {
+  Segment<L> segment;
+  typename L::Float extinction, pick;
+  typename L::Mask which;
+};
+template <class L>
+SCOLOPAX_LANES void keepNearer(FirstCollisionOf<L>* first, typename L::Mask which, typename L::Float depth,
+                               typename L::Int channel) {
+  const typename L::Mask nearer = which & ((typename L::Int(0) > first->channel) | (depth < first->depth));
+  first->depth = select(nearer, depth, first->depth);
+  first->channel = select(nearer, channel, first->channel);
 }
 
-/// Premultiplied RGBA of a ray; `only` >= 0 marches that channel alone.
-template <class Blend, class Features>
-SCOLOPAX_HD glm::vec4 marchRay(const SceneView& scene, const Ray& ray, Interval inside, int only,
-                               Sampler& sampler, Sampler& ofStrata, SampleCost* cost, FirstCollision* first) {
-  glm::vec3 color(0.0f);
-  float transmittance = 1.0f, opacity = 0.0f;  // both: 1 - transmittance would lose what is thin
-  const RandomBlock random = sampler.next();
+/// Keeps collisions that are nearer than what rays have met so far.
+template <class L, class Blend>
+SCOLOPAX_LANES_APART void meet(const SceneView& scene, const Blend& blend, const SegmentEnds<L>& ends,
+                               Hidden<L, Blend::kSums>& hidden, const SegmentCollision<L>& collision,
+                               FirstCollisionOf<L>* first) {
+  using Float = typename L::Float;
+  using Int = typename L::Int;
+  using Mask = typename L::Mask;
+  Float left = collision.pick * collision.extinction, most(-1.0f);
+  Int channel(0);
+  Mask open = L::everywhere();
+  visitParts<Detail::emission>(scene, blend, collision.segment, ends, hidden,
+                               [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
+                                 const Mask seen = part.opacity > 0.0f;
+                                 const Mask better = seen & (blend.mixes ? part.opacity > most : open);
+                                 channel = select(better, Int(n), channel);
+                                 most = select(better, part.opacity, most);
+                                 left = select(seen, left - part.opacity, left);
+                                 open = without(open, seen & (left < 0.0f));
+                               });
+  keepNearer(first, collision.which, collision.segment.start + collision.pick * collision.segment.length(),
+             channel);
+}
+
+/// Of rays among some channels, by their bits; `set` tells the random numbers of such marches apart.
+template <class Features, class L, class Blend>
+SCOLOPAX_LANES Radiance<L> marchRay(const SceneView& scene, const Blend& blend, const RayOf<L>& ray,
+                                    const IntervalOf<L>& inside, std::uint32_t channels, int set,
+                                    SamplerOf<L>& sampler, const SamplerOf<L>& ofStrata, CostOf<L>* cost,
+                                    FirstCollisionOf<L>* first) {
+  using Float = typename L::Float;
+  using Mask = typename L::Mask;
+  using Vec = typename L::Vec;
+  constexpr Detail kDetail = Features::kAny ? Detail::moment : Detail::emission;
+  Vec color(0.0f);
+  Float transmittance(1.0f), opacity(0.0f);  // both: 1 - transmittance would lose what is thin
+  const Mask meets = inside.enter < inside.exit;
+  const auto random = sampler.next(meets);
   // A tracker's ray would end where the opacity passes this number.
-  const float end = first ? uniformOf(random.y) : kInfinity;
-  bool ended = false;
-  [[maybe_unused]] StratumChannels channels;
-  [[maybe_unused]] Strata<Blend, Features> strata(channels, scene, ray, only, ofStrata, cost);
-  SegmentRun run;
-  LargestsOf<Blend> largests;
-  SegmentWalk walk(run, scene, ray, inside, only, uniformOf(random.x), scene.step, cost);
+  const Float end = uniformOf(random.y);
+  Mask open = meets;
+  using OfStrata = Strata<Features, L, Blend>;
+  [[maybe_unused]] typename OfStrata::Memory memory;
+  [[maybe_unused]] OfStrata strata(memory, scene, blend, ray, channels, set, ofStrata, cost);
+  SegmentEnds<L> ends;
+  Hidden<L, Blend::kSums> hidden;
+  Segments<L> along(ends, scene, ray, inside, channels, uniformOf(random.x), scene.step, cost);
+  Segment<L> segment;
   for (bool more = true; more;) {
-    more = walk.next();
-    const float length = walk.length(), before = opacity;
-    const SegmentParts<Blend> parts(largests, scene, walk);
-    glm::vec3 emission(0.0f);
-    const float extinction = parts.visit([&](int, const Part& part) { emission += part.emission; });
-    if (extinction > 0.0f) {
-      const float alpha = absorbed(extinction * length);
-      const float absorbedHere = transmittance * alpha;
-      opacity += absorbedHere;
-      transmittance *= 1.0f - alpha;
-      more = more && transmittance > kOpaqueTransmittance;
-      emission *= absorbedHere / extinction;
-      if constexpr (!Features::kAny) color += emission;
-      if (!ended && opacity > end) {
-        ended = true;
-        const float pick = (end - before) / absorbedHere;
-        keepNearer(first,
-                   {walk.start() + pick * length, only < 0 ? channelOf(parts, extinction, pick) : only});
-      }
+    more = along.next(segment);
+    const Float length = segment.length(), before = opacity;
+    Vec emission(0.0f);
+    const Float extinction = visitParts<kDetail>(scene, blend, segment, ends, hidden,
+                                                 [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
+                                                   if constexpr (Features::kAny) memory.parts[n] = part;
+                                                   emission = emission + part.emission;
+                                                 });
+    const Mask some = extinction > 0.0f;
+    if (any(some)) {
+      const Float alpha = absorbed(where(some, extinction * length)), absorbedHere = transmittance * alpha;
+      opacity = opacity + absorbedHere;
+      transmittance = transmittance * (1.0f - alpha);
+      more = more && along.keep(transmittance > kOpaqueTransmittance);
+      emission = emission * where(some, absorbedHere / extinction);
+      if constexpr (!Features::kAny) color = color + emission;
+      if (first) [[unlikely]]
+        if (const Mask met = open & some & (opacity > end); any(met)) {
+          open = without(open, met);
+          // A copy, so that the segment itself need not be in memory.
+          SegmentCollision<L> collision{segment, extinction, (end - before) / absorbedHere, met};
+          meet<L>(scene, blend, ends, hidden, collision, first);
+        }
     } else if (more) {
       continue;
     }
-    if constexpr (Features::kAny)
-      strata.absorb(before, opacity, !more, {walk.start(), length, extinction}, parts, emission, color);
+    if constexpr (Features::kAny) strata.absorb(before, opacity, !more, segment, extinction, emission, color);
   }
-  return glm::vec4(color, minimum(opacity, 1.0f));
+  return {color, minimum(opacity, 1.0f)};
 }
 
 struct RayMarch {
   template <class Blend, class Features>
   SCOLOPAX_HD static glm::vec4 sample(const SceneView& scene, const Ray& ray, Interval inside,
                                       Sampler& sampler, SampleCost* cost, FirstCollision* first) {
-    Sampler ofStrata = sampler.aside();  // one for all channels: their draws are independent
-    if constexpr (Blend::kSeparate) {
-      glm::vec3 color(0.0f);
-      float opacity = 0.0f;
-      for (int n = 0; n < scene.channelCount; ++n) {
-        const glm::vec4 alone =
-            marchRay<Blend, Features>(scene, ray, inside, n, sampler, ofStrata, cost, first);
-        color += glm::vec3(alone);
-        opacity += (1.0f - opacity) * alone.w;
-      }
-      return glm::vec4(color, opacity);
-    } else {
-      return marchRay<Blend, Features>(scene, ray, inside, -1, sampler, ofStrata, cost, first);
+    const Blending<Blend::kSums> blend{Blend::kSeparate, Blend::kMixes};
+    const Radiance<One> radiance = march<Features>(scene, blend, ray, inside, sampler, cost, first);
+    return glm::vec4(radiance.color, radiance.opacity);
+  }
+
+  template <class Features, class L, class Blend>
+  SCOLOPAX_LANES static Radiance<L> march(const SceneView& scene, const Blend& blend, const RayOf<L>& ray,
+                                          const IntervalOf<L>& inside, SamplerOf<L>& sampler, CostOf<L>* cost,
+                                          FirstCollisionOf<L>* first) {
+    using Float = typename L::Float;
+    const SamplerOf<L> ofStrata = sampler.aside();  // one for all channels: their draws are independent
+    Radiance<L> sum{typename L::Vec(0.0f), Float(0.0f)};
+    for (int n = 0; n < (blend.separate ? scene.channelCount : 1); ++n) {
+      const std::uint32_t channels =
+          blend.separate ? 1u << n : ~0u >> (kMaxVisibleChannels - scene.channelCount);
+      const Radiance<L> alone = marchRay<Features>(scene, blend, ray, inside, channels,
+                                                   blend.separate ? n : 0, sampler, ofStrata, cost, first);
+      sum.color = sum.color + alone.color;
+      sum.opacity = sum.opacity + (1.0f - sum.opacity) * alone.opacity;
     }
+    return sum;
   }
 };
 

@@ -5,41 +5,45 @@
 #pragma once
 #include <cstdint>
 
-#include "renderer/kernel/portable.h"
+#include "renderer/kernel/lanes.h"
 
 namespace scolopax::kernel {
 
 /// Four words of 32 random bits.
-struct RandomBlock {
-  std::uint32_t x, y, z, w;
+template <class Word>
+struct RandomBlockOf {
+  Word x, y, z, w;
 };
+using RandomBlock = RandomBlockOf<std::uint32_t>;
 
 /// pcg4d of Jarzynski and Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020: a permutation of 128
 /// bits.
-SCOLOPAX_HD inline RandomBlock pcg4d(std::uint32_t x, std::uint32_t y, std::uint32_t z, std::uint32_t w) {
+template <class Word>
+SCOLOPAX_LANES RandomBlockOf<Word> pcg4d(Word x, Word y, Word z, Word w) {
   x = x * 1664525u + 1013904223u;
   y = y * 1664525u + 1013904223u;
   z = z * 1664525u + 1013904223u;
   w = w * 1664525u + 1013904223u;
-  x += y * w, y += z * x, z += x * y, w += y * z;
-  x ^= x >> 16, y ^= y >> 16, z ^= z >> 16, w ^= w >> 16;
-  x += y * w, y += z * x, z += x * y, w += y * z;
+  x = x + y * w, y = y + z * x, z = z + x * y, w = w + y * z;
+  x = x ^ right<16>(x), y = y ^ right<16>(y), z = z ^ right<16>(z), w = w ^ right<16>(w);
+  x = x + y * w, y = y + z * x, z = z + x * y, w = w + y * z;
   return {x, y, z, w};
 }
 
 /// (k + 1/2) 2^-32, at most 1 - 2^-24: never 0 or 1, and fine enough near 0 that a free flight through
 /// optical thickness 1e-7 still has the right chance of a collision.
-SCOLOPAX_HD inline float uniformOf(std::uint32_t k) {
-  const float u = (float(k) + 0.5f) * 0x1p-32f;
-  return u < 0x1.fffffep-1f ? u : 0x1.fffffep-1f;
+template <class Word>
+SCOLOPAX_LANES auto uniformOf(Word k) {
+  return minimum((floatOfWord(k) + 0.5f) * 0x1p-32f, 0x1.fffffep-1f);
 }
 
 /// A bijection of 32 bits whose output bits all depend on all input bits (Wellons, "Prospecting for Hash
 /// Functions", 2018: lowbias32).
-SCOLOPAX_HD inline std::uint32_t hashOf(std::uint32_t x) {
-  x ^= x >> 16, x *= 0x7feb352du;
-  x ^= x >> 15, x *= 0x846ca68bu;
-  return x ^ (x >> 16);
+template <class Word>
+SCOLOPAX_LANES Word hashOf(Word x) {
+  x = (x ^ right<16>(x)) * 0x7feb352du;
+  x = (x ^ right<15>(x)) * 0x846ca68bu;
+  return x ^ right<16>(x);
 }
 
 /// Blocks of a sample whose words x, y, z come from a Sobol sequence.
@@ -56,56 +60,72 @@ struct SampleNumber {
   std::uint32_t point[kLowDiscrepancyBlocks][3];
 };
 
-SCOLOPAX_HD inline std::uint32_t reverseBits(std::uint32_t x) {
-  x = (x >> 16) | (x << 16);
-  x = ((x & 0x00ff00ffu) << 8) | ((x >> 8) & 0x00ff00ffu);
-  x = ((x & 0x0f0f0f0fu) << 4) | ((x >> 4) & 0x0f0f0f0fu);
-  x = ((x & 0x33333333u) << 2) | ((x >> 2) & 0x33333333u);
-  return ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
+template <class Word>
+SCOLOPAX_LANES Word reverseBits(Word x) {
+  x = right<16>(x) | left<16>(x);
+  x = left<8>(x & 0x00ff00ffu) | (right<8>(x) & 0x00ff00ffu);
+  x = left<4>(x & 0x0f0f0f0fu) | (right<4>(x) & 0x0f0f0f0fu);
+  x = left<2>(x & 0x33333333u) | (right<2>(x) & 0x33333333u);
+  return left<1>(x & 0x55555555u) | (right<1>(x) & 0x55555555u);
 }
 
 /// Owen's nested uniform scrambling of a coordinate whose bits come reversed (Burley, "Practical Hash-based
 /// Owen Scrambling", JCGT 9(4), 2020): every bit is flipped by a hash of the bits before it.
-SCOLOPAX_HD inline std::uint32_t owenScramble(std::uint32_t reversed, std::uint32_t seed) {
+template <class Word>
+SCOLOPAX_LANES Word owenScramble(Word reversed, Word seed) {
   // The seed's lowest bit flips the coordinate's highest, and pcg4d's lowest bits are not random enough.
-  std::uint32_t x = reversed + (seed ^ (seed >> 16));
-  x ^= x * 0x6c50b47cu;
-  x ^= x * 0xb82f1e52u;
-  x ^= x * 0xc7afe638u;
-  x ^= x * 0x8d22f6e6u;
+  Word x = reversed + (seed ^ right<16>(seed));
+  x = x ^ x * 0x6c50b47cu;
+  x = x ^ x * 0xb82f1e52u;
+  x = x ^ x * 0xc7afe638u;
+  x = x ^ x * 0x8d22f6e6u;
   return reverseBits(x);
 }
 
-/// The draws of one sample of one pixel. Block 0 places the sample in the pixel; every tentative collision
-/// takes the next block: x its optical depth, y the channel, z acceptance.
-class Sampler {
+/// The draws of one sample of a pixel a lane. Block 0 places the sample in the pixel; every tentative
+/// collision takes the next block: x its optical depth, y the channel, z acceptance.
+template <class L>
+class SamplerOf {
  public:
+  using Word = typename L::Word;
+  using Mask = typename L::Mask;
+  using Block = RandomBlockOf<Word>;
   /// Borrows `number`.
-  SCOLOPAX_HD Sampler(std::uint32_t pixel, const SampleNumber& number, std::uint32_t seed)
+  SCOLOPAX_LANES SamplerOf(Word pixel, const SampleNumber& number, std::uint32_t seed)
       : number_(number), pixel_(pixel), seed_(seed) {}
-  SCOLOPAX_HD RandomBlock next() { return at(block_++); }
+  /// Lanes that are not in the mask stay at their block, and get anything.
+  SCOLOPAX_LANES Block next(Mask which = L::everywhere()) {
+    const Word block = block_;
+    block_ = block_ + Word(onesOf(which));
+    return at(block, which);
+  }
   /// Any block, in any order.
-  SCOLOPAX_HD RandomBlock at(std::uint32_t block) const {
-    if (!number_.lowDiscrepancy || block >= kLowDiscrepancyBlocks)
-      return pcg4d(pixel_, number_.sample, block, seed_);
+  SCOLOPAX_LANES Block at(Word block, Mask which = L::everywhere()) const {
+    const Mask low = Word(number_.lowDiscrepancy ? kLowDiscrepancyBlocks : 0u) > block;
+    const Block random = pcg4d(pixel_, Word(number_.sample), block, Word(seed_));
+    if (!any(low & which)) return random;
     // Samples stay below 2^31, so no other draw has this counter.
-    const std::uint32_t replicate = 0x80000000u | (number_.sample / kReplicateSamples);
-    const RandomBlock scrambling = pcg4d(pixel_, replicate, block, seed_);
-    const std::uint32_t* point = number_.point[block];
-    return {owenScramble(point[0], scrambling.x), owenScramble(point[1], scrambling.y),
-            owenScramble(point[2], scrambling.z), scrambling.w};
+    const Word replicate(0x80000000u | (number_.sample / kReplicateSamples));
+    const Block scrambling = pcg4d(pixel_, replicate, block, Word(seed_));
+    const Word row = minimum(block, Word(kLowDiscrepancyBlocks - 1)) * 3u;
+    return {select(low, owenScramble(gather(&number_.point[0][0], row), scrambling.x), random.x),
+            select(low, owenScramble(gather(&number_.point[0][1], row), scrambling.y), random.y),
+            select(low, owenScramble(gather(&number_.point[0][2], row), scrambling.z), random.z),
+            select(low, scrambling.w, random.w)};
   }
   /// How many next() has given.
-  SCOLOPAX_HD std::uint32_t blocks() const { return block_; }
-  SCOLOPAX_HD void skipTo(std::uint32_t block) { block_ = block; }
+  SCOLOPAX_LANES Word blocks() const { return block_; }
+  SCOLOPAX_LANES void skipTo(Word block) { block_ = block; }
   /// Numbers apart from these, for a purpose whose need for them must not change what the others are. Pixels
   /// stay below 2^31.
-  SCOLOPAX_HD Sampler aside() const { return Sampler(pixel_ | 0x80000000u, number_, seed_); }
+  SCOLOPAX_LANES SamplerOf aside() const { return SamplerOf(pixel_ | Word(0x80000000u), number_, seed_); }
 
  private:
   const SampleNumber& number_;
-  std::uint32_t pixel_, seed_;
-  std::uint32_t block_ = 0;
+  Word pixel_;
+  std::uint32_t seed_;
+  Word block_{0u};
 };
+using Sampler = SamplerOf<One>;
 
 }  // namespace scolopax::kernel

@@ -1,152 +1,167 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the channels do on a segment of a ray: their extinction, emission and its centre, and which of them
-// counts where they hide each other. After segments.h, before raymarch.h and strata.h.
+// What the channels do on a segment of every ray: their extinction, emission and its centre, and which of
+// them counts where they hide each other. After the segments, before raymarch.h and strata.h.
 #pragma once
-#include <type_traits>
-
-#include "renderer/kernel/segments.h"
+#include "renderer/kernel/point_segments.h"
 
 namespace scolopax::kernel {
 
-/// What one channel does on a segment: means over the segment of its part in the extinction that is seen, of
-/// that times its colour, and of that times the place in [0,1]. Per world unit.
-using Part = StretchMeans;
+/// How quadrature sees a blend mode. Only the first decides what is compiled.
+template <bool kSumsExtinction>
+struct Blending {
+  static constexpr bool kSums = kSumsExtinction;  ///< extinctions add up; else the largest is seen (Eq. 8)
+  bool separate;                                  ///< channels do not see each other
+  bool mixes;                                     ///< the largest extinction shows all colours, weighted
+};
 
-SCOLOPAX_HD inline Part scaled(const Part& part, float factor) {
-  return {part.opacity * factor, part.emission * factor, part.moment * factor};
-}
-
-/// Part of channel n on segment k of a run, as if it were alone. Next to voxels that are not finite only the
-/// half of the segment that has a value counts.
-SCOLOPAX_HD inline Part partAlone(const ChannelView& channel, const float* position) {
-  const float p = position[0], q = position[1];
+/// Part of a channel on a segment of some rays, as if it were alone; of the others nothing. Next to voxels
+/// that are not finite only the half of the segment that has a value counts.
+template <Detail kDetail, class L>
+SCOLOPAX_LANES PartOf<L> partAlone(const ChannelView& channel, CurvePoint<L> from, CurvePoint<L> to,
+                                   typename L::Mask which) {
+  using Float = typename L::Float;
+  using Mask = typename L::Mask;
   const OpticalCurveView& curve = channel.optical;
-  if ((p <= curve.first && q <= curve.first) || (p >= curve.last && q >= curve.last)) return {};
-  if (p == p && q == q) return scaled(meansBetween(curve, p, q), channel.density);
-  if (p != p && q != q) return {};
-  const float finite = p == p ? p : q;
-  return scaled(meansBetween(curve, finite, finite), 0.5f * channel.density);
+  Float density(channel.density);
+  if (!channel.finite) {
+    const Mask known = from.position == from.position, other = to.position == to.position;
+    const CurvePoint<L> start = select(known, from, to);
+    to = select(other, to, from);
+    from = start;
+    density = select(known & other, density, 0.5f * density);
+    which = which & (known | other);
+  }
+  const Float p = from.position, q = to.position;
+  const Mask outside = ((p <= curve.first) & (q <= curve.first)) | ((p >= curve.last) & (q >= curve.last));
+  const Mask seen = without(which, outside);
+  if (!any(seen)) return noPart<L>();
+  return scaled(meansBetween<kDetail, L>(curve, from, to, seen), density);
 }
 
 /// Where channels hide each other, extinctions are compared at this many places of a segment, and at this
 /// many where a channel's curve is not one line on it.
 inline constexpr int kPlaces = 2, kPlacesAtKnots = 8;
 
-/// Channels of one segment where only the largest extinction counts (Eq. 8).
-struct Largests {
-  int places;
-  float extinction[kPlacesAtKnots];
-  int channel[kPlacesAtKnots];
+/// The parts of channels that hide each other.
+template <class L, bool kSums>
+struct Hidden {
+  PartOf<L> of[kMaxVisibleChannels];
 };
+/// Nothing where extinctions add up.
+template <class L>
+struct Hidden<L, true> {};
 
-/// In their place where extinctions add up.
-struct NoLargests {};
-template <class Blend>
-using LargestsOf = std::conditional_t<Blend::kSums, NoLargests, Largests>;
-
-/// What a channel is at a place in [0,1] of a segment.
-SCOLOPAX_HD inline Optical opticalOn(const ChannelView& channel, const float* position, float place) {
-  float p = position[0], q = position[1];
-  if (p != p) p = q;
-  if (q != q) q = p;
-  if (p != p) return {0.0f, glm::vec3(0.0f)};
-  Optical optical = opticalAt(channel.optical, p + place * (q - p));
-  optical.opacity *= channel.density;
+/// What a channel is at a place in [0,1] of a segment; of other rays anything.
+template <Detail kDetail, class L>
+SCOLOPAX_LANES Optical<L> opticalOn(const ChannelView& channel, const CurvePoint<L>& from,
+                                    const CurvePoint<L>& to, typename L::Float place,
+                                    typename L::Mask which) {
+  using Mask = typename L::Mask;
+  const Mask known = from.position == from.position, other = to.position == to.position;
+  const CurvePoint<L> p = select(known, from, to), q = select(other, to, from);
+  CurvePoint<L> point{p.position + place * (q.position - p.position), p.piece};
+  if (any(without(which, p.piece == q.piece))) point = pointOn<L>(channel.optical, point.position);
+  Optical<L> optical = opticalAt<kDetail, L>(channel.optical, point, which);
+  optical.opacity = where(known | other, optical.opacity * channel.density);
   return optical;
 }
 
-SCOLOPAX_HD inline void findLargests(const SceneView& scene, const SegmentRun& run, int k,
-                                     Largests& largests) {
-  largests.places = kPlaces;
+/// Adds what is seen of a channel around one place of a segment.
+template <Detail kDetail, class L>
+SCOLOPAX_LANES void add(typename L::Float opacity, const typename L::Vec& color, typename L::Float place,
+                        typename L::Mask which, PartOf<L>* part) {
+  part->opacity = part->opacity + where(which, opacity);
+  for (int c = 0; c < 3; ++c) part->emission[c] = part->emission[c] + where(which, opacity * color[c]);
+  if constexpr (kDetail >= Detail::moment) part->moment = part->moment + where(which, opacity * place);
+}
+
+/// Compares the channels of a segment, for some rays: the mean of the largest extinction, and what is seen of
+/// each channel.
+template <Detail kDetail, class L>
+SCOLOPAX_LANES typename L::Float compare(const SceneView& scene, bool mixes, const Segment<L>& segment,
+                                         const SegmentEnds<L>& ends, typename L::Mask which,
+                                         Hidden<L, false>& hidden) {
+  using Float = typename L::Float;
+  using Int = typename L::Int;
+  using Mask = typename L::Mask;
+  Mask bent = without(which, which);
   for (int n = 0; n < scene.channelCount; ++n) {
-    if (!(run.active[k] >> n & 1)) continue;
-    const OpticalCurveView& curve = scene.channels[n].optical;
-    if (pieceAt(curve, run.position[n][k]) != pieceAt(curve, run.position[n][k + 1]))
-      largests.places = kPlacesAtKnots;
+    if (!(segment.channels >> n & 1)) continue;
+    bent = bent | without(segment.of(scene, n), ends.from[n].piece == ends.to[n].piece);
+    if constexpr (kDetail >= Detail::emission) hidden.of[n] = noPart<L>();
   }
-  for (int i = 0; i < largests.places; ++i) {
-    const float place = (float(i) + 0.5f) / float(largests.places);
-    largests.extinction[i] = 0.0f;
-    largests.channel[i] = 0;
+  bent = bent & which;
+  const int most = any(bent) ? kPlacesAtKnots : kPlaces;
+  const Float share = select(bent, Float(1.0f / kPlacesAtKnots), Float(1.0f / kPlaces));
+  Float sum(0.0f);
+  for (int i = 0; i < most; ++i) {
+    const Mask on = i < kPlaces ? which : bent;
+    const Float place = (float(i) + 0.5f) * share;
+    Float largest(0.0f);
+    Int winner(0);
+    Optical<L> seen{};
     for (int n = 0; n < scene.channelCount; ++n) {
-      if (!(run.active[k] >> n & 1)) continue;
-      const float extinction = opticalOn(scene.channels[n], &run.position[n][k], place).opacity;
-      if (extinction > largests.extinction[i]) largests.extinction[i] = extinction, largests.channel[i] = n;
-    }
-  }
-}
-SCOLOPAX_HD inline float meanOf(const Largests& largests) {
-  float sum = 0.0f;
-  for (int i = 0; i < largests.places; ++i) sum += largests.extinction[i];
-  return sum / float(largests.places);
-}
-
-/// The same of channel n among others: in max where it is the largest, in mix weighted.
-template <class Blend>
-SCOLOPAX_HD Part partAmong(const ChannelView& channel, int n, const float* position,
-                           const Largests& largests) {
-  Part part;
-  const float share = 1.0f / float(largests.places);
-  for (int i = 0; i < largests.places; ++i) {
-    if (!Blend::kMixes && largests.channel[i] != n) continue;
-    const float place = (float(i) + 0.5f) * share;
-    const Optical o = opticalOn(channel, position, place);
-    const float seen = o.opacity * share * (Blend::kMixes ? channel.weight : 1.0f);
-    part.opacity += seen;
-    part.emission += seen * o.color;
-    part.moment += seen * place;
-  }
-  return part;
-}
-
-/// What the channels of a walk's segment do on it. One channel alone needs no comparisons.
-template <class Blend>
-class SegmentParts {
- public:
-  /// `largests` is apart from the rest as SegmentRun is.
-  SCOLOPAX_HD SegmentParts(LargestsOf<Blend>& largests, const SceneView& scene, const SegmentWalk& walk)
-      : largests_(largests), scene_(scene), run_(walk.run()), k_(walk.k()) {
-    if constexpr (!Blend::kSums) {
-      compared_ = (run_.active[k_] & (run_.active[k_] - 1)) != 0;
-      if (compared_) findLargests(scene, run_, k_, largests_);
-    }
-  }
-
-  /// Calls visit(n, part) for every channel that is seen, and returns the mean extinction.
-  template <class Visit>
-  SCOLOPAX_HD float visit(Visit&& visit) const {
-    float extinction = 0.0f;
-    for (int n = 0; n < scene_.channelCount; ++n) {
-      if (!(run_.active[k_] >> n & 1)) continue;
-      const ChannelView& channel = scene_.channels[n];
-      const float* position = &run_.position[n][k_];
-      Part part;
-      if constexpr (!Blend::kSums) {
-        if (compared_) {
-          part = partAmong<Blend>(channel, n, position, largests_);
-          if (part.opacity > 0.0f) visit(n, part);
-          continue;
-        }
+      if (!(segment.channels >> n & 1)) continue;
+      const Mask here = on & segment.of(scene, n);
+      if (!any(here)) continue;
+      const ChannelView& channel = scene.channels[n];
+      const Optical<L> optical = opticalOn<kDetail, L>(channel, ends.from[n], ends.to[n], place, here);
+      const Mask larger = here & (optical.opacity > largest);
+      largest = select(larger, optical.opacity, largest);
+      if constexpr (kDetail >= Detail::emission) {
+        winner = select(larger, Int(n), winner);
+        seen.color = select(larger, optical.color, seen.color);
+        if (mixes)
+          add<kDetail, L>(optical.opacity * share * channel.weight, optical.color, place, here,
+                          &hidden.of[n]);
       }
-      part = partAlone(channel, position);
-      if (!(part.opacity > 0.0f)) continue;
-      extinction += part.opacity;
-      if constexpr (!Blend::kMixes)
-        visit(n, part);
-      else if (channel.weight > 0.0f)
-        visit(n, scaled(part, channel.weight));
     }
-    if constexpr (!Blend::kSums)
-      if (compared_) return meanOf(largests_);
-    return extinction;
+    sum = sum + largest;
+    if constexpr (kDetail >= Detail::emission)
+      for (int n = 0; n < scene.channelCount && !mixes; ++n) {
+        if (!(segment.channels >> n & 1)) continue;
+        const Mask wins = on & (winner == Int(n));
+        if (any(wins)) add<kDetail, L>(largest * share, seen.color, place, wins, &hidden.of[n]);
+      }
   }
-
- private:
-  LargestsOf<Blend>& largests_;
-  const SceneView& scene_;
-  const SegmentRun& run_;
-  int k_;
-  bool compared_ = false;
-};
+  return sum * share;
+}
+/// Calls visit(n, part of channel n) for all channels of the segment, and returns the mean extinction that is
+/// seen. One channel alone needs no comparisons.
+template <Detail kDetail, class L, class Blend, class Visit>
+SCOLOPAX_LANES typename L::Float visitParts(const SceneView& scene, const Blend& blend,
+                                            const Segment<L>& segment, const SegmentEnds<L>& ends,
+                                            [[maybe_unused]] Hidden<L, Blend::kSums>& hidden, Visit&& visit) {
+  using Float = typename L::Float;
+  Float extinction(0.0f);
+  if constexpr (Blend::kSums) {
+    for (int n = 0; n < scene.channelCount; ++n) {
+      if (!(segment.channels >> n & 1)) continue;
+      const PartOf<L> part =
+          partAlone<kDetail, L>(scene.channels[n], ends.from[n], ends.to[n], segment.of(scene, n));
+      extinction = extinction + part.opacity;
+      visit(n, part);
+    }
+    return extinction;
+  } else {
+    const typename L::Mask several = segment.several();
+    const bool some = any(several);
+    Float largest(0.0f);
+    if (some) largest = compare<kDetail, L>(scene, blend.mixes, segment, ends, several, hidden);
+    for (int n = 0; n < scene.channelCount; ++n) {
+      if (!(segment.channels >> n & 1)) continue;
+      PartOf<L> part = noPart<L>();
+      const typename L::Mask alone = without(segment.of(scene, n), several);
+      if (any(alone)) {
+        part = partAlone<kDetail, L>(scene.channels[n], ends.from[n], ends.to[n], alone);
+        extinction = extinction + part.opacity;
+        if (blend.mixes) part = scaled(part, Float(scene.channels[n].weight));
+      }
+      if (some && kDetail >= Detail::emission) part = sum(part, hidden.of[n]);
+      visit(n, part);
+    }
+    return select(several, largest, extinction);
+  }
+}
 
 }  // namespace scolopax::kernel

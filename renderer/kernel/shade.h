@@ -13,117 +13,155 @@ struct LightFeatures {
   static constexpr bool kAny = kShading || kShadows;
 };
 
-/// Direction from a point to a light, in voxel space, of length 1 in world units, and how far the light is.
-struct ToLight {
-  glm::vec3 direction;
-  float distance;
+/// Points of rays that light falls on.
+template <class L>
+struct LitPoint {
+  RayOf<L> ray;  ///< that ends here
+  typename L::Float t;
+  typename L::Vec point;
 };
 
+/// Direction from a point to a light, in voxel space, of length 1 in world units, and how far the light is.
+template <class L>
+struct ToLight {
+  typename L::Vec direction;
+  typename L::Float distance;
+};
+
+template <class L>
+SCOLOPAX_LANES typename L::Vec product(const glm::mat3& m, const typename L::Vec& v) {
+  using Vec = typename L::Vec;
+  return Vec(m[0]) * v[0] + Vec(m[1]) * v[1] + Vec(m[2]) * v[2];
+}
 /// v times the matrix that takes voxel space to the world in units of the smallest spacing.
-SCOLOPAX_HD inline glm::vec3 toWorld(const SceneView& scene, glm::vec3 v) { return scene.worldFromVoxel * v; }
-
-SCOLOPAX_HD inline float dot(glm::vec3 a, glm::vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-SCOLOPAX_HD inline glm::vec3 normalize(glm::vec3 v) {
-  const float lengthSquared = dot(v, v);
-  return lengthSquared > 0.0f ? v * (1.0f / squareRoot(lengthSquared)) : v;
+template <class L>
+SCOLOPAX_LANES typename L::Vec toWorld(const SceneView& scene, const typename L::Vec& v) {
+  return product<L>(scene.worldFromVoxel, v);
 }
 
-SCOLOPAX_HD inline float largestComponent(glm::vec3 v) {
-  return maximum(maximum(maximum(v.x, -v.x), maximum(v.y, -v.y)), maximum(v.z, -v.z));
+template <class Vec>
+SCOLOPAX_LANES auto largestComponent(const Vec& v) {
+  return maximum(maximum(maximum(v[0], -v[0]), maximum(v[1], -v[1])), maximum(v[2], -v[2]));
 }
 
-SCOLOPAX_HD inline ToLight toLight(const SceneView& scene, const LightView& light, const Ray& ray,
-                                   const Collision& hit) {
-  if (light.kind == LightKind::directional) return {light.vector, kInfinity};
-  if (light.kind == LightKind::headlight) return {-ray.direction, hit.place.t()};
-  const glm::vec3 way = light.vector - hit.point;
-  const float distance = squareRoot(dot(toWorld(scene, way), toWorld(scene, way))) * scene.smallestSpacing;
+template <class L>
+SCOLOPAX_LANES ToLight<L> toLight(const SceneView& scene, const LightView& light, const LitPoint<L>& hit) {
+  using Float = typename L::Float;
+  using Vec = typename L::Vec;
+  if (light.kind == LightKind::directional) return {Vec(light.vector), Float(kInfinity)};
+  if (light.kind == LightKind::headlight) return {-hit.ray.direction, hit.t};
+  const Vec way = Vec(light.vector) - hit.point, world = toWorld<L>(scene, way);
+  const Float distance = squareRoot(dot(world, world)) * scene.smallestSpacing;
   return {way * (1.0f / maximum(distance, kLeastNormal)), distance};
 }
 
 /// Gradient of one channel's stored values in world space, per smallest spacing: central differences of one
-/// voxel, one-sided at the border; zero where a value is not finite.
-SCOLOPAX_HD inline glm::vec3 gradientAt(const SceneView& scene, const ChannelView& channel, glm::vec3 point,
-                                        SampleCost* cost) {
-  glm::vec3 perVoxel(0.0f);
+/// voxel, one-sided at the border; zero where a value is not finite. Costs count for lanes in the mask.
+template <class L>
+SCOLOPAX_LANES typename L::Vec gradientAt(const SceneView& scene, const ChannelView& channel,
+                                          const typename L::Vec& point, typename L::Mask which,
+                                          CostOf<L>* cost) {
+  using Float = typename L::Float;
+  using Vec = typename L::Vec;
+  Vec perVoxel(0.0f);
   for (int axis = 0; axis < 3; ++axis) {
-    const float at = clamp(point[axis], 0.0f, float(scene.dims[axis] - 1));
-    glm::vec3 low = point, high = point;
+    if (scene.dims[axis] < 2) continue;
+    const float last = float(scene.dims[axis] - 1);
+    const Float at = clamp(point[axis], 0.0f, last);
+    Vec low = point, high = point;
     low[axis] = maximum(at - 1.0f, 0.0f);
-    high[axis] = minimum(at + 1.0f, float(scene.dims[axis] - 1));
-    if (!(low[axis] < high[axis])) continue;
-    cost->fetches += 2;
-    const float difference = sampleStored(channel, scene.dims, high) - sampleStored(channel, scene.dims, low);
+    high[axis] = minimum(at + 1.0f, last);
+    cost->fetches = cost->fetches + typename L::Word(onesOf(which)) * 2u;
+    const Float difference = sampleStored(channel, scene.dims, high) - sampleStored(channel, scene.dims, low);
     perVoxel[axis] = difference / (high[axis] - low[axis]);
   }
-  if (!isFinite(perVoxel.x) || !isFinite(perVoxel.y) || !isFinite(perVoxel.z)) return glm::vec3(0.0f);
-  return scene.gradientFromVoxel * perVoxel;
+  const auto finite = isFinite(perVoxel[0]) & isFinite(perVoxel[1]) & isFinite(perVoxel[2]);
+  return select(finite, product<L>(scene.gradientFromVoxel, perVoxel), Vec(0.0f));
 }
 
-/// Which lights reach a collision, as the sums that every channel's material needs.
+/// Which lights reach points, as the sums that every channel's material needs.
+template <class L>
 struct Visibility {
-  float lights[kMaxLights];  ///< in [0,1]
-  glm::vec3 share;           ///< sum I V / sum I, 1 where there is no light
+  typename L::Float lights[kMaxLights];  ///< in [0,1]
+  typename L::Vec share;                 ///< sum I V / sum I, 1 where there is no light
 };
 
-/// shadow(ray, part of it inside the box) estimates the ray's transmittance, in [0,1].
-template <class Features, class Shadow>
-SCOLOPAX_HD Visibility visibilityAt(const SceneView& scene, const Ray& ray, const Collision& hit,
-                                    Shadow&& shadow) {
-  Visibility visibility;
-  glm::vec3 all(0.0f), seen(0.0f);
+/// shadow(ray, part of it inside the box) estimates the ray's transmittance, in [0,1]; only of lanes in the
+/// mask.
+template <class Features, class L, class Shadow>
+SCOLOPAX_LANES Visibility<L> visibilityAt(const SceneView& scene, const LitPoint<L>& hit,
+                                          typename L::Mask which, Shadow&& shadow) {
+  using Float = typename L::Float;
+  using Vec = typename L::Vec;
+  Visibility<L> visibility;
+  visibility.share = Vec(1.0f);
+  glm::vec3 all(0.0f);
+  Vec seen(0.0f);
   for (int i = 0; i < scene.lightCount; ++i) {
-    visibility.lights[i] = 1.0f;
+    visibility.lights[i] = Float(1.0f);
     if constexpr (Features::kShadows) {
-      const ToLight way = toLight(scene, scene.lights[i], ray, hit);
-      const Ray shadowRay{hit.point, way.direction};
-      Interval inside = clipToBox(shadowRay, scene.dims);
-      inside.exit = minimum(inside.exit, way.distance);
-      if (inside.enter < inside.exit) visibility.lights[i] = shadow(shadowRay, inside);
+      const ToLight<L> way = toLight(scene, scene.lights[i], hit);
+      const RayOf<L> shadowRay{hit.point, way.direction};
+      IntervalOf<L> inside = clipToBox(shadowRay, scene.dims);
+      inside.exit = where(which, minimum(inside.exit, way.distance));
+      const auto meets = inside.enter < inside.exit;
+      if (any(meets)) visibility.lights[i] = select(meets, shadow(shadowRay, inside), Float(1.0f));
       all += scene.lights[i].intensity;
-      seen += scene.lights[i].intensity * visibility.lights[i];
+      seen = seen + Vec(scene.lights[i].intensity) * visibility.lights[i];
     }
   }
-  for (int c = 0; c < 3; ++c) visibility.share[c] = all[c] > 0.0f ? seen[c] / all[c] : 1.0f;
+  for (int c = 0; c < 3; ++c)
+    if (all[c] > 0.0f) visibility.share[c] = seen[c] / all[c];
   return visibility;
 }
 
 /// L = c [(1-s) A + s (ka + kd sum I V max(n.l, 0))] + s ks sum I V max(n.h, 0)^p, faded by the gradient's
 /// magnitude g with s = 1 - (1-g)^2 (Kniss et al. 2002, 6.3); A dims unshaded matter in shadow.
-template <class Features>
-SCOLOPAX_HD glm::vec3 lit(const SceneView& scene, const ChannelView& channel, glm::vec3 color, const Ray& ray,
-                          const Collision& hit, const Visibility& visibility, SampleCost* cost) {
+template <class Features, class L>
+SCOLOPAX_LANES typename L::Vec lit(const SceneView& scene, const ChannelView& channel,
+                                   const typename L::Vec& color, const LitPoint<L>& hit,
+                                   const Visibility<L>& visibility, typename L::Mask which, CostOf<L>* cost) {
+  using Float = typename L::Float;
+  using Mask = typename L::Mask;
+  using Vec = typename L::Vec;
   const MaterialView& material = channel.material;
-  glm::vec3 ambient(1.0f);
-  if constexpr (Features::kShadows) ambient = material.ambient + (1.0f - material.ambient) * visibility.share;
-  if constexpr (!Features::kShading) return color * ambient;
+  Vec ambient(1.0f);
+  if constexpr (Features::kShadows)
+    ambient = Vec(material.ambient) + (1.0f - material.ambient) * visibility.share;
+  const Vec unshaded = color * ambient;
+  if constexpr (!Features::kShading) return unshaded;
 
   // In units of its largest component: stored values may be as large or small as floats can, and their
   // squares are not.
-  const glm::vec3 gradient = gradientAt(scene, channel, hit.point, cost);
-  const float largest = largestComponent(gradient);
-  if (!(largest > 0.0f)) return color * ambient;
-  const glm::vec3 scaled(gradient.x / largest, gradient.y / largest, gradient.z / largest);
-  const float length = squareRoot(dot(scaled, scaled));
-  const float g = minimum(1.0f, largest * channel.inverseRange * length);
-  const float s = 1.0f - (1.0f - g) * (1.0f - g);
-  if (!(s > 0.0f)) return color * ambient;
-  const glm::vec3 toViewer = normalize(-toWorld(scene, ray.direction));
-  glm::vec3 normal = scaled * (1.0f / length);
-  if (dot(normal, toViewer) < 0.0f) normal = -normal;
-  glm::vec3 diffuse(0.0f), specular(0.0f);
+  const Vec gradient = gradientAt<L>(scene, channel, hit.point, which, cost);
+  const Float largest = largestComponent(gradient);
+  Mask shaded = which & (largest > 0.0f);
+  if (!any(shaded)) return unshaded;
+  const Vec scaled(gradient[0] / largest, gradient[1] / largest, gradient[2] / largest);
+  const Float length = squareRoot(dot(scaled, scaled));
+  const Float g = minimum(1.0f, largest * channel.inverseRange * length);
+  const Float s = 1.0f - (1.0f - g) * (1.0f - g);
+  shaded = shaded & (s > 0.0f);
+  if (!any(shaded)) return unshaded;
+  const Vec toViewer = normalize(-toWorld<L>(scene, hit.ray.direction));
+  Vec normal = scaled * (1.0f / length);
+  normal = select(dot(normal, toViewer) < 0.0f, -normal, normal);
+  Vec diffuse(0.0f), specular(0.0f);
   for (int i = 0; i < scene.lightCount; ++i) {
     const LightView& light = scene.lights[i];
-    const float seen = visibility.lights[i];
-    if (!(seen > 0.0f)) continue;
-    const glm::vec3 l = normalize(toWorld(scene, toLight(scene, light, ray, hit).direction));
-    const glm::vec3 h = normalize(l + toViewer);
-    diffuse += light.intensity * seen * maximum(dot(normal, l), 0.0f);
-    const float highlight = maximum(dot(normal, h), 0.0f);
-    specular += light.intensity * seen * power(highlight, material.shininess);
+    const Mask seen = visibility.lights[i] > 0.0f;
+    if (!any(seen & shaded)) continue;
+    const Vec l = normalize(toWorld<L>(scene, toLight(scene, light, hit).direction));
+    const Vec h = normalize(l + toViewer);
+    const Vec arriving = Vec(light.intensity) * visibility.lights[i];
+    const Float highlight = power(maximum(dot(normal, h), 0.0f), Float(material.shininess));
+    diffuse = select(seen, diffuse + arriving * maximum(dot(normal, l), 0.0f), diffuse);
+    specular = select(seen, specular + arriving * highlight, specular);
   }
-  return color * ((1.0f - s) * ambient + s * (material.ambient + material.diffuse * diffuse)) +
-         s * material.specular * specular;
+  const Vec light =
+      color * ((1.0f - s) * ambient + s * (Vec(material.ambient) + material.diffuse * diffuse)) +
+      s * material.specular * specular;
+  return select(shaded, light, unshaded);
 }
 
 }  // namespace scolopax::kernel

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light of a marched ray. What the ray absorbs of its light is divided into equal strata; each is lit at one
+// Light of marched rays. What a ray absorbs of its light is divided into equal strata; each is lit at one
 // place, where visibility and the shading of every channel are taken together. raymarch has 64 strata,
 // hybrid 8.
 #pragma once
+#include "renderer/kernel/rng.h"
 #include "renderer/kernel/segment_parts.h"
 #include "renderer/kernel/shade.h"
 
@@ -13,44 +14,73 @@ inline constexpr float kOpaqueDepth = 9.21034f;
 /// Step of shadow rays, in steps: what they find is one factor of the light, and varies less.
 inline constexpr float kShadowSteps = 2.0f;
 
-/// Transmittance of a shadow ray; `only` >= 0: of one channel.
-template <class Blend>
-SCOLOPAX_HD float marchTransmittance(const SceneView& scene, const Ray& ray, Interval inside, int only,
-                                     float offset, SampleCost* cost) {
-  float depth = 0.0f;
-  SegmentRun run;
-  LargestsOf<Blend> largests;
-  SegmentWalk walk(run, scene, ray, inside, only, offset, kShadowSteps * scene.step, cost);
-  while (depth < kOpaqueDepth && walk.next())
-    depth += SegmentParts<Blend>(largests, scene, walk).visit([](int, const Part&) {}) * walk.length();
+/// Transmittance of shadow rays, of channels by their bits.
+template <class L, class Blend>
+SCOLOPAX_LANES typename L::Float marchTransmittance(const SceneView& scene, const Blend& blend,
+                                                    const RayOf<L>& ray, const IntervalOf<L>& inside,
+                                                    std::uint32_t channels, typename L::Float offset,
+                                                    CostOf<L>* cost) {
+  SegmentEnds<L> ends;
+  Hidden<L, Blend::kSums> hidden;
+  Segments<L> along(ends, scene, ray, inside, channels, offset, kShadowSteps * scene.step, cost);
+  Segment<L> segment;
+  typename L::Float depth(0.0f);
+  for (bool more = true; more && along.next(segment); more = along.keep(depth < kOpaqueDepth))
+    depth = depth + visitParts<Detail::extinction>(scene, blend, segment, ends, hidden,
+                                                   [](int, const PartOf<L>&) SCOLOPAX_LANES_LAMBDA {}) *
+                        segment.length();
   return 1.0f - absorbed(depth);
 }
 
-SCOLOPAX_HD inline Collision collisionAt(const SceneView& scene, const Ray& ray, float t, int channel) {
-  glm::vec3 point = ray.origin + t * ray.direction;
-  for (int axis = 0; axis < 3; ++axis)  // rounding may have left the box, and a ray from there sees nothing
-    point[axis] = clamp(point[axis], -0.5f, float(scene.dims[axis]) - 0.5f);
-  return {{t, 0.0f}, point, channel, 0.0f};
-}
-
-/// A segment as light sees it.
-struct AbsorbingSegment {
-  float start, length, extinction;
-};
-
 /// Mean place, in [0,1], of what a segment absorbs. `centre` is that of its extinction; the thicker the
 /// segment the further in front: in equal matter the mean is 1 / depth - 1 / (exp(depth) - 1).
-SCOLOPAX_HD inline float placeOfAbsorption(float depth, float centre) {
-  if (depth < 0.25f) return centre * (1.0f - depth * 0.166666667f);
-  const float alpha = absorbed(depth);
-  return centre * (2.0f / depth - 2.0f * (1.0f - alpha) / alpha);
+template <class Float>
+SCOLOPAX_LANES Float placeOfAbsorption(Float depth, Float centre) {
+  const auto thick = depth >= 0.25f;
+  const Float thin = centre * (1.0f - depth * 0.166666667f);
+  if (!any(thick)) return thin;
+  const Float alpha = absorbed(depth);
+  return select(thick, centre * (2.0f / depth - 2.0f * (1.0f - alpha) / alpha), thin);
 }
 
-/// The channels at the place where a stratum will be lit; apart from the rest as SegmentRun is.
-struct StratumChannels {
-  float share[kMaxVisibleChannels];  ///< of the extinction
-  glm::vec3 color[kMaxVisibleChannels];
+/// Places of rays where strata are lit, and the channels there.
+template <class L>
+struct StratumPlaces {
+  using Float = typename L::Float;
+  Float mass;                        ///< of the stratum: what it absorbs of the ray's light
+  typename L::Vec emission;          ///< of the whole stratum, without lights
+  Float t, offset;                   ///< the place, world units along the ray; the jitter of its shadow rays
+  typename L::Word kept;             ///< bit n: channel n is there
+  typename L::Vec radiance;          ///< of a unit of absorbed light there, without lights
+  Float share[kMaxVisibleChannels];  ///< of the extinction
+  typename L::Vec color[kMaxVisibleChannels];
 };
+
+/// Light of a unit of absorbed light at such places, for lanes in the mask.
+template <class Features, class L, class Blend>
+SCOLOPAX_LANES typename L::Vec lightOf(const SceneView& scene, const Blend& blend, const RayOf<L>& ray,
+                                       std::uint32_t channels, const StratumPlaces<L>& places,
+                                       typename L::Mask which, CostOf<L>* cost) {
+  using Word = typename L::Word;
+  using Vec = typename L::Vec;
+  LitPoint<L> hit{ray, places.t, ray.origin + places.t * ray.direction};
+  for (int axis = 0; axis < 3; ++axis)  // rounding may have left the box, and a ray from there sees nothing
+    hit.point[axis] = clamp(hit.point[axis], -0.5f, float(scene.dims[axis]) - 0.5f);
+  const Visibility<L> visibility = visibilityAt<Features>(
+      scene, hit, which, [&](const RayOf<L>& shadow, const IntervalOf<L>& part) SCOLOPAX_LANES_LAMBDA {
+        return marchTransmittance<L>(scene, blend, shadow, part, channels, places.offset, cost);
+      });
+  Vec sum(0.0f);
+  for (int n = 0; n < scene.channelCount; ++n) {
+    const Word bit(1u << n);
+    const typename L::Mask here = which & ((places.kept & bit) == bit);
+    if (!any(here)) continue;
+    const Vec light = places.share[n] *
+                      lit<Features>(scene, scene.channels[n], places.color[n], hit, visibility, here, cost);
+    sum = select(here, sum + light, sum);
+  }
+  return sum;
+}
 
 /// A stratum once its place is lit.
 struct LitStratum {
@@ -100,110 +130,226 @@ class StrataSum {
 /// question. So the places of stratum j are the records u1, u1 u2, u1 u2 u3, ... of a unit interval, u
 /// uniform: the largest that is at most m is uniform in [0, m), whatever m is (the records of a Poisson
 /// process are scale-free). As absorption passes a record, the place moves on to it.
-template <class Blend, class Features>
+///
+/// One ray's strata are lit as they end; those of many wait until there are as many as lanes.
+template <class Features, class L, class Blend>
 class Strata {
  public:
-  SCOLOPAX_HD Strata(StratumChannels& channels, const SceneView& scene, const Ray& ray, int only,
-                     const Sampler& sampler, SampleCost* cost)
-      : channels_(channels), scene_(scene), ray_(ray), only_(only), sampler_(sampler), cost_(cost) {}
+  using Float = typename L::Float;
+  using Int = typename L::Int;
+  using Word = typename L::Word;
+  using Mask = typename L::Mask;
+  using Vec = typename L::Vec;
+  /// What variables index: apart from the rest, as SegmentEnds is.
+  struct Memory {
+    PartOf<L> parts[kMaxVisibleChannels];  ///< of the segment
+    StratumPlaces<L> places;
+    struct Waiting {
+      StratumPlaces<L> places;
+      Int ray;
+      StrataSum sums[L::kLanes];  ///< of rays, as what follows
+      glm::vec3 color[L::kLanes];
+    };
+    struct Nothing {};
+    std::conditional_t<L::kLanes == 1, Nothing, Waiting> waiting;
+  };
 
-  /// Takes a segment that absorbs [before, after) of the ray's light and without lights would send out
-  /// `emission` of it; `last` if the ray ends with it. Adds the light of the strata that are complete to
-  /// `color`.
-  SCOLOPAX_HD void absorb(float before, float after, bool last, const AbsorbingSegment& segment,
-                          const SegmentParts<Blend>& parts, glm::vec3 emission, glm::vec3& color) {
-    const float mass = after - begin_;
-    if (after > before) {
-      emission_ += emission;
-      if (next_ == 0.0f) draw();
+  /// Of channels by their bits, with random numbers number `set` of those of the sampler.
+  SCOLOPAX_LANES Strata(Memory& memory, const SceneView& scene, const Blend& blend, const RayOf<L>& ray,
+                        std::uint32_t channels, int set, const SamplerOf<L>& sampler, CostOf<L>* cost)
+      : memory_(memory),
+        scene_(scene),
+        blend_(blend),
+        ray_(ray),
+        channels_(channels),
+        perLight_(1.0f / scene.stratum),
+        firstBlock_(std::uint32_t(set) * (std::uint32_t(perLight_) + 1)),
+        sampler_(sampler),
+        cost_(cost) {
+    if constexpr (L::kLanes > 1)
+      for (int i = 0; i < L::kLanes; ++i) {
+        memory.waiting.sums[i] = {};
+        memory.waiting.color[i] = glm::vec3(0.0f);
+      }
+  }
+
+  /// Takes a segment that absorbs [before, after) of the rays' light and without lights would send out
+  /// `emission` of it, with its parts in memory, whose extinctions add up to `extinction`; `last` if the rays
+  /// end with it. Adds light to `color`: of strata that are complete, and by the last of all.
+  SCOLOPAX_LANES void absorb(Float before, Float after, bool last, const Segment<L>& segment,
+                             Float extinction, const Vec& emission, Vec& color) {
+    const Mask on = after > before;
+    const Float mass = after - begin_;
+    if (any(on)) {
+      emission_ = select(on, emission_ + emission, emission_);
+      const Mask fresh = on & (next_ == 0.0f);
+      if (any(fresh)) draw(fresh);
       // Records lie below the ends of strata; the part of a segment beyond is drawn apart.
-      const float place = mass > scene_.stratum ? shared_ * mass : mass < next_ ? -1.0f : largestRecord(mass);
-      if (place >= before - begin_) keep(segment, parts);
+      const Mask beyond = on & (mass > scene_.stratum), moves = without(on, beyond | (mass < next_));
+      Float place = select(beyond, shared_ * mass, Float(-1.0f));
+      if (any(moves)) place = select(moves, largestRecord(mass, moves), place);
+      const Mask here = on & (place >= before - begin_);
+      if (any(here)) keep(here, segment, extinction);
     }
-    const int reached = int(after / scene_.stratum);
-    if (reached > index_ || last) {
-      if (mass > 0.0f) sum_.add({light(), radiance_, emission_, mass}, color);
-      index_ = reached;
-      begin_ = after;
-      next_ = 0.0f;
-      emission_ = glm::vec3(0.0f);
+    const Int reached = truncated(after * perLight_);
+    const Mask done = last ? L::everywhere() : on & (reached > index_);
+    if (any(done)) {
+      light(done & (mass > 0.0f), mass, color);
+      index_ = select(done, reached, index_);
+      begin_ = select(done, after, begin_);
+      next_ = select(done, Float(0.0f), next_);
+      emission_ = select(done, Vec(0.0f), emission_);
     }
-    if (last) sum_.finish(color);
+    if (last) finish(color);
   }
 
  private:
-  SCOLOPAX_HD void draw() {
-    const std::uint32_t strata = std::uint32_t(1.0f / scene_.stratum) + 1;
-    const RandomBlock random =
-        sampler_.at(std::uint32_t(only_ < 0 ? 0 : only_) * strata + std::uint32_t(index_));
-    ++cost_->randomBlocks;
-    first_ = uniformOf(random.x) * scene_.stratum;
-    chain_ = random.y;
-    offset_ = uniformOf(random.z);
-    shared_ = uniformOf(hashOf(random.z));
+  SCOLOPAX_LANES void draw(Mask which) {
+    const auto random = sampler_.at(Word(firstBlock_) + Word(index_), which);
+    cost_->randomBlocks = cost_->randomBlocks + Word(onesOf(which));
+    first_ = select(which, uniformOf(random.x) * scene_.stratum, first_);
+    chain_ = select(which, random.y, chain_);
+    offset_ = select(which, uniformOf(random.z), offset_);
+    shared_ = select(which, uniformOf(hashOf(random.z)), shared_);
   }
 
   /// Of the stratum's, at most `mass`; the one above it is the next.
-  SCOLOPAX_HD float largestRecord(float mass) {
-    float record = first_;
-    std::uint32_t chain = chain_;
-    next_ = kInfinity;
-    while (record > mass) {
-      next_ = record;
-      record *= uniformOf(chain);
-      chain = hashOf(chain + 0x9e3779b9u);
+  SCOLOPAX_LANES Float largestRecord(Float mass, Mask which) {
+    Float record = first_, next(kInfinity);
+    Word chain = chain_;
+    for (;;) {
+      const Mask above = which & (record > mass);
+      if (!any(above)) break;
+      next = select(above, record, next);
+      record = select(above, record * uniformOf(chain), record);
+      chain = select(above, hashOf(chain + 0x9e3779b9u), chain);
     }
+    next_ = select(which, next, next_);
     return record;
   }
 
-  SCOLOPAX_HD void keep(const AbsorbingSegment& segment, const SegmentParts<Blend>& parts) {
-    float opacity = 0.0f, moment = 0.0f;
-    kept_ = 0;
-    radiance_ = glm::vec3(0.0f);
-    parts.visit([&](int n, const Part& own) {
-      opacity += own.opacity;
-      moment += own.moment;
-      if (!(own.opacity > kLeastNormal)) return;  // its colour would not be a number
-      kept_ |= 1u << n;
-      channels_.share[n] = own.opacity / segment.extinction;
-      channels_.color[n] = own.emission * (1.0f / own.opacity);
-      radiance_ += channels_.share[n] * channels_.color[n];
-    });
-    place_ = segment.start + segment.length * placeOfAbsorption(segment.extinction * segment.length,
-                                                                minimum(moment / opacity, 1.0f));
+  SCOLOPAX_LANES void keep(Mask which, const Segment<L>& segment, Float extinction) {
+    StratumPlaces<L>& places = memory_.places;
+    Float opacity(0.0f), moment(0.0f);
+    kept_ = select(which, Word(0u), kept_);
+    radiance_ = select(which, Vec(0.0f), radiance_);
+    for (int n = 0; n < scene_.channelCount; ++n) {
+      if (!(segment.channels >> n & 1)) continue;
+      const PartOf<L>& own = memory_.parts[n];
+      opacity = opacity + own.opacity;
+      moment = moment + own.moment;
+      const Mask seen = which & (own.opacity > kLeastNormal);  // else its colour would not be a number
+      if (!any(seen)) continue;
+      kept_ = kept_ | where(seen, Word(1u << n));
+      places.share[n] = select(seen, own.opacity / extinction, places.share[n]);
+      places.color[n] = select(seen, own.emission * (1.0f / own.opacity), places.color[n]);
+      radiance_ = select(seen, radiance_ + places.color[n] * places.share[n], radiance_);
+    }
+    const Float length = segment.length();
+    const Float place =
+        segment.start + length * placeOfAbsorption(extinction * length, minimum(moment / opacity, 1.0f));
+    place_ = select(which, place, place_);
   }
 
-  /// Of a unit of absorbed light at the place that is kept.
-  SCOLOPAX_HD glm::vec3 light() {
-    const Collision hit = collisionAt(scene_, ray_, place_, 0);
-    const Visibility visibility =
-        visibilityAt<Features>(scene_, ray_, hit, [&](const Ray& shadow, Interval part) {
-          return marchTransmittance<Blend>(scene_, shadow, part, only_, offset_, cost_);
-        });
-    glm::vec3 color(0.0f);
-    for (int n = 0; n < scene_.channelCount; ++n)
-      if (kept_ >> n & 1)
-        color += channels_.share[n] *
-                 lit<Features>(scene_, scene_.channels[n], channels_.color[n], ray_, hit, visibility, cost_);
-    return color;
+  /// Lights these, or has them wait for it.
+  SCOLOPAX_LANES void light(Mask which, Float mass, Vec& color) {
+    StratumPlaces<L>& places = memory_.places;
+    places.mass = mass;
+    places.t = place_;
+    places.offset = offset_;
+    places.kept = kept_;
+    places.radiance = radiance_;
+    places.emission = emission_;
+    if constexpr (L::kLanes == 1) {
+      if (which)
+        sum_.add({lightOf<Features, L>(scene_, blend_, ray_, channels_, places, which, cost_), radiance_,
+                  emission_, mass},
+                 color);
+    } else {
+      for (unsigned left = bitsOf(which); left != 0; left &= left - 1) {
+        if (count_ == L::kLanes) shine();
+        const int i = std::countr_zero(left), slot = count_++;
+        StratumPlaces<L>& waiting = memory_.waiting.places;
+        put(i, slot, &memory_.waiting.ray);
+        put(at(mass, i), slot, &waiting.mass);
+        put(at(place_, i), slot, &waiting.t);
+        put(at(offset_, i), slot, &waiting.offset);
+        const std::int32_t kept = at(kept_, i);
+        put(kept, slot, &waiting.kept);
+        for (int c = 0; c < 3; ++c) {
+          put(at(radiance_[c], i), slot, &waiting.radiance[c]);
+          put(at(emission_[c], i), slot, &waiting.emission[c]);
+        }
+        for (std::uint32_t bits = std::uint32_t(kept); bits != 0; bits &= bits - 1) {
+          const int n = std::countr_zero(bits);
+          put(at(places.share[n], i), slot, &waiting.share[n]);
+          for (int c = 0; c < 3; ++c) put(at(places.color[n][c], i), slot, &waiting.color[n][c]);
+        }
+      }
+    }
   }
 
-  StratumChannels& channels_;
+  /// Lights what waits, in the order in which it came.
+  SCOLOPAX_LANES_APART void shine() {
+    auto& waiting = memory_.waiting;
+    const Int ray = waiting.ray;
+    RayOf<L> rays;
+    for (int axis = 0; axis < 3; ++axis) {
+      rays.origin[axis] = permuted(ray_.origin[axis], ray);
+      rays.direction[axis] = permuted(ray_.direction[axis], ray);
+    }
+    CostOf<L> spent{};
+    const Vec sum = lightOf<Features, L>(scene_, blend_, rays, channels_, waiting.places,
+                                         Int(count_) > L::laneNumbers(), &spent);
+    for (int i = 0; i < count_; ++i) {
+      const int to = at(ray, i);
+      const Mask lane = L::laneNumbers() == Int(to);
+      const auto of = [i](const Vec& v)
+                          SCOLOPAX_LANES_LAMBDA { return glm::vec3(at(v[0], i), at(v[1], i), at(v[2], i)); };
+      waiting.sums[to].add(
+          {of(sum), of(waiting.places.radiance), of(waiting.places.emission), at(waiting.places.mass, i)},
+          waiting.color[to]);
+      cost_->fetches = cost_->fetches + where(lane, Int(at(spent.fetches, i)));
+      cost_->cellSteps = cost_->cellSteps + where(lane, Int(at(spent.cellSteps, i)));
+      cost_->truncated = cost_->truncated + where(lane, Int(at(spent.truncated, i)));
+    }
+    count_ = 0;
+  }
+
+  /// All that is lit, and what has waited for more.
+  SCOLOPAX_LANES void finish(Vec& color) {
+    if constexpr (L::kLanes == 1) {
+      sum_.finish(color);
+    } else {
+      if (count_ > 0) shine();
+      for (int i = 0; i < L::kLanes; ++i) {
+        glm::vec3& own = memory_.waiting.color[i];
+        memory_.waiting.sums[i].finish(own);
+        for (int c = 0; c < 3; ++c) put(own[c], i, &color[c]);
+      }
+    }
+  }
+
+  Memory& memory_;
   const SceneView& scene_;
-  const Ray& ray_;
-  int only_;
-  const Sampler& sampler_;
-  SampleCost* cost_;
-  int index_ = 0;
-  float begin_ = 0.0f;  // of the stratum, in absorbed light
-  float next_ = 0.0f;   // record at which its place moves on; 0: none has been drawn
-  float first_ = 0.0f, offset_ = 0.0f, shared_ = 0.0f;
-  std::uint32_t chain_ = 0;
-  float place_ = 0.0f;  // world units along the ray
-  std::uint32_t kept_ = 0;
-  glm::vec3 radiance_{0.0f};  // there, without lights
-  glm::vec3 emission_{0.0f};  // of all of the stratum, without lights
-  StrataSum sum_;
+  const Blend& blend_;
+  const RayOf<L>& ray_;
+  std::uint32_t channels_;
+  float perLight_;  // a power of two
+  std::uint32_t firstBlock_;
+  const SamplerOf<L>& sampler_;
+  CostOf<L>* cost_;
+  Int index_{0};
+  Float begin_{0.0f};  // of the stratum, in absorbed light
+  Float next_{0.0f};   // record at which its place moves on; 0: none has been drawn
+  Float first_{0.0f}, offset_{0.0f}, shared_{0.0f};
+  Word chain_{0u};
+  Float place_{0.0f};  // world units along the ray
+  Word kept_{0u};
+  Vec radiance_{0.0f};  // there, without lights
+  Vec emission_{0.0f};  // of all of the stratum, without lights
+  std::conditional_t<L::kLanes == 1, StrataSum, typename Memory::Nothing> sum_;
+  int count_ = 0;  // that wait
 };
 
 }  // namespace scolopax::kernel

@@ -30,6 +30,7 @@ struct OpticalKnot {
   float opacity;
   glm::vec3 color;  ///< linear RGB
 };
+inline constexpr int kKnotFloats = sizeof(OpticalKnot) / sizeof(float);
 
 /// Both curves of a channel on the knots of both; the first knot is at 0 and the last at 1.
 struct OpticalCurveView {
@@ -72,17 +73,6 @@ struct ChannelView {
   bool finite;         ///< all voxels are
 };
 
-/// Points of a ray, in voxel coordinates, that are sampled together.
-inline constexpr int kBatchPoints = 8;
-struct PointBatch {
-  float x[kBatchPoints], y[kBatchPoints], z[kBatchPoints];
-};
-struct SceneView;
-/// Puts the stored values of channels (bit n: channel n) at all points into values[n], as sampleStored gives
-/// them.
-using SampleBatch = void (*)(const SceneView&, std::uint32_t channels, const PointBatch&,
-                             float (*values)[kBatchPoints]);
-
 struct SceneView {
   CameraRays rays;
   int width, height;
@@ -99,21 +89,22 @@ struct SceneView {
   glm::mat3 worldFromVoxel;  ///< linear part, in units of the smallest spacing: lengths near 1 at any scale
   glm::mat3 gradientFromVoxel;  ///< its inverse transpose
   float smallestSpacing;        ///< world units
-  SampleBatch sampleBatch;      ///< the launcher's own, for its processor; null: the kernels'
 };
 
-/// What a sample cost, for tests, benchmarks and the cost heat map.
-struct SampleCost {
-  std::uint32_t fetches = 0;
-  std::uint32_t cellSteps = 0;
-  std::uint32_t randomBlocks = 0;
-  std::uint32_t truncated = 0;
+/// What the samples of all lanes cost, for tests, benchmarks and the cost heat map.
+template <class L>
+struct CostOf {
+  using Word = typename L::Word;
+  Word fetches{0u}, cellSteps{0u}, randomBlocks{0u}, truncated{0u};
 };
+using SampleCost = CostOf<One>;
 
-/// What a sample's ray meets first, for pictures of depth and channels.
-struct FirstCollision {
-  float depth = 0.0f;  ///< world units; integrators give it along the ray, passes along the view direction
-  int channel = -1;    ///< among the visible channels; -1: nothing was met
+/// What every lane's ray meets first, for pictures of depth and channels.
+template <class L>
+struct FirstCollisionOf {
+  typename L::Float depth{0.0f};  ///< world units; integrators give it along the ray, passes along the view
+  typename L::Int channel{-1};    ///< among the visible channels; -1: nothing was met
 };
+using FirstCollision = FirstCollisionOf<One>;
 
 }  // namespace scolopax::kernel

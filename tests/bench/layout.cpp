@@ -14,9 +14,9 @@
 #include <string>
 #include <vector>
 
-#include "renderer/cpu/sample_batch.h"
 #include "renderer/data/volume.h"
 #include "renderer/kernel/sample_volume.h"
+#include "tests/support/sample_lanes.h"
 
 namespace {
 
@@ -148,7 +148,7 @@ void measure(const char* type, ScalarType scalar, int channels, bool json) {
   scene.dims = dims;
   scene.channels = views.data();
   scene.channelCount = channels;
-  const kernel::SampleBatch batch = sampleBatchFor(fastestInstructionSet());
+  const test::SampleLanes together8 = test::avx2LaneSampler().sample;
   for (const auto& [name, direction] :
        {std::pair{"x", glm::vec3(1, 0.02f, 0.01f)}, std::pair{"z", glm::vec3(0.01f, 0.02f, 1)},
         std::pair{"oblique", glm::vec3(1, 0.8f, 1.2f)}}) {
@@ -160,15 +160,12 @@ void measure(const char* type, ScalarType scalar, int channels, bool json) {
                                        return sum;
                                      }));
     const double together = nsPerPoint(lines, [&](const Line& line, int k) {
-      kernel::PointBatch points;
-      float values[kernel::kMaxVisibleChannels][kPoints], sum = 0;
-      for (int i = 0; i < kPoints; ++i) {
-        const glm::vec3 p = at(line, k + i);
-        points.x[i] = p.x, points.y[i] = p.y, points.z[i] = p.z;
-      }
-      batch(scene, (1u << channels) - 1, points, values);
+      glm::vec3 points[kPoints];
+      float values[kernel::kMaxVisibleChannels][test::kMostLanes], sum = 0;
+      for (int i = 0; i < kPoints; ++i) points[i] = at(line, k + i);
+      together8(scene, (1u << channels) - 1, points, values);
       for (int n = 0; n < channels; ++n)
-        for (const float v : values[n]) sum += v;
+        for (int i = 0; i < kPoints; ++i) sum += values[n][i];
       return sum;
     });
     const double interleave = channels % 4 ? 0 : nsPerPoint(lines, perPoint([&](glm::vec3 p) {

@@ -90,12 +90,15 @@ struct LitAtPlacesApart {
     if (!hit) return glm::vec4(0);
     auto other = track(ray, inside);
     while (!other) other = track(ray, inside);
+    const auto place = [&](const kernel::Collision& of) {
+      return kernel::LitPoint<kernel::One>{ray, of.place.t(), of.point};
+    };
     const auto visibility = kernel::visibilityAt<Features>(
-        scene, ray, *other,
+        scene, place(*other), true,
         [&](const kernel::Ray& way, kernel::Interval part) { return track(way, part) ? 0.0f : 1.0f; });
     const kernel::ChannelView& channel = scene.channels[hit->channel];
     return glm::vec4(kernel::lit<Features>(scene, channel, kernel::evaluate(channel.color, hit->position),
-                                           ray, *hit, visibility, cost),
+                                           place(*hit), visibility, true, cost),
                      1);
   }
 };

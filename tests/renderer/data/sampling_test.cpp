@@ -124,7 +124,7 @@ TEST(Sampling, OfIndependentDrawsIsPlainCounting) {
   const kernel::SampleNumber number = sampleNumber(Sampling::independent, 70);
   Sampler sampler(11, number, 3);
   for (std::uint32_t block = 0; block < 5; ++block) {
-    const RandomBlock found = sampler.next(), expected = kernel::pcg4d(11, 70, block, 3);
+    const RandomBlock found = sampler.next(), expected = kernel::pcg4d(11u, 70u, block, 3u);
     EXPECT_EQ(found.x, expected.x);
     EXPECT_EQ(found.w, expected.w);
   }

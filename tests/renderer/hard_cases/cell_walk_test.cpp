@@ -14,7 +14,6 @@
 namespace scolopax::kernel {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kDenormal = std::numeric_limits<float>::denorm_min();
 constexpr float kLargest = std::numeric_limits<float>::max();
 
@@ -96,7 +95,7 @@ TEST(CellWalk, VisitsTheCellsOfARayWithoutGapsAndEndsWithIt) {
 TEST(CellWalk, CountsTheFacesOfTheBoxAsInsideAndNothingBeside) {
   const glm::ivec3 dims(6, 4, 9);
   const auto lengthAt = [&](glm::vec3 origin, glm::vec3 direction) {
-    const Interval inside = clipToBox({origin, direction}, dims);
+    const Interval inside = clipToBox<One>({origin, direction}, dims);
     return inside.enter < inside.exit ? inside.exit - inside.enter : 0.0f;
   };
   for (const float x : {-0.5f, 0.0f, 2.0f, 5.5f})

@@ -37,10 +37,10 @@ TEST(Math, OpticalDepthIsWithinTwoUlpOfMinusLogOneMinusU) {
 }
 
 TEST(Math, OpticalDepthIsFiniteAndPositiveAtBothEnds) {
-  EXPECT_GT(opticalDepth(uniformOf(0)), 0.0f);
+  EXPECT_GT(opticalDepth(uniformOf(0u)), 0.0f);
   EXPECT_NEAR(opticalDepth(uniformOf(0xffffffffu)), 24 * std::log(2.0), 1e-5);
   EXPECT_LT(uniformOf(0xffffffffu), 1.0f);
-  EXPECT_GT(uniformOf(0), 0.0f);
+  EXPECT_GT(uniformOf(0u), 0.0f);
 }
 
 TEST(Math, OpticalDepthFollowsTheExponentialLawAtThinMedia) {
@@ -111,7 +111,7 @@ TEST(Rng, WordsAreUniformAndUncorrelatedOverPixelsSamplesAndBlocks) {
       std::vector<int> counts(256);
       for (int i = 0; i < n; ++i) {
         const auto k = std::uint32_t(i);
-        const RandomBlock r = axis == 0 ? pcg4d(k, 0, 1, 0) : pcg4d(77, k >> 3, k & 7, 5);
+        const RandomBlock r = axis == 0 ? pcg4d(k, 0u, 1u, 0u) : pcg4d(77u, k >> 3, k & 7, 5u);
         const std::uint32_t w[4] = {r.x, r.y, r.z, r.w};
         ++counts[(w[kPairs[pair][0]] >> 28) * 16 + (w[kPairs[pair][1]] >> 28)];
       }

@@ -97,6 +97,11 @@ Made made(const Curves& curves) {
   return result;
 }
 
+kernel::PartOf<kernel::One> meansBetween(const kernel::OpticalCurveView& curve, float p, float q) {
+  return kernel::meansBetween<kernel::Detail::moment, kernel::One>(
+      curve, kernel::pointOn<kernel::One>(curve, p), kernel::pointOn<kernel::One>(curve, q), true);
+}
+
 TEST(OpticalCurve, HasTheMeansOfBothCurvesOverAnyStretch) {
   std::mt19937 random(7);
   for (int round = 0; round < 300; ++round) {
@@ -109,7 +114,7 @@ TEST(OpticalCurve, HasTheMeansOfBothCurvesOverAnyStretch) {
       };
       const float p = float(place()), q = float(place());
       if (p == q) continue;
-      const kernel::StretchMeans found = kernel::meansBetween(curve.view, p, q);
+      const kernel::PartOf<kernel::One> found = meansBetween(curve.view, p, q);
       const Means expected = meansOf(curves, p, q);
       ASSERT_NEAR(double(found.opacity), expected.opacity, 2e-5) << p << " to " << q;
       ASSERT_NEAR(double(found.moment), expected.moment, 2e-5) << p << " to " << q;
@@ -127,7 +132,7 @@ TEST(OpticalCurve, AtOnePositionIsBothCurves) {
     for (int i = 0; i < 40; ++i) {
       const float p = i % 2 ? float(random() % 1001) / 1000
                             : float(curves.opacity[i / 2 % curves.opacity.size()].position);
-      const kernel::StretchMeans found = kernel::meansBetween(curve.view, p, p);
+      const kernel::PartOf<kernel::One> found = meansBetween(curve.view, p, p);
       ASSERT_NEAR(double(found.opacity), curves.opacityAt(p), 1e-5) << p;
       for (int c = 0; c < 3; ++c)
         ASSERT_NEAR(double(found.emission[c]), curves.opacityAt(p) * curves.colorAt(p)[c], 1e-5) << p;
@@ -144,7 +149,9 @@ TEST(OpticalCurve, KnowsWhereItsOpacityBeginsAndEnds) {
     const Made curve = made(curves);
     for (int i = 0; i <= 1000; ++i) {
       const float p = float(i) / 1000;
-      const float opacity = kernel::opticalAt(curve.view, p).opacity;
+      const float opacity = kernel::opticalAt<kernel::Detail::extinction, kernel::One>(
+                                curve.view, kernel::pointOn<kernel::One>(curve.view, p), true)
+                                .opacity;
       if (p <= curve.view.first || p >= curve.view.last)
         ASSERT_EQ(opacity, 0.0f) << p;
       else

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sampling many points at once gives the bits of sampling them one by one, in every instruction set.
-#include "renderer/cpu/sample_batch.h"
+#include "tests/support/sample_lanes.h"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +8,7 @@
 #include <cstring>
 #include <random>
 
+#include "renderer/cpu/instruction_set.h"
 #include "renderer/data/volume.h"
 #include "renderer/kernel/sample_volume.h"
 #include "tests/support/volumes.h"
@@ -17,7 +18,7 @@ namespace {
 
 using namespace test;
 
-class SampleBatch : public testing::TestWithParam<InstructionSet> {
+class LaneSampling : public testing::TestWithParam<InstructionSet> {
  protected:
   void SetUp() override {
     if (!available(GetParam())) GTEST_SKIP() << "this processor does not have the instruction set";
@@ -62,12 +63,13 @@ struct Channels {
   }
 };
 
-TEST_P(SampleBatch, HasTheBitsOfSamplingOneChannelAtOnePointAfterTheOther) {
+TEST_P(LaneSampling, HasTheBitsOfSamplingOneChannelAtOnePointAfterTheOther) {
   constexpr ScalarType u8 = ScalarType::u8, u16 = ScalarType::u16, i16 = ScalarType::i16,
                        f32 = ScalarType::f32;
   std::mt19937 random(20);
   std::uniform_real_distribution<float> within(-1.5f, 1.5f);
-  const kernel::SampleBatch sample = sampleBatchFor(GetParam());
+  const test::LaneSampler sampler =
+      GetParam() == InstructionSet::avx2 ? avx2LaneSampler() : avx512LaneSampler();
   int compared = 0, finite = 0;
   for (const glm::ivec3 dims :
        {glm::ivec3(1, 1, 1), glm::ivec3(2, 2, 2), glm::ivec3(1, 9, 5), glm::ivec3(7, 1, 5),
@@ -80,29 +82,28 @@ TEST_P(SampleBatch, HasTheBitsOfSamplingOneChannelAtOnePointAfterTheOther) {
       const std::uint32_t all = (1u << types.size()) - 1;
       for (int round = 0; round < 100; ++round) {
         // Along a ray, of which parts lie outside, on faces and on voxels; or anywhere, which costs nothing.
-        kernel::PointBatch points;
+        glm::vec3 points[kMostLanes];
         const glm::vec3 size(dims), origin = glm::vec3(within(random), within(random), within(random)) * size;
         const glm::vec3 step = glm::vec3(within(random), within(random), within(random)) * 0.6f;
-        for (int i = 0; i < kernel::kBatchPoints; ++i) {
+        for (int i = 0; i < sampler.lanes; ++i) {
           glm::vec3 p = origin + float(i) * step;
           if (round % 4 == 1) p = glm::round(p * 2.0f) * 0.5f;
           if (round % 4 == 2) p = glm::vec3(within(random), within(random), within(random)) * size;
           if (round % 4 == 3) p[round / 4 % 3] = i % 2 ? -0.0f : float(dims[round / 4 % 3] - 1);
-          points.x[i] = p.x, points.y[i] = p.y, points.z[i] = p.z;
+          points[i] = p;
         }
         const std::uint32_t channels = round % 3 ? all & std::uint32_t(random()) : all;
-        float values[kernel::kMaxVisibleChannels][kernel::kBatchPoints];
+        float values[kernel::kMaxVisibleChannels][kMostLanes];
         for (auto& row : values) std::fill(std::begin(row), std::end(row), -12345.0f);
-        sample(made.scene, channels, points, values);
+        sampler.sample(made.scene, channels, points, values);
         for (int n = 0; n < int(types.size()); ++n)
-          for (int i = 0; i < kernel::kBatchPoints; ++i) {
+          for (int i = 0; i < sampler.lanes; ++i) {
             const float found = values[n][i];
             if (!(channels >> n & 1)) {
               ASSERT_EQ(found, -12345.0f) << "nobody has asked";
               continue;
             }
-            const float expected = kernel::sampleStored(made.views[std::size_t(n)], dims,
-                                                        glm::vec3(points.x[i], points.y[i], points.z[i]));
+            const float expected = kernel::sampleStored(made.views[std::size_t(n)], dims, points[i]);
             ++compared;
             if (!std::isfinite(expected)) {  // a NaN is as good as another
               ASSERT_FALSE(std::isfinite(found));
@@ -110,15 +111,15 @@ TEST_P(SampleBatch, HasTheBitsOfSamplingOneChannelAtOnePointAfterTheOther) {
             }
             ++finite;
             ASSERT_EQ(std::memcmp(&found, &expected, sizeof expected), 0)
-                << found << " for " << expected << " of channel " << n << " at " << points.x[i] << ' '
-                << points.y[i] << ' ' << points.z[i] << " of " << dims.x << 'x' << dims.y << 'x' << dims.z;
+                << found << " for " << expected << " of channel " << n << " at " << points[i].x << ' '
+                << points[i].y << ' ' << points[i].z << " of " << dims.x << 'x' << dims.y << 'x' << dims.z;
           }
       }
     }
   EXPECT_GT(finite, compared * 3 / 4);
 }
 
-TEST_P(SampleBatch, ReachesVoxelsBeyondIndicesOf32Bits) {
+TEST_P(LaneSampling, ReachesVoxelsBeyondIndicesOf32Bits) {
   // 2^32 voxels, of which the memory that is touched is all that is taken.
   const glm::ivec3 dims(1 << 12, 1 << 12, (1 << 8) + 2);
   const std::size_t slice = std::size_t(dims.x) * std::size_t(dims.y);
@@ -136,25 +137,24 @@ TEST_P(SampleBatch, ReachesVoxelsBeyondIndicesOf32Bits) {
   scene.dims = dims;
   scene.channels = &channel;
   scene.channelCount = 1;
-  const kernel::SampleBatch sample = sampleBatchFor(GetParam());
+  const test::LaneSampler sampler =
+      GetParam() == InstructionSet::avx2 ? avx2LaneSampler() : avx512LaneSampler();
   for (const bool across : {false, true}) {
-    kernel::PointBatch points;
-    for (int i = 0; i < kernel::kBatchPoints; ++i) {
-      points.x[i] = float(i) * 0.5f;
-      points.y[i] = float(dims.y - 1) - 0.25f;
-      points.z[i] = across && i < 4 ? 0.0f : float(dims.z - 2) + 0.5f;
+    glm::vec3 points[kMostLanes];
+    for (int i = 0; i < sampler.lanes; ++i) {
+      points[i] = glm::vec3(float(i) * 0.4f, float(dims.y - 1) - 0.25f,
+                            across && i < 4 ? 0.0f : float(dims.z - 2) + 0.5f);
     }
-    float values[1][kernel::kBatchPoints];
-    sample(scene, 1, points, values);
-    for (int i = 0; i < kernel::kBatchPoints; ++i)
-      EXPECT_EQ(values[0][i],
-                kernel::sampleStored(channel, dims, glm::vec3(points.x[i], points.y[i], points.z[i])));
+    float values[1][kMostLanes];
+    sampler.sample(scene, 1, points, values);
+    for (int i = 0; i < sampler.lanes; ++i)
+      EXPECT_EQ(values[0][i], kernel::sampleStored(channel, dims, points[i]));
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Of, SampleBatch, testing::Values(InstructionSet::baseline, InstructionSet::avx2),
+INSTANTIATE_TEST_SUITE_P(Of, LaneSampling, testing::Values(InstructionSet::avx2, InstructionSet::avx512),
                          [](const auto& set) {
-                           return std::string(set.param == InstructionSet::avx2 ? "Avx2" : "Baseline");
+                           return std::string(set.param == InstructionSet::avx2 ? "Avx2" : "Avx512");
                          });
 
 }  // namespace

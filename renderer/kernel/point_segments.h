@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+// The segments of a ray a lane, in step with each other: what segments.h finds cell by cell for one ray.
+#pragma once
+#include <bit>
+#include <type_traits>
+
+#include "renderer/kernel/point_walk.h"
+#include "renderer/kernel/segments.h"
+
+namespace scolopax::kernel {
+
+template <class L>
+class PointSegments {
+ public:
+  using Float = typename L::Float;
+  using Int = typename L::Int;
+  using Word = typename L::Word;
+  using Mask = typename L::Mask;
+
+  SCOLOPAX_LANES PointSegments(SegmentEnds<L>& ends, const SceneView& scene, const RayOf<L>& rays,
+                               const IntervalOf<L>& inside, std::uint32_t channels, Float offset, float step,
+                               CostOf<L>* cost)
+      : ends_(ends),
+        scene_(scene),
+        rays_(rays),
+        inside_(inside),
+        channels_(channels),
+        offset_(offset),
+        step_(step),
+        cost_(cost),
+        walk_(rays, inside_, scene.majorants, columnsOf(channels)) {
+    live_ = more_ = walk_.meets();
+    counted_ = without(live_, live_);
+    if (any(live_)) k_ = firstSegment(walk_.enter()) - 1;
+  }
+
+  /// Goes on to the next segment that may have extinction for some ray; false when there is none: then it is
+  /// empty.
+  SCOLOPAX_LANES bool next(Segment<L>& segment) {
+    settle();
+    for (++k_; any(live_); ++k_) {
+      const Float start = k_ > 0 ? endOf(k_ - 1) : inside_.enter, end = endOf(k_);
+      if (!meetsSomething(start, end)) {
+        const int first = firstSegment(select(walk_.full(), walk_.enter(), walk_.exit()));
+        // Where floats cannot tell segments apart there may be no end of them.
+        if (first <= k_ + 1 && ++idle_ > kMaxSegments) giveUp(live_);
+        k_ = k_ > first - 1 ? k_ : first - 1;
+        continue;
+      }
+      const bool apart = scene_.majorants.active != nullptr;
+      const Mask met = apart ? without(live_, met_ == Word(0u)) : live_;
+      const std::uint32_t wanted = apart ? channelsOf(unionOf(met_)) : channels_;
+      if (last_ != k_ - 1) known_ = 0;
+      if ((wanted & ~known_) != 0) sample(start, wanted & ~known_, ends_.from);
+      sample(end, wanted, ends_.to);
+      last_ = k_;
+      known_ = wanted;
+      segment = {start, end, wanted, met, apart, met_};
+      more_ = live_ & (end < inside_.exit);
+      counted_ = met & walk_.full();
+      return true;
+    }
+    segment = {inside_.exit, inside_.exit, 0, live_, false, Word(0u)};
+    return false;
+  }
+
+  /// Ends rays that do not want more; whether there may be more for some ray.
+  SCOLOPAX_LANES bool keep(Mask wants) {
+    more_ = more_ & wants;
+    return any(more_);
+  }
+
+ private:
+  /// Leaves the segment behind.
+  SCOLOPAX_LANES void settle() {
+    live_ = more_;
+    for (std::uint32_t left = known_; left != 0; left &= left - 1)
+      ends_.from[std::countr_zero(left)] = ends_.to[std::countr_zero(left)];
+    taken_ = taken_ + onesOf(counted_);
+    giveUp(live_ & (taken_ > kMaxSegments - 1));
+  }
+  SCOLOPAX_LANES void giveUp(Mask which) {
+    cost_->truncated = maximum(cost_->truncated, Word(onesOf(which)));
+    live_ = without(live_, which);
+  }
+
+  SCOLOPAX_LANES std::uint32_t columnsOf(std::uint32_t channels) const {
+    std::uint32_t columns = 0;
+    for (std::uint32_t left = channels; left != 0; left &= left - 1)
+      columns |= 1u << scene_.majorants.tables[std::countr_zero(left)].column;
+    return columns;
+  }
+  SCOLOPAX_LANES std::uint32_t channelsOf(std::uint32_t columns) const {
+    std::uint32_t channels = 0;
+    for (std::uint32_t left = channels_; left != 0; left &= left - 1) {
+      const int n = std::countr_zero(left);
+      channels |= (columns >> scene_.majorants.tables[n].column & 1) << n;
+    }
+    return channels;
+  }
+
+  SCOLOPAX_LANES Float endOf(int segment) const {
+    return minimum(inside_.enter + (float(segment) + offset_) * step_, inside_.exit);
+  }
+
+  /// Whether a ray may be in a cell that is not empty between these places. If none is, the walk has gone on
+  /// to the next such cell of every ray or some way there; rays that have none left end. Without bits of
+  /// channels the first such ray is enough: where voxels are finite and extinctions add up, the others'
+  /// segments have no extinction.
+  SCOLOPAX_LANES bool meetsSomething(Float start, Float end) {
+    walk_.jump(start);
+    cost_->cellSteps = cost_->cellSteps + Word(onesOf(live_));
+    met_ = Word(0u);
+    for (;;) {
+      const Mask here = live_ & walk_.full() & (walk_.enter() < end);
+      if (scene_.majorants.active)
+        met_ = met_ | where(here, walk_.active());
+      else if (any(here))
+        return true;
+      walk_.measure();
+      // What has nothing left may still have met something.
+      const Mask rest = walk_.full() | (walk_.exit() < inside_.exit);
+      const Mask behind = live_ & rest & (walk_.exit() < end);
+      if (!any(behind)) {
+        const bool some = scene_.majorants.active && unionOf(met_) != 0;
+        if (!some) live_ = live_ & rest;
+        return some;
+      }
+      const Mask moving = behind | without(live_ & rest, walk_.full());
+      walk_.advance(moving);
+      cost_->cellSteps = cost_->cellSteps + Word(onesOf(moving));
+    }
+  }
+
+  /// First segment that has one of these points, of rays that have not ended.
+  SCOLOPAX_LANES int firstSegment(Float t) const {
+    const Float place = (t - inside_.enter) / step_ - offset_ + 1.0f;
+    const int k = int(clamp(smallestOf(select(live_, place, Float(kInfinity))), 0.0f, 1e9f));
+    // Rounding may have come to the next.
+    return k > 0 && any(live_ & (t < endOf(k - 1))) ? k - 1 : k;
+  }
+
+  SCOLOPAX_LANES void sample(Float t, std::uint32_t channels, CurvePoint<L>* points) {
+    Float stored[kMaxVisibleChannels];
+    sampleChannels(scene_, channels, rays_.origin + t * rays_.direction, stored);
+    for (std::uint32_t left = channels; left != 0; left &= left - 1) {
+      const int n = std::countr_zero(left);
+      const ChannelView& channel = scene_.channels[n];
+      points[n] = pointOn<L>(channel.optical, stretchPosition(channel, stored[n]));
+    }
+    cost_->fetches = cost_->fetches + Word(onesOf(live_)) * Word(unsigned(std::popcount(channels)));
+  }
+
+  SegmentEnds<L>& ends_;
+  const SceneView& scene_;
+  const RayOf<L>& rays_;
+  IntervalOf<L> inside_;
+  std::uint32_t channels_;
+  Float offset_, step_;
+  CostOf<L>* cost_;
+  PointWalk<L> walk_;
+  Mask live_, more_;  // rays that have not ended, and those that have something behind the segment
+  Mask counted_;      // rays for which it is one of those that a ray may have
+  Word met_;
+  Int taken_{0};
+  int k_ = 0, last_ = -2;    // the segment, and which was taken last
+  std::uint32_t known_ = 0;  // channels that were sampled at its end
+  int idle_ = 0;
+};
+
+/// Segments of rays: cell by cell for one, which takes fewer steps; point by point for many.
+template <class L>
+using Segments = std::conditional_t<L::kLanes == 1, CellSegments, PointSegments<L>>;
+
+}  // namespace scolopax::kernel
