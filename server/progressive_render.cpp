@@ -81,7 +81,7 @@ struct ProgressiveRender::Taking {
   std::shared_ptr<Renderer> renderer;
   RebuildStats stats;
 
-  /// Whether what takes long of it is of no use to the scene of `other`.
+  /// Whether the expensive part of this build is useless for `other`.
   bool uselessFor(const RenderRequest& other) const {
     return other.scene->dataset->volume != request.scene->dataset->volume ||
            other.scene->render.macrocell != scene.macrocell;
@@ -236,8 +236,7 @@ std::uint64_t ProgressiveRender::filmSize() const {
 
 bool ProgressiveRender::largeFilm() const { return filmSize() >= kLargePicture; }
 
-/// A pass that is given up has cost as much as it had until then; how much was missing is not known: say
-/// half.
+/// An abandoned pass cost at least this much; assume it was half done.
 void ProgressiveRender::learnFromUnfinished() {
   if (!unfinished_ || !scene_) return;
   auto& known = secondsPerPixel_[small_];
