@@ -17,6 +17,7 @@ namespace {
 
 using nlohmann::json;
 using protocol::ProtocolError;
+using protocol::shortened;
 
 std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(" \t");
@@ -123,7 +124,7 @@ json jsonBody(const net::Request& request, const Config& config, std::string_vie
     throw ProtocolError(415, "",
                         "expected Content-Type application/json" +
                             (alsoType.empty() ? "" : " or " + std::string(alsoType)) + ", found " +
-                            (type.empty() ? "none" : std::string(type)));
+                            (type.empty() ? "none" : shortened(type)));
   return protocol::parseJson(request.body, {config.maxBodyBytes, config.maxJsonDepth});
 }
 
@@ -135,7 +136,8 @@ std::uint32_t queryUnsigned(const net::Request& request, std::string_view name, 
   if (error != std::errc() || end != text->data() + text->size())
     throw ProtocolError(422, "",
                         "query parameter " + std::string(name) +
-                            ": expected a whole number from 0 to 4294967295, found \"" + *text + '"');
+                            ": expected a whole number from 0 to 4294967295, found \"" + shortened(*text) +
+                            '"');
   return value;
 }
 
@@ -148,7 +150,7 @@ double queryNumber(const net::Request& request, std::string_view name) {
   }
   throw ProtocolError(422, "",
                       "query parameter " + std::string(name) + ": expected a number, found " +
-                          (text ? '"' + *text + '"' : "none"));
+                          (text ? '"' + shortened(*text) + '"' : "none"));
 }
 
 const ImageType* acceptedImageType(const std::string* accept) {
@@ -230,11 +232,11 @@ void addApi(net::Server& server, ApiContext& context) {
       const std::string_view path = request.path;
       if (path.size() <= kPrefix.size() + kSuffix.size() || !path.starts_with(kPrefix) ||
           !path.ends_with(kSuffix))
-        throw ProtocolError(404, "", "expected the stream of a session, found " + request.path);
+        throw ProtocolError(404, "", "expected the stream of a session, found " + shortened(request.path));
       const auto id = path.substr(kPrefix.size(), path.size() - kPrefix.size() - kSuffix.size());
       const auto session = context.sessions.find(id);
       if (!session)
-        throw ProtocolError(404, "", "there is no session " + std::string(id) + "; it may have ended");
+        throw ProtocolError(404, "", "there is no session " + shortened(id) + "; it may have ended");
       return context.streams.join(session, socket);
     } catch (const ProtocolError& error) {
       return errorResponse(error);
