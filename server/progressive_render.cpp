@@ -174,6 +174,7 @@ bool ProgressiveRender::showDue(const RenderRequest& request) const {
   const std::uint32_t samples = renderer_->samples();
   if (samples == 0) return false;
   if (shown_.revision != revision_ || shown_.interactive != request.interactive) return true;
+  if (request.failures != shownFailures_) return true;
   if (shown_.mixed && !request.pollSamples.empty()) return true;
   if (!request.interactive && divisor_ == 1 && finished(request)) return !shown_.final;
   if (samples == shown_.samples) return false;
@@ -201,7 +202,7 @@ bool ProgressiveRender::edited() const {
 std::optional<TimePoint> ProgressiveRender::dueAt() const {
   if (job_) return std::nullopt;  // whose end wakes the loop
   const RenderRequest request = session_->request();
-  if (!request.wanted) return std::nullopt;
+  if (!request.wanted || request.retryAt) return request.retryAt;
   // Also when the end has just passed, between work() and here: then it is due at once.
   if (request.interactive || shown_.interactive) return request.interactiveEnd;
   return std::nullopt;
@@ -354,6 +355,7 @@ void ProgressiveRender::sampleAdded(PassResult& result) {
 }
 
 void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
+  shownFailures_ = request.failures;
   showing_ = std::make_shared<Showing>();
   FrameInfo& info = showing_->frame.info;
   info.revision = revision_;
@@ -421,7 +423,9 @@ PassResult ProgressiveRender::run(const Others& others) {
 }
 
 void ProgressiveRender::fail(const RenderRequest& request, const Error& error) {
-  session_->fail(taking_ ? taking_->request.revision : request.revision, error);
+  // What failed may be of a scene that an edit has replaced in the meantime.
+  const std::uint32_t revision = taking_ ? taking_->request.revision : scene_ ? revision_ : request.revision;
+  session_->fail(revision, error);
   // What an error has left behind is not worth keeping.
   taking_.reset();
   showing_.reset();

@@ -144,6 +144,7 @@ class ProgressiveRender {
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
 
   FrameInfo shown_;                       ///< the last frame handed in; revision 0 before the first
+  std::uint32_t shownFailures_ = 0;       ///< of the session, when it was made
   std::shared_ptr<const Image> reduced_;  ///< the last reduced picture of this revision, while it is of use
   double sampleError_ = 0;                ///< estimated RMSE of one sample while edits arrived; 0: not known
   TimePoint shownAt_;
