@@ -11,19 +11,15 @@
 #include "renderer/core/error.h"
 #include "renderer/io/image_file.h"
 #include "server/encoder.h"
+#include "server/net/url.h"
 
 namespace scolopax::server {
 namespace {
 
+using net::trimmed;
 using nlohmann::json;
 using protocol::ProtocolError;
 using protocol::shortened;
-
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
 
 /// Calls f with each part between separators.
 template <class F>

@@ -9,6 +9,7 @@
 #include "protocol/problem.h"
 #include "renderer/core/short_text.h"
 #include "server/api.h"
+#include "server/stop_rule.h"
 
 namespace scolopax::server {
 namespace {

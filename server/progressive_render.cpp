@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "renderer/core/error.h"
+#include "renderer/data/film.h"
 #include "server/blend.h"
+#include "server/stop_rule.h"
 
 namespace scolopax::server {
 namespace {
@@ -19,8 +21,6 @@ constexpr double kInteractiveStep = 2;
 constexpr double kProbeDivisor = 4;
 constexpr double kMostDivisor = 16;
 constexpr double kFiner = 0.7, kKept = 1.2;  ///< shares of the target at which the divisor changes
-/// As many as a scene may ask for; numbers of samples beyond 2^31 would repeat draws.
-constexpr std::uint32_t kMaxSamples = 1u << 24;
 
 double secondsBetween(TimePoint from, TimePoint to) {
   return std::chrono::duration<double>(to - from).count();
@@ -61,14 +61,6 @@ Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive
   return scene;
 }
 }  // namespace
-
-bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
-  const std::uint32_t samples = renderer.samples();
-  // The estimate counts from 16 samples on: fewer can look alike by chance.
-  return samples > 0 && (samples >= kMaxSamples || (stop.samples > 0 && samples >= stop.samples) ||
-                         (stop.seconds > 0 && seconds >= stop.seconds) ||
-                         (stop.error > 0 && samples >= 16 && renderer.estimatedError() <= stop.error));
-}
 
 /// A scene on its way into the renderer.
 struct ProgressiveRender::Taking {

@@ -150,12 +150,6 @@ class ProgressiveRender {
   TimePoint shownAt_;
 };
 
-/// From so many pixels on, what is done with all pixels of a picture at once is done in the background.
-inline constexpr std::uint64_t kLargePicture = 1 << 20;
-
-/// Whether rendering ends at what `renderer` has and the seconds it took.
-bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds);
-
 /// The smallest of 1, 1.5, 2, 3, 4, 6, 8, ... by which width and height must be divided so that a pass fits
 /// the target. `current`, that of the pass before (0: none), is kept until another fits clearly better: a
 /// picture that changes its resolution to and fro is worse than one that is a little late.

@@ -74,7 +74,7 @@ class CpuRenderer final : public Renderer {
   bool takesLong(const Scene& scene) const override {
     const auto pixels = std::size_t(scene.width) * std::size_t(scene.height);
     // Memory of a large film takes its time to be given back, and records to be emptied.
-    const bool largeFilm = std::max(pixels, film_.pixelCount()) >= kLargeFilm &&
+    const bool largeFilm = std::max(pixels, film_.pixelCount()) >= kLargePicture &&
                            (pixels != film_.pixelCount() || recording_ || counting_);
     return largeFilm || scene.method == Method::automatic || plan_.takesLong(scene);
   }
@@ -251,7 +251,6 @@ class CpuRenderer final : public Renderer {
   std::vector<std::uint64_t> fetches_;  // one per pixel while recording
   FirstCollisions first_;
   static constexpr std::uint32_t kSamplesWorthBias = 16;
-  static constexpr std::size_t kLargeFilm = 1 << 20;
   Choice automatic_{Method::raymarch, 1};
   double automaticBias_ = 0;
   double target_ = 0;                    // for which it was made

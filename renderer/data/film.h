@@ -11,6 +11,9 @@
 
 namespace scolopax {
 
+/// From so many pixels on, what is done with all of them at once takes long enough to hold others up.
+inline constexpr std::uint64_t kLargePicture = 1 << 20;
+
 class Film {
  public:
   /// Empties the film and sets its size. Takes no time: the first sample fills the memory. Throws
