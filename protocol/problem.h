@@ -9,7 +9,8 @@ namespace scolopax::protocol {
 
 inline constexpr std::string_view kProblemType = "application/problem+json";
 
-/// A stranger's text for a message: no longer than `most` bytes, cut between two characters of UTF-8.
+/// A stranger's text for a message: no longer than `most` bytes, cut between two characters of UTF-8. Every
+/// text of a request that a detail repeats goes through this.
 std::string shortened(std::string_view text, std::size_t most = 200);
 
 /// What a client did wrong. `what()` is the detail: one line with what was expected and what was found.

@@ -84,7 +84,7 @@ class Renderer {
 };
 
 /// `threads` 0 means all. Same scene, seed and sample count give the same bits for any number of threads.
-/// What it takes of memory is of `memory`, if that is given; setScene and recordAovs throw what it throws.
+/// Its memory is charged to `memory`, if given; setScene and recordAovs rethrow its errors.
 std::unique_ptr<Renderer> makeCpuRenderer(std::shared_ptr<const Volume> volume, int threads,
                                           std::shared_ptr<MemoryBudget> memory = nullptr);
 

@@ -11,18 +11,15 @@
 #include "renderer/core/error.h"
 #include "renderer/io/image_file.h"
 #include "server/encoder.h"
+#include "server/net/url.h"
 
 namespace scolopax::server {
 namespace {
 
+using net::trimmed;
 using nlohmann::json;
 using protocol::ProtocolError;
-
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
+using protocol::shortened;
 
 /// Calls f with each part between separators.
 template <class F>
@@ -123,7 +120,7 @@ json jsonBody(const net::Request& request, const Config& config, std::string_vie
     throw ProtocolError(415, "",
                         "expected Content-Type application/json" +
                             (alsoType.empty() ? "" : " or " + std::string(alsoType)) + ", found " +
-                            (type.empty() ? "none" : std::string(type)));
+                            (type.empty() ? "none" : shortened(type)));
   return protocol::parseJson(request.body, {config.maxBodyBytes, config.maxJsonDepth});
 }
 
@@ -135,7 +132,8 @@ std::uint32_t queryUnsigned(const net::Request& request, std::string_view name, 
   if (error != std::errc() || end != text->data() + text->size())
     throw ProtocolError(422, "",
                         "query parameter " + std::string(name) +
-                            ": expected a whole number from 0 to 4294967295, found \"" + *text + '"');
+                            ": expected a whole number from 0 to 4294967295, found \"" + shortened(*text) +
+                            '"');
   return value;
 }
 
@@ -148,7 +146,7 @@ double queryNumber(const net::Request& request, std::string_view name) {
   }
   throw ProtocolError(422, "",
                       "query parameter " + std::string(name) + ": expected a number, found " +
-                          (text ? '"' + *text + '"' : "none"));
+                          (text ? '"' + shortened(*text) + '"' : "none"));
 }
 
 const ImageType* acceptedImageType(const std::string* accept) {
@@ -230,11 +228,11 @@ void addApi(net::Server& server, ApiContext& context) {
       const std::string_view path = request.path;
       if (path.size() <= kPrefix.size() + kSuffix.size() || !path.starts_with(kPrefix) ||
           !path.ends_with(kSuffix))
-        throw ProtocolError(404, "", "expected the stream of a session, found " + request.path);
+        throw ProtocolError(404, "", "expected the stream of a session, found " + shortened(request.path));
       const auto id = path.substr(kPrefix.size(), path.size() - kPrefix.size() - kSuffix.size());
       const auto session = context.sessions.find(id);
       if (!session)
-        throw ProtocolError(404, "", "there is no session " + std::string(id) + "; it may have ended");
+        throw ProtocolError(404, "", "there is no session " + shortened(id) + "; it may have ended");
       return context.streams.join(session, socket);
     } catch (const ProtocolError& error) {
       return errorResponse(error);

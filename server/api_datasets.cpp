@@ -11,7 +11,9 @@ std::vector<Route> datasetRoutes(ApiContext& context) {
   using nlohmann::json;
   const auto dataset = [&context](const net::Request& request) {
     auto found = context.datasets.find(request.matches.at(1));
-    if (!found) throw protocol::ProtocolError(404, "", "there is no data set " + request.matches.at(1));
+    if (!found)
+      throw protocol::ProtocolError(404, "",
+                                    "there is no data set " + protocol::shortened(request.matches.at(1)));
     return found;
   };
   const Parameter id{"id", "path", "string", "Id of the data set"};

@@ -9,6 +9,7 @@
 #include "protocol/problem.h"
 #include "renderer/core/short_text.h"
 #include "server/api.h"
+#include "server/stop_rule.h"
 
 namespace scolopax::server {
 namespace {
@@ -68,9 +69,9 @@ std::string sceneHash(const ResolvedScene& scene) {
 net::Response render(ApiContext& context, std::atomic<int>& running, const net::Request& request) {
   const ImageType* type = acceptedImageType(request.header("accept"));
   if (!type)
-    throw ProtocolError(
-        406, "",
-        "expected Accept to hold image/jpeg, image/png or image/x-exr, found " + *request.header("accept"));
+    throw ProtocolError(406, "",
+                        "expected Accept to hold image/jpeg, image/png or image/x-exr, found " +
+                            protocol::shortened(*request.header("accept")));
   const double limit = context.config.maxRenderSeconds;
   const auto scene = context.renderResolver.replace(jsonBody(request, context.config));
   if (scene->stop.seconds > limit)

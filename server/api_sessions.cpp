@@ -12,13 +12,15 @@ namespace {
 
 using nlohmann::json;
 using protocol::ProtocolError;
+using protocol::shortened;
 
 constexpr std::string_view kMergePatch = "application/merge-patch+json";
 
 std::shared_ptr<Session> sessionOf(const ApiContext& context, const net::Request& request) {
   auto session = context.sessions.find(request.matches.at(1));
   if (!session)
-    throw ProtocolError(404, "", "there is no session " + request.matches.at(1) + "; it may have ended");
+    throw ProtocolError(404, "",
+                        "there is no session " + shortened(request.matches.at(1)) + "; it may have ended");
   return session;
 }
 
@@ -32,7 +34,7 @@ EditOrigin originOf(const net::Request& request) {
   std::uint32_t revision = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), revision);
   if (error != std::errc() || end != text.data() + text.size())
-    throw ProtocolError(400, "", "If-Match: expected a revision, found " + *header);
+    throw ProtocolError(400, "", "If-Match: expected a revision, found " + shortened(*header));
   origin.ifRevision = revision;
   return origin;
 }
@@ -49,7 +51,7 @@ net::Response create(ApiContext& context, const net::Request& request) {
     json body = jsonBody(request, context.config);
     if (!body.is_object()) throw ProtocolError(422, "", "expected an object");
     for (const auto& [key, value] : body.items())
-      if (key != "scene") throw ProtocolError(422, "/" + key, "unknown field; expected scene");
+      if (key != "scene") throw ProtocolError(422, "/" + shortened(key), "unknown field; expected scene");
     if (body.contains("scene")) scene = std::move(body["scene"]);
   }
   const auto session = context.sessions.create(scene);
@@ -96,7 +98,8 @@ std::optional<Aov> queryAov(const net::Request& request) {
     if (kAovs[i].name == *asked) return Aov(i);
     known += (i > 0 ? ", " : "") + std::string(kAovs[i].name);
   }
-  throw ProtocolError(422, "", "query parameter aov: expected one of " + known + ", found \"" + *asked + '"');
+  throw ProtocolError(
+      422, "", "query parameter aov: expected one of " + known + ", found \"" + shortened(*asked) + '"');
 }
 
 net::Response frame(ApiContext& context, const net::Request& request) {
@@ -107,7 +110,7 @@ net::Response frame(ApiContext& context, const net::Request& request) {
                                  [&](const ImageType& one) { return one.format == format; });
   if (type == std::end(kImageTypes))
     throw ProtocolError(
-        422, "", "query parameter format: expected jpeg, png or exr, found \"" + std::string(format) + '"');
+        422, "", "query parameter format: expected jpeg, png or exr, found \"" + shortened(format) + '"');
   const std::optional<Aov> aov = queryAov(request);
   const FrameQuery query{queryUnsigned(request, "after", 0), queryUnsigned(request, "minSamples", 1),
                          aov.has_value(), request.gone};

@@ -26,8 +26,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kMaxSide = 16384;  // of a picture, as the table of fields says
-
 constexpr std::string_view kNoPage =
     "Scolopax is running, but its page is not built.\n\n"
     "Build it with:  cd client_web && npm ci && npm run build\n"
@@ -74,8 +72,8 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
            {{"bodyBytes", config.maxBodyBytes},
             {"messageBytes", config.maxMessageBytes},
             {"sceneDepth", config.maxJsonDepth},
-            {"imageWidth", kMaxSide},
-            {"imageHeight", kMaxSide},
+            {"imageWidth", kMaxImageSide},
+            {"imageHeight", kMaxImageSide},
             {"imagePixels", config.maxPixels},
             {"memoryBytes", config.maxMemoryBytes},
             {"sessions", config.maxSessions},

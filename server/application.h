@@ -15,8 +15,8 @@ namespace scolopax::server {
 
 class Application {
  public:
-  /// An empty token in `config` is replaced by a new one. `memory` bounds the renderers' memory too, which
-  /// take of it.
+  /// An empty token in `config` is replaced by a new one. `memory` must be the budget that the renderers
+  /// charge, too.
   Application(Config config, std::vector<Dataset> datasets, MakeRenderer makeRenderer,
               std::shared_ptr<MemoryBudget> memory, Log log);
   ~Application();  ///< stops at once

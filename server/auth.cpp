@@ -26,12 +26,6 @@ bool isTokenCharacter(char c) {
          std::string_view("-._~+/=").find(c) != std::string_view::npos;
 }
 
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
-  return text;
-}
-
 /// An IPv4 address of this machine's own net, and not a name that only begins like one.
 bool isLoopbackAddress(std::string_view host) {
   return host.substr(0, 4) == "127." && host.find_first_not_of("0123456789.") == std::string_view::npos;
@@ -114,7 +108,7 @@ bool Authorizer::hasBearer(const net::Request& request) const {
   const std::string_view text = *header;
   const std::size_t space = text.find(' ');
   return space != std::string_view::npos && net::equalIgnoringCase(text.substr(0, space), "Bearer") &&
-         sameToken(trimmed(text.substr(space)), token_);
+         sameToken(net::trimmed(text.substr(space)), token_);
 }
 
 bool Authorizer::hasQueryToken(const net::Request& request) const {
@@ -127,7 +121,7 @@ bool Authorizer::hasCookie(const net::Request& request) const {
   for (auto header = begin; header != end; ++header) {
     std::string_view rest = header->second;
     while (!rest.empty()) {
-      const std::string_view pair = trimmed(rest.substr(0, rest.find(';')));
+      const std::string_view pair = net::trimmed(rest.substr(0, rest.find(';')));
       rest.remove_prefix(std::min(rest.find(';'), rest.size() - 1) + 1);
       const std::size_t equals = pair.find('=');
       if (equals == std::string_view::npos || pair.substr(0, equals) != cookieName_) continue;

@@ -33,20 +33,34 @@ BackgroundThreads::~BackgroundThreads() {
 
 std::shared_ptr<Background::Job> BackgroundThreads::start(Work work, std::function<void()> ended) {
   auto job = std::make_shared<Job>(std::move(work));
+  if (!startThread(job, ended)) {
+    job->run();
+    ended();
+  }
+  return job;
+}
+
+bool BackgroundThreads::startThread(const std::shared_ptr<Job>& job, const std::function<void()>& ended) {
   const std::lock_guard lock(mutex_);
   running_.remove_if([](Running& one) {
-    if (one.over) one.thread.join();
-    return one.over.load();
+    if (!one.over) return false;
+    one.thread.join();
+    return true;
   });
   Running& one = running_.emplace_back();
   one.job = job;
-  one.thread = std::thread([&one, job, ended = std::move(ended)] {
-    lowerThreadPriority();
-    job->run();
-    ended();
-    one.over = true;
-  });
-  return job;
+  try {
+    one.thread = std::thread([&one, job, ended] {
+      lowerThreadPriority();
+      job->run();
+      ended();
+      one.over = true;
+    });
+  } catch (const std::exception&) {
+    running_.pop_back();
+    return false;
+  }
+  return true;
 }
 
 }  // namespace scolopax::server

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Work that would hold up the thread of a loop: building scenes, encoding large pictures.
 #pragma once
+#include <atomic>
 #include <functional>
 #include <future>
 #include <list>
@@ -41,7 +42,8 @@ class Background {
   virtual std::shared_ptr<Job> start(Work work, std::function<void()> ended) = 0;
 };
 
-/// Every job at once, on a thread of its own and of low priority: none waits for another's end.
+/// Every job at once, on a thread of its own and of low priority: none waits for another's end. Where the
+/// system gives no thread, start() does the work itself.
 class BackgroundThreads : public Background {
  public:
   ~BackgroundThreads() override;  ///< cancels the jobs and waits for them
@@ -53,6 +55,8 @@ class BackgroundThreads : public Background {
     std::atomic<bool> over{false};
     std::thread thread;
   };
+  bool startThread(const std::shared_ptr<Job>& job, const std::function<void()>& ended);
+
   std::mutex mutex_;
   std::list<Running> running_;
 };

@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "renderer/core/error.h"
+#include "renderer/data/film.h"
 #include "server/blend.h"
+#include "server/stop_rule.h"
 
 namespace scolopax::server {
 namespace {
@@ -19,8 +21,6 @@ constexpr double kInteractiveStep = 2;
 constexpr double kProbeDivisor = 4;
 constexpr double kMostDivisor = 16;
 constexpr double kFiner = 0.7, kKept = 1.2;  ///< shares of the target at which the divisor changes
-/// As many as a scene may ask for; numbers of samples beyond 2^31 would repeat draws.
-constexpr std::uint32_t kMaxSamples = 1u << 24;
 
 double secondsBetween(TimePoint from, TimePoint to) {
   return std::chrono::duration<double>(to - from).count();
@@ -62,14 +62,6 @@ Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive
 }
 }  // namespace
 
-bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
-  const std::uint32_t samples = renderer.samples();
-  // The estimate counts from 16 samples on: fewer can look alike by chance.
-  return samples > 0 && (samples >= kMaxSamples || (stop.samples > 0 && samples >= stop.samples) ||
-                         (stop.seconds > 0 && seconds >= stop.seconds) ||
-                         (stop.error > 0 && samples >= 16 && renderer.estimatedError() <= stop.error));
-}
-
 /// A scene on its way into the renderer.
 struct ProgressiveRender::Taking {
   RenderRequest request;
@@ -81,7 +73,7 @@ struct ProgressiveRender::Taking {
   std::shared_ptr<Renderer> renderer;
   RebuildStats stats;
 
-  /// Whether what takes long of it is of no use to the scene of `other`.
+  /// Whether the expensive part of this build is useless for `other`.
   bool uselessFor(const RenderRequest& other) const {
     return other.scene->dataset->volume != request.scene->dataset->volume ||
            other.scene->render.macrocell != scene.macrocell;
@@ -174,6 +166,7 @@ bool ProgressiveRender::showDue(const RenderRequest& request) const {
   const std::uint32_t samples = renderer_->samples();
   if (samples == 0) return false;
   if (shown_.revision != revision_ || shown_.interactive != request.interactive) return true;
+  if (request.failures != shownFailures_) return true;
   if (shown_.mixed && !request.pollSamples.empty()) return true;
   if (!request.interactive && divisor_ == 1 && finished(request)) return !shown_.final;
   if (samples == shown_.samples) return false;
@@ -201,7 +194,7 @@ bool ProgressiveRender::edited() const {
 std::optional<TimePoint> ProgressiveRender::dueAt() const {
   if (job_) return std::nullopt;  // whose end wakes the loop
   const RenderRequest request = session_->request();
-  if (!request.wanted) return std::nullopt;
+  if (!request.wanted || request.retryAt) return request.retryAt;
   // Also when the end has just passed, between work() and here: then it is due at once.
   if (request.interactive || shown_.interactive) return request.interactiveEnd;
   return std::nullopt;
@@ -236,8 +229,7 @@ std::uint64_t ProgressiveRender::filmSize() const {
 
 bool ProgressiveRender::largeFilm() const { return filmSize() >= kLargePicture; }
 
-/// A pass that is given up has cost as much as it had until then; how much was missing is not known: say
-/// half.
+/// An abandoned pass cost at least this much; assume it was half done.
 void ProgressiveRender::learnFromUnfinished() {
   if (!unfinished_ || !scene_) return;
   auto& known = secondsPerPixel_[small_];
@@ -355,6 +347,7 @@ void ProgressiveRender::sampleAdded(PassResult& result) {
 }
 
 void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
+  shownFailures_ = request.failures;
   showing_ = std::make_shared<Showing>();
   FrameInfo& info = showing_->frame.info;
   info.revision = revision_;
@@ -422,7 +415,9 @@ PassResult ProgressiveRender::run(const Others& others) {
 }
 
 void ProgressiveRender::fail(const RenderRequest& request, const Error& error) {
-  session_->fail(taking_ ? taking_->request.revision : request.revision, error);
+  // What failed may be of a scene that an edit has replaced in the meantime.
+  const std::uint32_t revision = taking_ ? taking_->request.revision : scene_ ? revision_ : request.revision;
+  session_->fail(revision, error);
   // What an error has left behind is not worth keeping.
   taking_.reset();
   showing_.reset();

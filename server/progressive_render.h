@@ -144,16 +144,11 @@ class ProgressiveRender {
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
 
   FrameInfo shown_;                       ///< the last frame handed in; revision 0 before the first
+  std::uint32_t shownFailures_ = 0;       ///< of the session, when it was made
   std::shared_ptr<const Image> reduced_;  ///< the last reduced picture of this revision, while it is of use
   double sampleError_ = 0;                ///< estimated RMSE of one sample while edits arrived; 0: not known
   TimePoint shownAt_;
 };
-
-/// From so many pixels on, what is done with all pixels of a picture at once is done in the background.
-inline constexpr std::uint64_t kLargePicture = 1 << 20;
-
-/// Whether rendering ends at what `renderer` has and the seconds it took.
-bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds);
 
 /// The smallest of 1, 1.5, 2, 3, 4, 6, 8, ... by which width and height must be divided so that a pass fits
 /// the target. `current`, that of the pass before (0: none), is kept until another fits clearly better: a

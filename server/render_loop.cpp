@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "renderer/core/error.h"
+#include "renderer/data/film.h"
 #include "server/encoder.h"
 
 namespace scolopax::server {

@@ -174,7 +174,8 @@ std::shared_ptr<const Dataset> SceneResolver::datasetOf(const json& scene) const
   if (!dataset) {
     std::string known;
     for (const auto& one : datasets_->all()) known += (known.empty() ? "" : ", ") + one->id;
-    throw ProtocolError(422, "/dataset", "expected one of " + known + ", found " + id->dump());
+    const json found = protocol::shortened(id->get_ref<const std::string&>());
+    throw ProtocolError(422, "/dataset", "expected one of " + known + ", found " + found.dump());
   }
   return dataset;
 }

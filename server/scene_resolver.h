@@ -10,15 +10,9 @@
 #include "protocol/scene.h"
 #include "renderer/data/scene.h"
 #include "server/dataset_store.h"
+#include "server/stop_rule.h"
 
 namespace scolopax::server {
-
-/// When rendering ends: at the first that is met; 0 means no such bound.
-struct StopRule {
-  std::uint32_t samples = 0;
-  double seconds = 0;
-  double error = 0;
-};
 
 /// A scene in the forms the server needs it in. Immutable once made.
 struct ResolvedScene {

@@ -79,6 +79,8 @@ ViewerId Session::addViewer(std::shared_ptr<ViewerSink> sink) {
   const std::lock_guard lock(mutex_);
   if (closed_) throw protocol::ProtocolError(404, "", "the session has ended");
   const ViewerId id = nextViewer_++;
+  retryIfBusy();
+  if (failedRevision_ == revision_) sink->renderFailed(*failure_);
   viewers_[id].sink = std::move(sink);
   lastUsed_ = hooks_.now();
   hooks_.wakeRender();
@@ -98,6 +100,7 @@ void Session::setView(ViewerId id, bool visible, double maxFps) {
   const auto viewer = viewers_.find(id);
   if (viewer == viewers_.end()) return;
   viewer->second.visible = visible;
+  if (visible) retryIfBusy();
   // Within an hour: a smaller rate than that overflows a duration.
   const auto seconds = maxFps > 0 ? std::min(1 / maxFps, 3600.0) : 0.0;
   viewer->second.period =
@@ -124,7 +127,7 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
     ++revision_;
     for (auto& [id, viewer] : viewers_) viewer.sink->sceneChanged(revision_, nlohmann::json::object());
   }
-  if (failure_ && failure_->code() == ErrorCode::busy) failedRevision_ = 0;
+  retryIfBusy();
   const std::uint32_t revision = revision_;
   const auto fits = [&] {
     return frame_ && frame_->info.number > query.after && frame_->info.revision >= revision &&
@@ -172,7 +175,12 @@ RenderRequest Session::request() const {
   request.aovs = aovs_;
   const bool seen =
       std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.visible; });
-  request.wanted = !closed_ && failedRevision_ != revision_ && (seen || !pollSamples_.empty());
+  request.failures = failures_;
+  request.wanted = !closed_ && (seen || !pollSamples_.empty());
+  if (failedRevision_ == revision_) {
+    if (request.wanted) request.retryAt = retryAt_;
+    request.wanted = request.retryAt && hooks_.now() >= *request.retryAt;
+  }
   if (seen && lastEdit_) {
     request.interactiveEnd = *lastEdit_ + kInteractiveTime;
     request.interactive = hooks_.now() < request.interactiveEnd;
@@ -183,16 +191,28 @@ RenderRequest Session::request() const {
 void Session::submit(RenderedFrame frame) {
   const std::lock_guard lock(mutex_);
   if (closed_) return;
+  if (retryAt_ && frame.info.revision == failedRevision_) failedRevision_ = 0;  // the retry went well
   rendered_ = std::move(frame);
   hooks_.wakeEncoder();
 }
 
 void Session::fail(std::uint32_t revision, const Error& error) {
   const std::lock_guard lock(mutex_);
+  ++failures_;
+  const bool busy = error.code() == ErrorCode::busy;
+  const bool known = busy && retryAt_ && failedRevision_ == revision;  // a retry that was in vain
+  if (!known)
+    for (auto& [id, viewer] : viewers_) viewer.sink->renderFailed(error);
+  if (revision != revision_) return;  // the scene of now may well be rendered
   failedRevision_ = revision;
   failure_ = error;
-  for (auto& [id, viewer] : viewers_) viewer.sink->renderFailed(error);
+  retryAt_.reset();
+  if (busy) retryAt_ = hooks_.now() + kRetryTime;
   frameCame_.notify_all();
+}
+
+void Session::retryIfBusy() {
+  if (retryAt_) failedRevision_ = 0;
 }
 
 std::optional<RenderedFrame> Session::takeRendered(std::uint64_t mostPixels) {

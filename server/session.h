@@ -76,6 +76,8 @@ struct RenderRequest {
   TimePoint interactiveEnd;                ///< when that ends, if no edit comes
   std::vector<std::uint32_t> pollSamples;  ///< sample counts that scripts wait for
   bool aovs = false;                       ///< somebody has asked for AOVs
+  std::optional<TimePoint> retryAt;        ///< when to try again what others' memory has refused
+  std::uint32_t failures = 0;              ///< so far; after another one, the last picture may be lost
 };
 
 /// Functions that act on the loops; called with or without the session's mutex held.
@@ -90,6 +92,9 @@ class Session {
  public:
   /// The time after an edit during which speed counts more than quality.
   static constexpr std::chrono::milliseconds kInteractiveTime{200};
+
+  /// After which what failed because others held the memory is tried again.
+  static constexpr std::chrono::milliseconds kRetryTime{1000};
 
   /// Scripts that may wait at once.
   static constexpr std::size_t kMaxPolls = 8;
@@ -135,8 +140,8 @@ class Session {
   RenderRequest request() const;
   /// Takes the one waiting place of the encoder, replacing what is there.
   void submit(RenderedFrame frame);
-  /// Nothing is rendered until the next edit; what failed because others held the memory, until it is asked
-  /// for again.
+  /// Nothing is rendered until the next edit; what failed because others held the memory, for kRetryTime or
+  /// until somebody comes and asks for it. Viewers hear of it once.
   void fail(std::uint32_t revision, const Error& error);
 
   // --- encoder thread
@@ -165,6 +170,7 @@ class Session {
 
   SceneState edit(std::shared_ptr<const ResolvedScene> next, const EditOrigin& origin);
   void checkRevision(const EditOrigin& origin) const;
+  void retryIfBusy();
 
   const std::string id_, token_;
   const std::shared_ptr<const SceneResolver> resolver_;
@@ -179,6 +185,8 @@ class Session {
   bool closed_ = false;
   std::uint32_t failedRevision_ = 0;
   std::optional<Error> failure_;
+  std::optional<TimePoint> retryAt_;  ///< of a failure because others held the memory
+  std::uint32_t failures_ = 0;
   std::map<ViewerId, Viewer> viewers_;
   ViewerId nextViewer_ = 1;
   std::multiset<std::uint32_t> pollSamples_;  ///< one per waiting script

@@ -18,9 +18,9 @@ inline constexpr std::string_view kMemoryUses[] = {"films", "grids", "pictures",
 /// Every function may be called from any thread. Shares keep the budget alive.
 class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
  public:
-  /// Of the budget the last quarter is left to shares no larger than this: large ones do not keep the
-  /// ordinary from their work.
-  static constexpr std::uint64_t kOrdinaryBytes = 128 << 20;
+  /// The last quarter of the budget is reserved for shares up to this size, so that large ones cannot starve
+  /// small ones. A film of 1920x1080 pixels takes 192 MiB.
+  static constexpr std::uint64_t kOrdinaryBytes = 256 << 20;
 
   explicit MemoryBudget(std::uint64_t limitBytes) : limit_(limitBytes) {}
 
@@ -44,7 +44,7 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
     MemoryUse use_ = MemoryUse::films;
     std::uint64_t bytes_ = 0;
   };
-  /// Throws as Share::resize. Of a null budget everything is granted.
+  /// Throws as Share::resize. Without a budget every request is granted.
   static Share take(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use, std::uint64_t bytes = 0);
   /// The same, for what several hold.
   static std::shared_ptr<Share> takeShared(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use,

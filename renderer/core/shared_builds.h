@@ -47,7 +47,7 @@ class SharedBuilds {
   }
 
  private:
-  /// Held by those who wait alone: with the last of them it ends.
+  /// Owned by its waiters only; when the last one leaves, the build is stopped.
   class Build {
    public:
     explicit Build(const Make& make)

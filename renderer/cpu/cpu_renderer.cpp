@@ -9,6 +9,8 @@
 #include <new>
 #include <optional>
 #include <string>
+#include <tuple>
+#include <utility>
 
 #include "renderer/core/error.h"
 #include "renderer/cpu/pass.h"
@@ -33,22 +35,29 @@ TileFunction chooseKernel(Scene scene, const kernel::SceneView& view) {
 class CpuRenderer final : public Renderer {
  public:
   CpuRenderer(std::shared_ptr<const Volume> volume, int threads, std::shared_ptr<MemoryBudget> memory)
-      : memory_(MemoryBudget::take(memory, MemoryUse::films)),
-        plan_(std::move(volume), std::move(memory)),
+      : budget_(std::move(memory)),
+        memory_(MemoryBudget::take(budget_, MemoryUse::films)),
+        plan_(std::move(volume), budget_),
         arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
 
   std::string_view backendName() const override { return "cpu"; }
 
   RebuildStats setScene(const Scene& scene, std::stop_token stop) override {
-    // Memory first: when there is none, plan and film stay as they were.
     Film resized;
     const bool newSize = scene.width != film_.width() || scene.height != film_.height();
     checkImageSize(scene);
     const std::size_t bytes = filmBytes(std::size_t(scene.width) * std::size_t(scene.height), scene);
-    memory_.resize(std::max<std::uint64_t>(memory_.bytes(), bytes));
-    if (newSize) resized.reset(scene.width, scene.height);
+    const std::uint64_t bytesBefore = memory_.bytes();
     RebuildStats stats;
-    arena_.execute([&] { stats = take(scene, stop); });
+    try {
+      // Memory first: when there is none, plan and film stay as they were.
+      memory_.resize(std::max<std::uint64_t>(bytesBefore, bytes));
+      if (newSize) resized.reset(scene.width, scene.height);
+      arena_.execute([&] { stats = take(scene, stop); });
+    } catch (...) {
+      memory_.resize(bytesBefore);
+      throw;
+    }
     if (newSize) {
       film_ = std::move(resized);
       memory_.resize(bytes);
@@ -64,7 +73,7 @@ class CpuRenderer final : public Renderer {
   bool takesLong(const Scene& scene) const override {
     const auto pixels = std::size_t(scene.width) * std::size_t(scene.height);
     // Memory of a large film takes its time to be given back, and records to be emptied.
-    const bool largeFilm = std::max(pixels, film_.pixelCount()) >= kLargeFilm &&
+    const bool largeFilm = std::max(pixels, film_.pixelCount()) >= kLargePicture &&
                            (pixels != film_.pixelCount() || recording_ || counting_);
     return largeFilm || scene.method == Method::automatic || plan_.takesLong(scene);
   }
@@ -139,12 +148,9 @@ class CpuRenderer final : public Renderer {
       case Aov::depth:
         result.values = first_.depth();
         break;
-      case Aov::transmittance: {
-        const Image image = film_.image();
-        std::transform(image.pixels.begin(), image.pixels.end(), result.values.begin(),
-                       [](const glm::vec4& p) { return 1.0f - p.a; });
+      case Aov::transmittance:
+        result.values = film_.transmittance();
         break;
-      }
       case Aov::channel:
         result.values = first_.channel();
         break;
@@ -161,30 +167,37 @@ class CpuRenderer final : public Renderer {
   RebuildStats take(const Scene& scene, const std::stop_token& stop) {
     Scene chosen = scene;
     chosen.targetError = 0;  // makes no picture of its own
-    if (scene.method != Method::automatic) {
-      target_ = 0;  // what was chosen is not of this scene, even if it says the same
-      return plan_.update(chosen, stop);
+    const bool automatic = scene.method == Method::automatic;
+    Choice choice = automatic_;
+    double bias = automaticBias_;
+    if (automatic) {
+      // The choice before, if there was one: when nothing else is new either, the film goes on.
+      chosen.method = choice.method;
+      chosen.step = choice.step;
+      if (!plan_.makesSamePicture(chosen) || scene.targetError != target_)
+        std::tie(choice, bias) = choose(scene, chosen, stop);
+      chosen.method = choice.method;
+      chosen.step = choice.step;
     }
-    // The choice before, if there was one: when nothing else is new either, the film goes on.
-    chosen.method = automatic_.method;
-    chosen.step = automatic_.step;
-    RebuildStats stats = plan_.update(chosen, stop);
-    if (!stats.filmReset && scene.targetError == target_) return stats;
+    const RebuildStats stats = plan_.update(chosen, stop);
+    automatic_ = choice;
+    automaticBias_ = bias;
+    target_ = automatic ? scene.targetError : 0;  // what was chosen is of no other scene
+    return stats;
+  }
+
+  /// Method and step for a scene that leaves them to us, with the bias that was found. On a plan of its own:
+  /// when it is stopped, ours is still that of the film.
+  std::pair<Choice, double> choose(const Scene& scene, const Scene& resolved, const std::stop_token& stop) {
+    RenderPlan trial(plan_.volume(), budget_);
+    trial.update(resolved, stop);
     // Shadow rays are what costs most where there are any.
     const Method quadrature = scene.shadows ? Method::hybrid : Method::raymarch;
     // Half of the error is left to noise.
-    const auto found = largestStep(plan_, quadrature, scene.targetError / 2, stop);
-    automatic_ = found ? Choice{quadrature, found->step} : Choice{Method::superposed, Scene().step};
-    automaticBias_ = found ? found->bias : 0;
-    // Too late to leave all as it was: a choice that has been given up is none, and made again.
-    target_ = stop.stop_requested() ? 0 : scene.targetError;
-    if (automatic_.method == chosen.method && automatic_.step == chosen.step) return stats;
-    chosen.method = automatic_.method;
-    chosen.step = automatic_.step;
-    const RebuildStats again = plan_.update(chosen);
-    stats.filmReset = stats.filmReset || again.filmReset;
-    stats.rebuildMs += again.rebuildMs;
-    return stats;
+    const auto found = largestStep(trial, quadrature, scene.targetError / 2, stop);
+    if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "nobody waits for the choice of a method");
+    if (!found) return {{Method::superposed, Scene().step}, 0};
+    return {{quadrature, found->step}, found->bias};
   }
 
   /// Of a film of this size, and of all that is kept of its pixels.
@@ -225,6 +238,7 @@ class CpuRenderer final : public Renderer {
     }
   }
 
+  const std::shared_ptr<MemoryBudget> budget_;
   MemoryBudget::Share memory_;  // of the film and what is recorded
   RenderPlan plan_;
   Film film_;
@@ -235,7 +249,6 @@ class CpuRenderer final : public Renderer {
   std::vector<std::uint64_t> fetches_;  // one per pixel while recording
   FirstCollisions first_;
   static constexpr std::uint32_t kSamplesWorthBias = 16;
-  static constexpr std::size_t kLargeFilm = 1 << 20;
   Choice automatic_{Method::raymarch, 1};
   double automaticBias_ = 0;
   double target_ = 0;                    // for which it was made

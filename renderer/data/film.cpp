@@ -72,6 +72,15 @@ Image Film::image() const {
   return image;
 }
 
+std::vector<float> Film::transmittance() const {
+  std::vector<float> values(sum_.size(), 1.0f);
+  if (samples_ == 0) return values;
+  const double scale = 1.0 / samples_;
+  std::transform(sum_.begin(), sum_.end(), values.begin(),
+                 [&](const glm::dvec4& sum) { return 1.0f - float(sum.a * scale); });
+  return values;
+}
+
 double Film::estimatedError() const {
   if (samples_ < 2) return std::numeric_limits<double>::quiet_NaN();
   const std::uint32_t replicates = samples_ / kernel::kReplicateSamples;

@@ -4,11 +4,15 @@
 #pragma once
 #include <cstdint>
 #include <glm/vec4.hpp>
+#include <vector>
 
 #include "renderer/core/raw_vector.h"
 #include "renderer/data/image.h"
 
 namespace scolopax {
+
+/// From so many pixels on, what is done with all of them at once takes long enough to hold others up.
+inline constexpr std::uint64_t kLargePicture = 1 << 20;
 
 class Film {
  public:
@@ -27,6 +31,8 @@ class Film {
   std::uint32_t samples() const { return samples_; }
   /// Mean of the samples; all zero when there are none.
   Image image() const;
+  /// 1 - alpha of image(), for each pixel.
+  std::vector<float> transmittance() const;
   /// Estimated RMSE over linear premultiplied RGBA of image(); NaN below two samples. From the variance
   /// between replicates, which are independent, as soon as there are kEnoughReplicates of them. Before, from
   /// the samples' variance, which is too large where sampling is of low discrepancy: an upper estimate, for a

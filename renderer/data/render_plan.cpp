@@ -126,11 +126,13 @@ bool RenderPlan::takesLong(const Scene& scene) const {
          macrocells_->intervals.size() > kManyIntervals;
 }
 
+bool RenderPlan::makesSamePicture(const Scene& scene) const { return scene_ && samePicture(*scene_, scene); }
+
 RebuildStats RenderPlan::update(const Scene& scene, const std::stop_token& stop) {
   const auto start = std::chrono::steady_clock::now();
   checkScene(scene, *volume_);
   RebuildStats stats;
-  stats.filmReset = !scene_ || !samePicture(*scene_, scene);
+  stats.filmReset = !makesSamePicture(scene);
   const auto rays = makeCameraRays(scene.camera, volume_->grid(), scene.width, scene.height);
 
   // Everything that can throw comes first and into new objects; the plan is replaced at the end.

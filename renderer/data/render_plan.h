@@ -31,7 +31,10 @@ class RenderPlan {
   RebuildStats update(const Scene& scene, const std::stop_token& stop = {});
   /// Whether that takes longer than a few milliseconds.
   bool takesLong(const Scene& scene) const;
+  /// Whether update() would leave the film as it is.
+  bool makesSamePicture(const Scene& scene) const;
   const Scene& scene() const { return *scene_; }
+  const std::shared_ptr<const Volume>& volume() const { return volume_; }
   const Grid& grid() const { return volume_->grid(); }
   /// Valid until the next update.
   const kernel::SceneView& view() const { return view_; }

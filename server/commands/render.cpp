@@ -18,8 +18,8 @@
 #include "server/commands/interrupt.h"
 #include "server/commands/scene_arguments.h"
 #include "server/commands/validators.h"
-#include "server/progressive_render.h"
 #include "server/scene_resolver.h"
+#include "server/stop_rule.h"
 
 namespace scolopax {
 namespace {

@@ -70,7 +70,7 @@ class Core {
   std::shared_ptr<std::atomic<std::size_t>> unsentTexts = std::make_shared<std::atomic<std::size_t>>(0);
   asio::thread_pool workers;
   asio::thread_pool bulkWorkers;
-  /// For ordinary work on so many bytes: who sends much waits with his like.
+  /// Pool for quick work of this size: large requests queue only behind each other.
   asio::thread_pool& workersFor(std::size_t bytes) { return bytes > kBulkBytes ? bulkWorkers : workers; }
   asio::thread_pool slowWorkers;
   std::atomic<int> slowRunning{0};

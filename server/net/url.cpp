@@ -77,6 +77,12 @@ std::optional<Target> parseTarget(std::string_view target) {
   return out;
 }
 
+std::string_view trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
+}
+
 bool equalIgnoringCase(std::string_view a, std::string_view b) {
   const NameLess less;
   return a.size() == b.size() && !less(a, b) && !less(b, a);

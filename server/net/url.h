@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Request targets and origins: decoding and comparing, nothing else.
+// Request targets, origins and header values: decoding and comparing, nothing else.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -37,6 +37,8 @@ bool sameOrigin(std::string_view origin, std::string_view host);
 /// The rule for upgrades: no Origin (not a browser), the own one, or one of `allowed`.
 bool originAllowed(const Request& request, const std::vector<std::string>& allowed);
 
+/// Without the spaces and tabs around it.
+std::string_view trimmed(std::string_view text);
 /// ASCII only.
 bool equalIgnoringCase(std::string_view a, std::string_view b);
 

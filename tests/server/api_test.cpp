@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <thread>
@@ -150,6 +151,43 @@ TEST(Api, HoldsARenderToTheLimits) {
   EXPECT_EQ(api.errorOf("POST", "/api/v1/render", "{}", {}).first, 415);
   api.config.maxBodyBytes = 10;
   EXPECT_EQ(api.errorOf("POST", "/api/v1/render", kSmallRender).first, 413);
+}
+
+TEST(Api, RepeatsNoMoreThan200BytesOfWhatItWasSent) {
+  Api api;
+  const std::string text(900, 'x');
+  const std::string session = "/api/v1/sessions/" + api.workshop.store.create(json::object())->id();
+  const json dataset{{"dataset", text}}, unknown{{text, 1}}, method{{"integrator", {{"method", text}}}};
+  struct Call {
+    std::string method, target, body;
+    net::Headers headers{{"Content-Type", "application/json"}};
+  };
+  const Call calls[] = {
+      {"GET", "/api/v1/datasets/" + text, ""},
+      {"GET", "/api/v1/sessions/" + text, ""},
+      {"GET", session + "/frame?aov=" + text, ""},
+      {"GET", session + "/frame?format=" + text, ""},
+      {"GET", session + "/frame?after=" + text, ""},
+      {"GET", session + "/frame?timeout=" + text, ""},
+      {"POST", "/api/v1/sessions", unknown.dump()},
+      {"POST", "/api/v1/sessions", json{{"scene", unknown}}.dump()},
+      {"POST", "/api/v1/sessions", json{{"scene", dataset}}.dump()},
+      {"POST", "/api/v1/sessions", json{{"scene", method}}.dump()},
+      {"POST", "/api/v1/sessions", "{}", {{"Content-Type", text}}},
+      {"POST", "/api/v1/render", "{}", {{"Content-Type", "application/json"}, {"Accept", text}}},
+      {"PUT", session + "/scene", "{}", {{"Content-Type", "application/json"}, {"If-Match", text}}}};
+  for (const Call& call : calls) {
+    try {
+      api.call(call.method, call.target, call.body, call.headers);
+      ADD_FAILURE() << "no error: " << call.method << ' ' << call.target;
+    } catch (const ProtocolError& error) {
+      const auto echoed = [](std::string_view detail) {
+        return std::count(detail.begin(), detail.end(), 'x');
+      };
+      EXPECT_LE(echoed(error.what()), 205) << error.what();
+      EXPECT_LE(echoed(error.pointer), 205) << error.pointer;
+    }
+  }
 }
 
 TEST(Api, RefusesOneRenderTooManyWith503) {

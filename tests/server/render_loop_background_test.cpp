@@ -38,6 +38,71 @@ TEST(RenderLoop, RefusesAFilmThatTheMemoryForAllSessionsDoesNotHoldUntilItIsAske
   EXPECT_FALSE(viewers[4]->frames.empty());
 }
 
+TEST(RenderLoop, TriesAgainAfterASecondWhatOthersMemoryKeptItFrom) {
+  Workshop workshop;
+  workshop.control->memory = std::make_shared<MemoryBudget>(64 * 48);
+  auto others = MemoryBudget::take(workshop.control->memory, MemoryUse::grids, 64 * 48);
+  const auto session = workshop.store.create({{"image", {{"width", 64}, {"height", 48}}}});
+  const auto viewer = std::make_shared<FakeViewer>(), second = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.steps(3);
+  EXPECT_EQ(viewer->failures.size(), 1u);
+  EXPECT_EQ(workshop.render.step(), workshop.hooks.now() + Session::kRetryTime);
+  workshop.clock.advance(Session::kRetryTime);
+  workshop.steps(3);
+  EXPECT_EQ(workshop.control->renderersMade, 2);
+  EXPECT_EQ(viewer->failures.size(), 1u);  // is not told again of a retry in vain
+  session->addViewer(second);
+  workshop.steps(3);
+  EXPECT_EQ(second->failures.size(), 1u);
+  others.resize(0);
+  session->setView(2, true, 0);
+  workshop.steps(3);
+  EXPECT_FALSE(viewer->frames.empty());
+  EXPECT_FALSE(second->frames.empty());
+}
+
+TEST(RenderLoop, ShowsAFinishedPictureAgainThatCouldNotBeEncoded) {
+  Workshop workshop;
+  const auto session = workshop.store.create({{"stop", {{"samples", 1}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.steps(4);
+  const auto before = viewer->frames.size();
+  session->fail(1, Error(ErrorCode::busy, "memory for encodings"));
+  workshop.steps(4);
+  EXPECT_EQ(viewer->frames.size(), before);
+  workshop.clock.advance(Session::kRetryTime);
+  workshop.steps(4);
+  EXPECT_EQ(viewer->frames.size(), before + 1);
+}
+
+TEST(RenderLoop, RendersTheSceneThatReplacedOneWhosePictureCouldNotBeMade) {
+  Workshop workshop;
+  const auto session = workshop.store.create({{"image", {{"width", 1024}, {"height", 1024}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.render.step();
+  workshop.background.atOnce = false;
+  workshop.control->error = [](std::uint32_t) -> double {
+    throw Error(ErrorCode::busy, "memory for pictures");
+  };
+  workshop.clock.advance(600ms);
+  for (int i = 0; i < 4 && viewer->failures.empty(); ++i) {
+    // The picture is being made when the edit comes.
+    if (i == 2) session->patch({{"image", {{"width", 64}, {"height", 64}}}}, {});
+    workshop.background.finish();
+    workshop.render.step();
+  }
+  workshop.control->error = [](std::uint32_t) { return 1.0; };
+  workshop.background.atOnce = true;
+  workshop.background.finish();
+  EXPECT_FALSE(viewer->failures.empty());
+  workshop.steps(4);
+  ASSERT_FALSE(viewer->frames.empty());
+  EXPECT_EQ(viewer->frames.back().info.revision, 2u);
+}
+
 TEST(RenderLoop, BuildsInTheBackgroundWhileOthersHaveTheirTurns) {
   Workshop workshop;
   const auto calm = workshop.store.create(seedPatch(1)), other = workshop.store.create(seedPatch(2));

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "renderer/core/error.h"
+#include "renderer/data/film.h"
 
 namespace scolopax {
 namespace {
@@ -66,12 +67,16 @@ TEST(MemoryBudget, StaysAsItWasWhenAShareCannotGrow) {
 }
 
 TEST(MemoryBudget, LeavesTheLastQuarterToOrdinaryShares) {
-  const auto budget = budgetOf(1000);
-  const auto large = MemoryBudget::take(budget, MemoryUse::films, 700 * kMiB);
-  EXPECT_EQ(refusal(budget, 129).first, ErrorCode::busy);
-  const auto ordinary = MemoryBudget::take(budget, MemoryUse::films, 128 * kMiB);
-  EXPECT_EQ(refusal(budget, 128).first, ErrorCode::io);
-  EXPECT_EQ(refusal(budget, 751).first, ErrorCode::tooLarge);
+  const auto budget = budgetOf(2000);
+  const auto large = MemoryBudget::take(budget, MemoryUse::films, 1400 * kMiB);
+  EXPECT_EQ(refusal(budget, 257).first, ErrorCode::busy);
+  const auto ordinary = MemoryBudget::take(budget, MemoryUse::films, 256 * kMiB);
+  EXPECT_EQ(refusal(budget, 256).first, ErrorCode::io);
+  EXPECT_EQ(refusal(budget, 1501).first, ErrorCode::tooLarge);
+}
+
+TEST(MemoryBudget, TakesAFullHdFilmForAnOrdinaryOne) {
+  EXPECT_LE(1920 * 1080 * (Film::kPixelBytes + 1), MemoryBudget::kOrdinaryBytes);
 }
 
 TEST(MemoryBudget, GrantsEverythingWhereThereIsNone) {

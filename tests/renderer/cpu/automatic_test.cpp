@@ -5,6 +5,7 @@
 #include <cstring>
 #include <random>
 
+#include "renderer/core/error.h"
 #include "renderer/renderer.h"
 #include "tests/support/orbitals.h"
 
@@ -73,6 +74,35 @@ TEST(Automatic, DependsOnSceneAndDataAlone) {
   }
   EXPECT_EQ(chosen(volume, large).step, chosen(volume, scene).step);
   EXPECT_LT(chosen(volume, fine).step, chosen(volume, scene).step);
+}
+
+TEST(Automatic, LeavesAllAsItWasWhenItIsStoppedAndChoosesAnewTheNextTime) {
+  const auto volume = orbitals();
+  const Scene scene = automaticScene(*volume);
+  Scene edited = scene;
+  edited.channels[0].density *= 0.5;
+  edited.width *= 2;
+  std::stop_source stop;
+  stop.request_stop();
+  const auto renderer = makeCpuRenderer(volume, 1);
+  renderer->setScene(scene);
+  renderer->renderSample(kNever);
+  const Choice before = renderer->choice();
+  try {
+    renderer->setScene(edited, stop.get_token());
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::cancelled);
+  }
+  EXPECT_EQ(renderer->choice().method, before.method);
+  EXPECT_EQ(renderer->choice().step, before.step);
+  EXPECT_TRUE(renderer->renderSample(kNever));
+  EXPECT_EQ(renderer->image().width, scene.width);
+  EXPECT_EQ(renderer->samples(), 2u);
+  EXPECT_FALSE(renderer->setScene(scene).filmReset);
+  EXPECT_TRUE(renderer->setScene(edited).filmReset);
+  EXPECT_EQ(renderer->choice().method, chosen(volume, edited).method);
+  EXPECT_EQ(renderer->choice().step, chosen(volume, edited).step);
 }
 
 TEST(Automatic, ChoosesAnewAfterASceneThatSaidWhatWasChosenForAnother) {

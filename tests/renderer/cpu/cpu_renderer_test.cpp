@@ -256,6 +256,23 @@ TEST(CpuRenderer, TakesItsMemoryFromTheBudgetAndRefusesWhatIsNotThere) {
   EXPECT_EQ(memory->used(MemoryUse::grids), 0u);
 }
 
+TEST(CpuRenderer, GivesTheMemoryOfALargerFilmBackWhenItIsStopped) {
+  const auto volume = orbitals();
+  Scene scene = orbitalScene(*volume);
+  scene.width = scene.height = 64;
+  const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(256) << 20);
+  const auto renderer = makeCpuRenderer(volume, 0, memory);
+  renderer->setScene(scene);
+  const auto before = memory->used(MemoryUse::films);
+  Scene large = scene;
+  large.width = large.height = 1024;
+  large.macrocell = 3;
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THROW(renderer->setScene(large, stop.get_token()), Error);
+  EXPECT_EQ(memory->used(MemoryUse::films), before);
+}
+
 TEST(CpuRenderer, TellsWhichScenesTakeLong) {
   const auto volume = orbitals();
   Scene scene = orbitalScene(*volume);

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/stop_rule.h"
+
+namespace scolopax::server {
+namespace {
+
+/// As many as a scene may ask for; numbers of samples beyond 2^31 would repeat draws.
+constexpr std::uint32_t kMaxSamples = 1u << 24;
+
+}  // namespace
+
+bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
+  const std::uint32_t samples = renderer.samples();
+  // The estimate counts from 16 samples on: fewer can look alike by chance.
+  return samples > 0 && (samples >= kMaxSamples || (stop.samples > 0 && samples >= stop.samples) ||
+                         (stop.seconds > 0 && seconds >= stop.seconds) ||
+                         (stop.error > 0 && samples >= 16 && renderer.estimatedError() <= stop.error));
+}
+
+}  // namespace scolopax::server
