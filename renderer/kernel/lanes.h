@@ -9,15 +9,17 @@
 #include "renderer/kernel/portable.h"
 
 // A lane type L has kLanes, Float, Int (32 bits), Word (the same without a sign; where it is compared or
-// converted its highest bit is 0), Mask (all of a lane, or nothing) and Vec (three Floats), everywhere() and
-// laneNumbers(); with `any(mask)` an `if` where there is one lane. Beside arithmetic:
-//   without(a, b)           a, but not where b is
-//   select(m, a, b)         a where the mask is set, else b; where(m, a) with b = 0; onesOf(m) with a = 1, b
-//   = 0 bitsOf(mask)            bit i is lane i left, right<bits>       shifts, right of a number without
-//   sign; rightSigned permuted(a, index)      lane index[i] of a in lane i at(a, i), put(x, i, p)  one lane,
-//   p in memory; firstIn(m, a): of the first lane in the mask minimum(a, b)           b where either is NaN;
-//   comparisons with NaN are false gather(base, i)         base[i]; of 16 bits it may read two bytes more
-//   truncated, toFloat      conversions; floatOfWord of all 32 bits; bitsOf and floatOf leave the bits alone
+// converted its highest bit is 0), Mask (all of a lane, or nothing), Vec (three Floats), everywhere() and
+// laneNumbers(). `if (any(mask))` is a plain `if` where there is one lane. Beside arithmetic there are:
+// - without(a, b): a, but not where b is set;
+// - select(m, a, b): a where m is set, else b; where(m, a): with b = 0; onesOf(m): with a = 1 and b = 0;
+// - bitsOf(mask): bit i is lane i; bitsOf(a), floatOf(a): the same bits as another type;
+// - left<bits>, right<bits>, rightSigned<bits>: shifts, of which right takes a number without a sign;
+// - permuted(a, index): lane index[i] of a in lane i; firstIn(m, a): that of the first lane in the mask;
+// - at(a, i), put(x, i, p): one lane, p in memory;
+// - minimum(a, b), maximum(a, b): b where either is NaN, with which every comparison is false;
+// - gather(base, i): base[i]; of 16-bit numbers it may read two bytes more;
+// - truncated, toFloat: conversions; floatOfWord: of all 32 bits.
 namespace scolopax::kernel {
 
 inline constexpr float kInfinity = __builtin_huge_valf();

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What marks code that runs on host and device alike, and code that runs on one lane or many. Kernels use
-// only
-// + - * /, comparisons and the functions of this folder, so that every compiler and device computes the same
-// bits.
+// only arithmetic, comparisons and the functions of this folder, so that every compiler and device computes
+// the same bits.
 #pragma once
 
 #if defined(__CUDACC__)
