@@ -10,9 +10,9 @@ namespace scolopax {
 
 /// Side of the pictures, pixels: the longer one.
 inline constexpr int kThumbnailSide = 24, kLitThumbnailSide = 16;
-/// What is claimed for a bias is this many standard deviations above what was found: were the pictures' rays
-/// drawn from the scene's at random, and many enough for the law of large numbers, too little would be
-/// claimed for one scene in 44.
+/// The bias claimed is this many standard deviations above the estimate. If the rays of the small pictures
+/// were drawn at random, and were many, a single estimate would be too low for one scene in 44. largestStep
+/// takes the first step that passes, after up to four estimates of each, so it errs more often.
 inline constexpr double kDeviations = 2;
 
 /// RMSE, over linear premultiplied RGBA, of the expected picture of the plan's scene by quadrature at its

@@ -96,8 +96,9 @@ SCOLOPAX_HD inline float boundAhead(const SceneView& scene, int n, const Ray& ra
 }
 
 /// Goes on through the walk's macrocell, from `past` its entry to `end`, in stretches that have bounds of
-/// their own. `random` and `depth` are of the next tentative collision, and stay so. `bound(cell, point,
-/// least, &way)` is that of a stretch, as boundAhead gives it; `test(bound, place, point, random)` tests.
+/// their own. On entry and exit, `random` and `depth` belong to the next tentative collision. `boundOf(cell,
+/// point, least, &way)` bounds a stretch as boundAhead does; `test(bound, place, point, random)` tests a
+/// tentative collision.
 template <class Bound, class Test>
 SCOLOPAX_HD CellOutcome trackCellClosely(const SceneView& scene, const Ray& ray, const CellWalk& walk,
                                          float past, float end, Sampler& sampler, RandomBlock* random,
@@ -151,10 +152,10 @@ SCOLOPAX_APART CloselyTracked trackClosely(Track track, const SceneView& scene, 
   return {hit, sampler.blocks(), cost};
 }
 
-/// Track::along<kClosely> tracks along a ray. With kClosely false it stops and says that it is stuck where it
-/// ought to look closer. Then the ray is tracked once more: the random numbers are the same, and so is all
-/// that happens on the way to that place. Looking closer is thus apart from the code that most rays run,
-/// which is slower by a fifth when the two share variables.
+/// Track::along<kClosely> tracks along a ray. With kClosely false it sets `stuck` and stops where it should
+/// look closer. The ray is then tracked again from its start with the same random numbers, so that it comes
+/// to the same place. This keeps the close look out of the loop that most rays run, which is up to a fifth
+/// slower with it.
 template <class Track>
 SCOLOPAX_HOT std::optional<Collision> trackWithPatience(const Track& track, const SceneView& scene,
                                                         const Ray& ray, Interval inside, Sampler& sampler,
@@ -172,7 +173,7 @@ SCOLOPAX_HOT std::optional<Collision> trackWithPatience(const Track& track, cons
   cost->cellSteps += again.cost.cellSteps;
   cost->truncated |= again.cost.truncated;
   if (!again.hit) return std::nullopt;
-  // Number by number: a copy of the whole would keep every ray's collision in memory.
+  // Member by member: copying the whole keeps every ray's collision in memory (g++ 12).
   const Collision& met = *again.hit;
   return Collision{
       {met.place.enter, met.place.past}, {met.point.x, met.point.y, met.point.z}, met.channel, met.position};
