@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "renderer/core/error.h"
-#include "tests/support/orbitals.h"
+#include "tests/support/volumes.h"
 
 namespace scolopax {
 namespace {
@@ -16,17 +16,27 @@ namespace {
 using namespace test;
 using namespace std::chrono_literals;
 
-/// Thumbnails of it take minutes.
-Scene endlessScene(const Volume& volume) {
-  Scene scene = orbitalScene(volume);
+/// Noise, 3000 voxels deep.
+std::shared_ptr<const Volume> deepVolume() {
+  const glm::ivec3 dims(4, 4, 3000);
+  const auto value = [](int x, int y, int z) { return (x * 89 + y * 57 + z * 131) % 256; };
+  const auto channel = [&] { return channelOf<std::uint8_t>(dims, value); };
+  return volumeOf(gridOf(dims), channel(), channel());
+}
+
+/// Seen along its depth, and through all of it: marched for minutes.
+Scene slowScene(const Volume& volume) {
+  Scene scene = frontScene(volume, 16, 16);
+  for (ChannelAppearance& channel : scene.channels) channel.density = 1e-4;
   scene.method = Method::raymarch;
-  scene.step = 0.002;
+  scene.blend = BlendMode::max;
+  scene.step = 0.01;
   scene.shading = scene.shadows = true;
   scene.lights.assign(8, {});
   return scene;
 }
 
-/// Whether the work ends as cancelled, long before it would have been done.
+/// Whether the work ends as cancelled, and not minutes later.
 template <class Work>
 void expectToEndWhenStopped(Work work) {
   std::stop_source stop;
@@ -43,17 +53,16 @@ void expectToEndWhenStopped(Work work) {
     EXPECT_EQ(error.code(), ErrorCode::cancelled);
   }
   other.join();
-  EXPECT_LT(std::chrono::steady_clock::now() - requested, 5s);
+  EXPECT_LT(std::chrono::steady_clock::now() - requested, 30s);
 }
 
 TEST(Thumbnails, EndSoonAfterAStopIsRequested) {
-  const auto volume = orbitals();
+  const auto volume = deepVolume();
   RenderPlan plan(volume);
-  plan.update(endlessScene(*volume));
+  plan.update(slowScene(*volume));
   expectToEndWhenStopped([&](const std::stop_token& stop) { estimateBias(plan, stop); });
-  expectToEndWhenStopped([&](const std::stop_token& stop) {
-    while (true) largestStep(plan, Method::raymarch, 1e-9, stop);
-  });
+  expectToEndWhenStopped(
+      [&](const std::stop_token& stop) { largestStep(plan, Method::raymarch, 1e-9, stop); });
 }
 
 TEST(Thumbnails, MarchNoFinerThanTheSmallestStepOfARay) {
