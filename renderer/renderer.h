@@ -70,7 +70,11 @@ class Renderer {
   virtual std::uint32_t samples() const = 0;
   /// Estimated RMSE over linear premultiplied RGBA of the picture as it stands: of noise and, for quadrature
   /// that was chosen automatically or has 16 samples, bias; NaN below two samples.
-  virtual double estimatedError() const = 0;
+  /// Throws Error(cancelled) soon after `stop` is requested, but only while errorTakesLong().
+  virtual double estimatedError(std::stop_token stop = {}) const = 0;
+  /// Whether estimatedError would measure a bias, which takes long; once it has, the bias is known until the
+  /// film is reset.
+  virtual bool errorTakesLong() const = 0;
   /// From now on, count what samples cost; costs a little time and 16 bytes a pixel. Call before setScene.
   virtual void countCosts() = 0;
   /// All zero unless counting.

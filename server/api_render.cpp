@@ -2,11 +2,18 @@
 // POST /render: scene in, picture out, nothing kept.
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <cstdio>
+#include <limits>
+#include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stop_token>
+#include <thread>
 
 #include "protocol/problem.h"
+#include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
 #include "server/api.h"
 #include "server/stop_rule.h"
@@ -18,6 +25,8 @@ using protocol::ProtocolError;
 
 /// Seconds that a pass goes on before it is asked whether anybody still waits for the picture.
 constexpr double kSlice = 0.1;
+/// Seconds that a clock can still add to its time.
+constexpr double kForever = 1e9;
 
 /// A place among the renders that may run at once.
 class RenderPlace {
@@ -36,11 +45,15 @@ class RenderPlace {
   std::atomic<int>& running_;
 };
 
-/// Whether a render is to end early: its client has gone, or the server stops.
+using Clock = std::chrono::steady_clock;
+
+/// Whether a render is to end early: its client has gone, the server stops, or its time is over.
 class Ending {
  public:
-  Ending(const std::stop_token& gone, const std::stop_token& cutting)
-      : gone_(gone, Request{this}), cutting_(cutting, Request{this}) {}
+  Ending(const std::stop_token& gone, const std::stop_token& cutting, double seconds)
+      : gone_(gone, Request{this}),
+        cutting_(cutting, Request{this}),
+        timer_([this, seconds](const std::stop_token& over) { endAfter(seconds, over); }) {}
   std::stop_token token() const { return source_.get_token(); }
   const std::atomic<bool>& flag() const { return flag_; }
 
@@ -52,10 +65,50 @@ class Ending {
       ending->source_.request_stop();
     }
   };
+  void endAfter(double seconds, const std::stop_token& over) {
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable_any never;
+    const std::chrono::duration<double> most(std::min(seconds, kForever));
+    never.wait_for(lock, over, std::chrono::duration_cast<Clock::duration>(most), [] { return false; });
+    if (!over.stop_requested()) Request{this}();
+  }
+
   std::stop_source source_;
   std::atomic<bool> flag_{false};
   std::stop_callback<Request> gone_, cutting_;
+  std::jthread timer_;
 };
+
+/// What `work` returns; none when it was stopped.
+template <class Work>
+auto unlessStopped(Work work) -> std::optional<decltype(work())> {
+  try {
+    return work();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::cancelled) throw;
+    return std::nullopt;
+  }
+}
+
+/// Its estimated error; NaN when it was stopped before that was known.
+double errorOf(const Renderer& renderer, const std::stop_token& stop) {
+  return unlessStopped([&] { return renderer.estimatedError(stop); })
+      .value_or(std::numeric_limits<double>::quiet_NaN());
+}
+
+void checkWanted(const ApiContext& context, const net::Request& request) {
+  if (request.gone.stop_requested()) throw ProtocolError(503, "", "the client has gone");
+  if (context.cutting.stop_requested()) throw ProtocolError(503, "", "the server is stopping");
+}
+
+/// A picture that depends on the machine's speed is only for those who asked for it.
+ProtocolError tooLate(double limit, std::uint32_t samples) {
+  return ProtocolError(422, "/stop",
+                       "expected to end within " + shortText(limit) + " seconds, found " +
+                           std::to_string(samples) +
+                           " samples done by then; ask for less, or set stop.seconds");
+}
 
 /// FNV-1a, 64 bits, of the resolved scene's canonical text: equal pictures have equal hashes.
 std::string sceneHash(const ResolvedScene& scene) {
@@ -79,13 +132,15 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
                         "expected at most " + shortText(limit) + ", found " + shortText(scene->stop.seconds));
   const RenderPlace place(running, context.config.maxRenders);
 
-  const auto begin = std::chrono::steady_clock::now();
-  const auto seconds = [&] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  };
+  const auto begin = Clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   const auto renderer = context.makeRenderer(scene->dataset->volume);
-  const Ending ending(request.gone, context.cutting);
-  const RebuildStats rebuild = renderer->setScene(scene->render, ending.token());
+  const Ending ending(request.gone, context.cutting, limit);
+  const auto rebuild = unlessStopped([&] { return renderer->setScene(scene->render, ending.token()); });
+  if (!rebuild) {
+    checkWanted(context, request);
+    throw tooLate(limit, 0);
+  }
   while (!stopMet(scene->stop, *renderer, seconds())) {
     // A rule of time may end a pass in the middle; the first sample is given more, up to the server's own
     // limit.
@@ -94,19 +149,19 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
     // In this order: no duration but a short one becomes one of whole nanoseconds.
     const auto budget = std::chrono::duration<double>(std::clamp(until - seconds(), 0.0, kSlice));
     const auto slice = std::chrono::duration_cast<std::chrono::nanoseconds>(budget);
-    if (renderer->renderSample(ending.flag(), slice)) continue;
-    if (request.gone.stop_requested()) throw ProtocolError(503, "", "the client has gone");
-    if (context.cutting.stop_requested()) throw ProtocolError(503, "", "the server is stopping");
+    if (renderer->renderSample(ending.flag(), slice)) {
+      // Before stopMet, which does not wait for it.
+      if (scene->stop.error > 0 && renderer->errorTakesLong()) errorOf(*renderer, ending.token());
+      continue;
+    }
+    checkWanted(context, request);
     if (seconds() < until) continue;
     if (timed && until < limit) break;
-    // A picture that depends on the machine's speed is only for those who asked for it.
-    throw ProtocolError(422, "/stop",
-                        "expected to end within " + shortText(limit) + " seconds, found " +
-                            std::to_string(renderer->samples()) +
-                            " samples done by then; ask for less, or set stop.seconds");
+    throw tooLate(limit, renderer->samples());
   }
   const auto milliseconds = std::int64_t(seconds() * 1000);
-  const std::string error = nlohmann::json(renderer->estimatedError()).dump();
+  const std::string error = nlohmann::json(errorOf(*renderer, ending.token())).dump();
+  checkWanted(context, request);
   const auto pixels = std::uint64_t(scene->render.width) * std::uint64_t(scene->render.height);
   const auto memory = MemoryBudget::takeShared(
       context.memory, MemoryUse::encodings, pixels * sizeof(glm::vec4) + imageMemory(pixels, type->format));
@@ -123,7 +178,7 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
                       {"Scolopax-Step", shortText(renderer->choice().step)},
                       {"Scolopax-Scene", sceneHash(*scene)},
                       {"Scolopax-Render-Ms", std::to_string(milliseconds)},
-                      {"Scolopax-Rebuild-Ms", std::to_string(std::int64_t(rebuild.rebuildMs))},
+                      {"Scolopax-Rebuild-Ms", std::to_string(std::int64_t(rebuild->rebuildMs))},
                       {"Vary", "Accept"}};
   return response;
 }

@@ -89,15 +89,17 @@ struct ProgressiveRender::Showing {
   double sampleError = 0;
   double share = 0;  ///< of the new picture in the mixture
 
-  void make(const Renderer& renderer, std::uint64_t pixels, const std::shared_ptr<MemoryBudget>& memory) {
+  /// Throws Error(cancelled) when it is stopped while the error is measured.
+  void make(const Renderer& renderer, std::uint64_t pixels, const std::shared_ptr<MemoryBudget>& memory,
+            const std::stop_token& stop) {
     FrameInfo& info = frame.info;
+    info.error = float(renderer.estimatedError(stop));
     const auto take = [&](std::size_t pixelBytes) {
       return MemoryBudget::take(memory, MemoryUse::pictures, pixels * pixelBytes);
     };
     // Mixing makes another one of the reduced picture.
     auto imageMemory = take(sizeof(glm::vec4) * (reduced ? 2 : 1));
     auto aovMemory = take(aovs ? std::size(kAovs) * sizeof(float) : 0);
-    info.error = float(renderer.estimatedError());
     Image picture = renderer.image();
     if (reduced) {
       const double error = info.samples > 1 ? double(info.error) : sampleError;
@@ -253,8 +255,9 @@ void ProgressiveRender::collect(PassResult& result) {
     job->rethrow();
   } catch (const Error& error) {
     if (error.code() != ErrorCode::cancelled) throw;
+    result.abandoned = taking_ != nullptr;
     taking_.reset();
-    result.abandoned = true;
+    showing_.reset();
     return;
   }
   (this->*next_)(result);
@@ -263,7 +266,8 @@ void ProgressiveRender::collect(PassResult& result) {
 void ProgressiveRender::supervise() {
   if (!job_ || job_->done()) return;
   const RenderRequest request = session_->request();
-  if (!request.wanted || (taking_ && taking_->uselessFor(request))) job_->cancel();
+  const bool useless = taking_ ? taking_->uselessFor(request) : showing_ && sceneStale(request);
+  if (!request.wanted || useless) job_->cancel();
 }
 
 void ProgressiveRender::takeScene(const RenderRequest& request, const Others& others, PassResult& result) {
@@ -329,7 +333,8 @@ void ProgressiveRender::addSample(bool urgent, bool othersUrgent, PassResult& re
   if (!complete) return;
   const auto add = [renderer = renderer_, estimate = scene_->stop.error > 0](const std::stop_token&) {
     renderer->addPixels();
-    if (estimate) renderer->estimatedError();  // so that it is known when it is asked for
+    // So that it is known when it is asked for; what takes long is left to show().
+    if (estimate && !renderer->errorTakesLong()) renderer->estimatedError();
   };
   perform(largeFilm(), add, &ProgressiveRender::sampleAdded, result);
 }
@@ -365,8 +370,8 @@ void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
   if (!request.interactive && !info.final && request.pollSamples.empty()) showing_->reduced = reduced_;
   showing_->sampleError = sampleError_;
   const auto make = [showing = showing_, renderer = renderer_, pixels = filmSize(), memory = context_.memory](
-                        const std::stop_token&) { showing->make(*renderer, pixels, memory); };
-  perform(largeFilm(), make, &ProgressiveRender::pictureMade, result);
+                        const std::stop_token& stop) { showing->make(*renderer, pixels, memory, stop); };
+  perform(largeFilm() || renderer_->errorTakesLong(), make, &ProgressiveRender::pictureMade, result);
 }
 
 void ProgressiveRender::pictureMade(PassResult&) {

@@ -80,7 +80,7 @@ class ProgressiveRender {
   bool edited() const;
   /// When there may be work without being woken.
   std::optional<TimePoint> dueAt() const;
-  /// Gives up what is built in the background, once nobody wants it any more.
+  /// Gives up what is built or measured in the background, once nobody wants it any more.
   void supervise();
   /// One sample pass at most, with the rebuild before it and the submission after it, of which what takes
   /// long goes on in the background until a later turn. Never throws: what cannot be rendered is told to the

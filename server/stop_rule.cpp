@@ -12,9 +12,12 @@ constexpr std::uint32_t kMaxSamples = 1u << 24;
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
   const std::uint32_t samples = renderer.samples();
   // The estimate counts from 16 samples on: fewer can look alike by chance.
+  const auto errorMet = [&] {
+    return stop.error > 0 && samples >= 16 && !renderer.errorTakesLong() &&
+           renderer.estimatedError() <= stop.error;
+  };
   return samples > 0 && (samples >= kMaxSamples || (stop.samples > 0 && samples >= stop.samples) ||
-                         (stop.seconds > 0 && seconds >= stop.seconds) ||
-                         (stop.error > 0 && samples >= 16 && renderer.estimatedError() <= stop.error));
+                         (stop.seconds > 0 && seconds >= stop.seconds) || errorMet());
 }
 
 }  // namespace scolopax::server

@@ -14,7 +14,8 @@ struct StopRule {
   double error = 0;
 };
 
-/// Whether rendering ends at what `renderer` has and the seconds it took.
+/// Whether rendering ends at what `renderer` has and the seconds it took. An error that takes long to find is
+/// not known here: somebody else asks for it first.
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds);
 
 }  // namespace scolopax::server

@@ -112,14 +112,14 @@ class CpuRenderer final : public Renderer {
   }
 
   std::uint32_t samples() const override { return film_.samples(); }
-  double estimatedError() const override {
+  double estimatedError(std::stop_token stop) const override {
     if (!noise_) arena_.execute([&] { noise_ = film_.estimatedError(); });
-    const double noise = *noise_;
-    if (!hasStep(plan_.scene().method)) return noise;
+    if (errorTakesLong()) arena_.execute([&] { bias_ = estimateBias(plan_, stop); });
+    return std::hypot(*noise_, bias_.value_or(0));
+  }
+  bool errorTakesLong() const override {
     // A film of few samples may be one of many that edits make, and is not worth the thumbnails.
-    if (!bias_ && film_.samples() < kSamplesWorthBias) return noise;
-    if (!bias_) arena_.execute([&] { bias_ = estimateBias(plan_); });
-    return std::hypot(noise, *bias_);
+    return hasStep(plan_.scene().method) && !bias_ && film_.samples() >= kSamplesWorthBias;
   }
   Image image() const override {
     Image image;
@@ -195,7 +195,6 @@ class CpuRenderer final : public Renderer {
     const Method quadrature = scene.shadows ? Method::hybrid : Method::raymarch;
     // Half of the error is left to noise.
     const auto found = largestStep(trial, quadrature, scene.targetError / 2, stop);
-    if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "nobody waits for the choice of a method");
     if (!found) return {{Method::superposed, Scene().step}, 0};
     return {{quadrature, found->step}, found->bias};
   }

@@ -4,10 +4,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <map>
 
+#include "renderer/core/error.h"
 #include "renderer/cpu/pass.h"
 #include "renderer/cpu/ray_packets.h"
 #include "renderer/data/camera.h"
@@ -26,12 +28,13 @@ struct Pictures {
 };
 /// Where one has noise that another step has not, more samples tell it from bias: up to so many.
 constexpr std::size_t kSamples = 4, kMostSamples = 32;
-/// Of a ray, at a step that others are compared with.
+/// Of a ray, at the smallest step.
 constexpr double kMostSegments = 1 << 16;
 
 class Thumbnails {
  public:
-  Thumbnails(const RenderPlan& plan, Scene scene) : view_(plan.view()) {
+  Thumbnails(const RenderPlan& plan, Scene scene, const std::stop_token& stop)
+      : view_(plan.view()), onStop_(stop, RaiseFlag{&stopped_}) {
     scene.shadows = scene.shadows && view_.lightCount > 0;
     const bool lit = scene.shading || scene.shadows;
     const double longer = std::max(scene.width, scene.height);
@@ -50,27 +53,34 @@ class Thumbnails {
     addSamples(pictures, kSamples);
     return pictures;
   }
+  /// Throws Error(cancelled) once a stop is requested.
   void addSamples(Pictures& pictures, std::size_t count) {
     view_.step = view_.smallestSpacing * float(pictures.step);
     const std::size_t pixels = std::size_t(view_.width) * std::size_t(view_.height);
-    const std::atomic<bool> never = false;
     const int tilesX = (view_.width + kTile - 1) / kTile, tilesY = (view_.height + kTile - 1) / kTile;
     while (pictures.samples.size() < count) {
       const auto number = sampleNumber(Sampling::independent, std::uint32_t(pictures.samples.size()));
       std::vector<glm::vec4>& sample = pictures.samples.emplace_back(pixels);
       std::vector<std::uint8_t> done(pixels, 0);
       const Pass pass{view_,   number,      sample.data(), nullptr,
-                      nullptr, done.data(), &never,        std::chrono::steady_clock::time_point::max()};
+                      nullptr, done.data(), &stopped_,     std::chrono::steady_clock::time_point::max()};
       tbb::parallel_for(0, tilesX * tilesY, [&](int i) { render_(pass, i % tilesX, i / tilesX); });
+      if (stopped_) throw Error(ErrorCode::cancelled, "nobody waits for the bias of a step");
       rays_ += pixels;
     }
   }
   std::uint64_t rays() const { return rays_; }
 
  private:
+  struct RaiseFlag {
+    std::atomic<bool>* flag;
+    void operator()() const { *flag = true; }
+  };
   kernel::SceneView view_;
   TileFunction render_;
   std::uint64_t rays_ = 0;
+  std::atomic<bool> stopped_{false};
+  std::stop_callback<RaiseFlag> onStop_;
 };
 
 /// An estimate, and the standard deviation that its pixels' spread gives it.
@@ -104,8 +114,8 @@ Estimate squaredDifference(const Pictures& a, const Pictures& b) {
 /// Small pictures at all steps that somebody has asked for.
 class Steps {
  public:
-  Steps(const RenderPlan& plan, const Scene& scene)
-      : thumbnails_(plan, scene),
+  Steps(const RenderPlan& plan, const Scene& scene, const std::stop_token& stop)
+      : thumbnails_(plan, scene, stop),
         finest_(plan.grid().diagonal() / double(plan.view().smallestSpacing) / kMostSegments) {}
 
   /// Whether a step that is small enough beside this one is not too small to be marched with.
@@ -115,6 +125,7 @@ class Steps {
   /// changes of it, and what finer ones would as halving the step goes on to take away the same share. Steps
   /// that all leap over the same voxels look alike: the fine one does not.
   double bias(double step) {
+    step = std::max(step, finest_);
     const double finest = fineStep(step);
     const Pictures& fine = at(finest);
     const Estimate last = squaredDifference(at(2 * finest), fine);
@@ -140,7 +151,7 @@ class Steps {
   std::uint64_t rays() const { return thumbnails_.rays(); }
 
  private:
-  double fineStep(double step) const { return std::min(step / 4, std::max(0.25, finest_)); }
+  double fineStep(double step) const { return std::max(std::min(step / 4, 0.25), finest_); }
   Pictures& at(double step) {
     const auto found = pictures_.find(step);
     return found != pictures_.end() ? found->second
@@ -154,16 +165,18 @@ class Steps {
 
 }  // namespace
 
-double estimateBias(const RenderPlan& plan) { return Steps(plan, plan.scene()).bias(plan.scene().step); }
+double estimateBias(const RenderPlan& plan, const std::stop_token& stop) {
+  return Steps(plan, plan.scene(), stop).bias(plan.scene().step);
+}
 
 std::optional<BiasedStep> largestStep(const RenderPlan& plan, Method method, double target,
                                       const std::stop_token& stop, std::uint64_t* rays) {
   Scene scene = plan.scene();
   scene.method = method;
-  Steps steps(plan, scene);
+  Steps steps(plan, scene, stop);
   std::optional<BiasedStep> found;
   for (const double step : kSteps) {
-    if (stop.stop_requested() || !steps.canTell(step)) break;
+    if (!steps.canTell(step)) break;
     double bias = steps.bias(step);
     while (bias > target && steps.leastBias(step) <= target && steps.lookAgain(step)) bias = steps.bias(step);
     if (bias > target) continue;

@@ -17,8 +17,10 @@ inline constexpr double kDeviations = 2;
 
 /// RMSE, over linear premultiplied RGBA, of the expected picture of the plan's scene by quadrature at its
 /// step, with all its light: what a quarter of the step, and of a voxel, changes of it, and what still
-/// smaller steps would as the last differences foretell. Takes the threads of the caller's arena.
-double estimateBias(const RenderPlan& plan);
+/// smaller steps would as the last differences foretell. No step is so small that a ray has more than 2^16 of
+/// them; for such a one, the bias of the smallest that is not. Takes the threads of the caller's arena.
+/// Throws Error(cancelled) soon after `stop` is requested.
+double estimateBias(const RenderPlan& plan, const std::stop_token& stop = {});
 
 /// A step, and the bias that was found for it.
 struct BiasedStep {
@@ -27,8 +29,9 @@ struct BiasedStep {
 };
 
 /// The largest of 4, 2, 1, ... 1/8 at which the bias of `method` is at most `target`; none when it is at
-/// none, or `stop` was requested in between. The same for the same scene and volume, whatever the picture's
-/// size. `rays`: how many it took, at most 32 times kThumbnailSide^2 for each of eight steps.
+/// none. The same for the same scene and volume, whatever the picture's size. `rays`: how many it took, at
+/// most 32 times kThumbnailSide^2 for each of eight steps. Throws Error(cancelled) soon after `stop` is
+/// requested.
 std::optional<BiasedStep> largestStep(const RenderPlan& plan, Method method, double target,
                                       const std::stop_token& stop = {}, std::uint64_t* rays = nullptr);
 

@@ -143,7 +143,10 @@ void render(const Options& options) {
     renderer->renderSample(cancel, std::chrono::milliseconds(100));
     seconds = std::chrono::duration<double>(Clock::now() - start).count();
     bar.show(renderer->samples(), seconds);
-    if (cancel || server::stopMet(stop, *renderer, seconds)) break;
+    if (cancel) break;
+    // Before stopMet, which does not wait for it.
+    if (stop.error > 0 && renderer->errorTakesLong()) renderer->estimatedError();
+    if (server::stopMet(stop, *renderer, seconds)) break;
   }
   bar.clear();
   if (cancel) {

@@ -29,7 +29,7 @@ struct Api {
   SceneResolver resolver{datasets, {64, 1000}};
   StreamHub streams{workshop.store, metrics, {}};
   std::atomic<bool> stopping{false};
-  std::stop_source cutting;
+  std::stop_source gone, cutting;
   ApiContext context{config,
                      *datasets,
                      resolver,
@@ -63,6 +63,7 @@ struct Api {
     request.path = target.substr(0, target.find('?'));
     request.body = body;
     request.headers = std::move(headers);
+    request.gone = gone.get_token();
     static const std::regex pair("[?&]([^=]+)=([^&]*)");
     for (std::sregex_iterator at(target.begin(), target.end(), pair), end; at != end; ++at)
       request.query.emplace((*at)[1], (*at)[2]);
@@ -135,6 +136,44 @@ TEST(Api, GivesTheSameBytesForTheSameRender) {
   const auto other = api.call("POST", "/api/v1/render",
                               R"({"image": {"width": 20, "height": 10}, "integrator": {"seed": 1}})");
   EXPECT_NE(headerOf(first, "Scolopax-Scene"), headerOf(other, "Scolopax-Scene"));
+}
+
+TEST(Api, EndsTheMeasuringOfAnErrorWithTheTimeForTheRender) {
+  Api api;
+  api.config.maxRenderSeconds = 0.5;
+  api.workshop.control->longErrorFrom = 3;
+  api.workshop.control->measuring = [](const std::stop_token& stop) {
+    while (!stop.stop_requested()) std::this_thread::sleep_for(1ms);
+  };
+  const auto finished = api.call("POST", "/api/v1/render", kSmallRender);
+  EXPECT_EQ(finished.status, 200);
+  EXPECT_EQ(headerOf(finished, "Scolopax-Error"), "null");
+  EXPECT_EQ(api.errorOf("POST", "/api/v1/render",
+                        R"({"image": {"width": 20, "height": 10}, "stop": {"error": 2}})"),
+            Expected(422, "/stop"));
+}
+
+TEST(Api, EndsTheMeasuringOfAnErrorWhenItsClientHasGoneOrTheServerStops) {
+  for (const bool gone : {false, true}) {
+    Api api;
+    api.workshop.control->longErrorFrom = 3;
+    bool stopped = false;
+    api.workshop.control->measuring = [&](const std::stop_token& stop) {
+      (gone ? api.gone : api.cutting).request_stop();
+      stopped = stop.stop_requested();
+    };
+    EXPECT_EQ(api.errorOf("POST", "/api/v1/render", kSmallRender), Expected(503, ""));
+    EXPECT_TRUE(stopped);
+  }
+}
+
+TEST(Api, MeasuresAnErrorThatARenderEndsAt) {
+  Api api;
+  api.workshop.control->longErrorFrom = 16;
+  const auto response =
+      api.call("POST", "/api/v1/render", R"({"image": {"width": 20, "height": 10}, "stop": {"error": 2}})");
+  EXPECT_EQ(headerOf(response, "Scolopax-Samples"), "16");
+  EXPECT_EQ(headerOf(response, "Scolopax-Error"), "1.0");
 }
 
 TEST(Api, HoldsARenderToTheLimits) {

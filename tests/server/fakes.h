@@ -43,6 +43,8 @@ struct FakeControl {
   bool takesLong = false;                         ///< of every scene, not only of a renderer's first
   std::function<void(std::stop_token)> building;  ///< called in setScene
   std::shared_ptr<MemoryBudget> memory;           ///< of which films take a byte a pixel
+  std::uint32_t longErrorFrom = ~0u;  ///< samples from which the error takes long, until it is measured
+  std::function<void(std::stop_token)> measuring;  ///< called while it is
 };
 
 /// Begins no job before it is told to, or each at once.
@@ -82,7 +84,7 @@ class FakeRenderer : public Renderer {
     RebuildStats stats;
     stats.filmReset = samples_ == 0 || scene.seed != scene_.seed || scene.width != scene_.width ||
                       scene.height != scene_.height;
-    if (stats.filmReset) samples_ = 0;
+    if (stats.filmReset) samples_ = 0, measured_ = false;
     scene_ = scene;
     return stats;
   }
@@ -108,7 +110,15 @@ class FakeRenderer : public Renderer {
   void addPixels() override { ++samples_; }
   Choice choice() const override { return {scene_.method, scene_.step}; }
   std::uint32_t samples() const override { return samples_; }
-  double estimatedError() const override { return control_->error(samples_); }
+  double estimatedError(std::stop_token stop) const override {
+    if (errorTakesLong()) {
+      if (control_->measuring) control_->measuring(stop);
+      if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "stopped");
+      measured_ = true;
+    }
+    return control_->error(samples_);
+  }
+  bool errorTakesLong() const override { return !measured_ && samples_ >= control_->longErrorFrom; }
   void countCosts() override {}
   RenderStats stats() const override { return {}; }
   void recordAovs() override { samples_ = 0; }
@@ -125,6 +135,7 @@ class FakeRenderer : public Renderer {
   MemoryBudget::Share film_ = MemoryBudget::take(control_->memory, MemoryUse::films);
   Scene scene_;
   std::uint32_t samples_ = 0;
+  mutable bool measured_ = false;
   double seen_ = 0;
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the render loop has others do: building scenes, and adding up and encoding large pictures.
+// What the render loop has others do: building scenes, adding up and encoding large pictures, and measuring
+// errors that take long.
 #include "server/render_loop.h"
 
 #include <gtest/gtest.h>
@@ -215,6 +216,81 @@ TEST(RenderLoop, AddsUpAndMakesLargePicturesInTheBackground) {
     workshop.step();
   }
   EXPECT_EQ(viewer->frames.size(), before + 1);
+}
+
+/// A small picture of 16 samples whose error is being measured, until the background is told to finish it.
+struct Measured {
+  Workshop workshop;
+  std::shared_ptr<FakeViewer> viewer = std::make_shared<FakeViewer>(), other = std::make_shared<FakeViewer>();
+  std::shared_ptr<Session> session, otherSession;
+  ViewerId viewerId{};
+  int measured = 0, stopped = 0;
+
+  Measured() {
+    workshop.control->longErrorFrom = 16;
+    workshop.control->error = [](std::uint32_t) { return 0.5; };
+    workshop.control->measuring = [this](const std::stop_token& stop) {
+      ++measured;
+      stopped += stop.stop_requested();
+    };
+    session = workshop.store.create({{"stop", {{"error", 0.9}}}});
+    viewerId = session->addViewer(viewer);
+    otherSession = workshop.store.create({{"stop", {{"samples", 1}}}});
+    otherSession->addViewer(other);
+    workshop.steps(4);
+    workshop.background.atOnce = false;
+    workshop.steps(30);
+  }
+};
+
+TEST(RenderLoop, MeasuresAnErrorThatTakesLongInTheBackgroundWhileOthersHaveTheirTurns) {
+  Measured test;
+  EXPECT_EQ(test.workshop.background.waiting.size(), 1u);
+  EXPECT_EQ(test.measured, 0);
+  EXPECT_EQ(test.viewer->frames.back().info.samples, 8u);
+  test.otherSession->patch(seedPatch(5), {});
+  test.workshop.steps(2);
+  EXPECT_EQ(test.other->frames.back().info.revision, 2u);
+  EXPECT_FALSE(test.viewer->frames.back().info.final);
+  test.workshop.background.finish();
+  test.workshop.steps(6);
+  EXPECT_EQ(test.measured, 1);
+  EXPECT_TRUE(test.viewer->frames.back().info.final);
+  EXPECT_EQ(test.viewer->frames.back().info.samples, 16u);
+}
+
+TEST(RenderLoop, GivesUpMeasuringTheErrorOfADeletedSession) {
+  Measured test;
+  EXPECT_TRUE(test.workshop.store.remove(test.session->id()));
+  test.workshop.step();
+  test.workshop.background.finish();
+  EXPECT_EQ(test.stopped, 1);
+}
+
+TEST(RenderLoop, GivesUpMeasuringTheErrorOfASceneThatAnEditReplaces) {
+  Measured test;
+  test.session->patch(seedPatch(5), {});
+  test.workshop.step();
+  test.workshop.background.finish();
+  EXPECT_EQ(test.stopped, 1);
+  test.workshop.steps(2);
+  EXPECT_FALSE(test.workshop.last.abandoned);  // no build was
+  EXPECT_EQ(test.viewer->frames.back().info.revision, 2u);
+  EXPECT_TRUE(test.viewer->failures.empty());
+}
+
+TEST(RenderLoop, MeasuresAnewWhenSomebodyWaitsAgain) {
+  Measured test;
+  test.session->removeViewer(test.viewerId);
+  test.workshop.step();
+  test.workshop.background.finish();
+  EXPECT_EQ(test.stopped, 1);
+  test.workshop.background.atOnce = true;
+  test.session->addViewer(test.viewer);
+  test.workshop.steps(6);
+  EXPECT_EQ(test.measured, 2);
+  EXPECT_EQ(test.stopped, 1);
+  EXPECT_TRUE(test.viewer->frames.back().info.final);
 }
 
 TEST(EncodeLoop, EncodesALargePictureInTheBackgroundAndTheSmallOneAfterAnEditAtOnce) {

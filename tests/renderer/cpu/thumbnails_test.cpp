@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// How long small pictures of a scene may take: until nobody waits for them, and no finer than a ray can be.
+#include "renderer/cpu/thumbnails.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+
+#include "renderer/core/error.h"
+#include "tests/support/volumes.h"
+
+namespace scolopax {
+namespace {
+
+using namespace test;
+using namespace std::chrono_literals;
+
+/// Noise, 3000 voxels deep.
+std::shared_ptr<const Volume> deepVolume() {
+  const glm::ivec3 dims(4, 4, 3000);
+  const auto value = [](int x, int y, int z) { return (x * 89 + y * 57 + z * 131) % 256; };
+  const auto channel = [&] { return channelOf<std::uint8_t>(dims, value); };
+  return volumeOf(gridOf(dims), channel(), channel());
+}
+
+/// Seen along its depth, and through all of it: marched for minutes.
+Scene slowScene(const Volume& volume) {
+  Scene scene = frontScene(volume, 16, 16);
+  for (ChannelAppearance& channel : scene.channels) channel.density = 1e-4;
+  scene.method = Method::raymarch;
+  scene.blend = BlendMode::max;
+  scene.step = 0.01;
+  scene.shading = scene.shadows = true;
+  scene.lights.assign(8, {});
+  return scene;
+}
+
+/// Whether the work ends as cancelled, and not minutes later.
+template <class Work>
+void expectToEndWhenStopped(Work work) {
+  std::stop_source stop;
+  std::chrono::steady_clock::time_point requested;
+  std::jthread other([&] {
+    std::this_thread::sleep_for(50ms);
+    requested = std::chrono::steady_clock::now();
+    stop.request_stop();
+  });
+  try {
+    work(stop.get_token());
+    ADD_FAILURE() << "was not stopped";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::cancelled);
+  }
+  other.join();
+  EXPECT_LT(std::chrono::steady_clock::now() - requested, 30s);
+}
+
+TEST(Thumbnails, EndSoonAfterAStopIsRequested) {
+  const auto volume = deepVolume();
+  RenderPlan plan(volume);
+  plan.update(slowScene(*volume));
+  expectToEndWhenStopped([&](const std::stop_token& stop) { estimateBias(plan, stop); });
+  expectToEndWhenStopped(
+      [&](const std::stop_token& stop) { largestStep(plan, Method::raymarch, 1e-9, stop); });
+}
+
+TEST(Thumbnails, MarchNoFinerThanTheSmallestStepOfARay) {
+  // 2^16 steps of 0.046 are as long as the diagonal.
+  const glm::ivec3 dims(3000, 4, 4);
+  const auto value = [](int x, int y, int z) { return (x * 89 + y * 57 + z * 131) % 256; };
+  const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, value));
+  Scene scene = frontScene(*volume, 24, 24);
+  scene.method = Method::raymarch;
+  const auto biasAt = [&](double step) {
+    scene.step = step;
+    RenderPlan plan(volume);
+    plan.update(scene);
+    return estimateBias(plan);
+  };
+  EXPECT_GT(biasAt(0.01), 0);
+  EXPECT_EQ(biasAt(0.01), biasAt(0.04));
+  EXPECT_LT(biasAt(0.04), biasAt(0.5));
+}
+
+}  // namespace
+}  // namespace scolopax
