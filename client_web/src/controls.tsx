@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Controls built from the schema: one for each kind of field. fields.tsx picks among them.
-import type { ComponentChildren } from 'preact';
-import { useId, useRef } from 'preact/hooks';
+import type { ComponentChildren, JSX } from 'preact';
+import { useId, useRef, useState } from 'preact/hooks';
 import type { Named } from './api';
 import type { Field } from './schema';
 
@@ -76,7 +76,25 @@ export interface ControlProps<T> {
   onChange(value: T | null): void;
 }
 
+/** Text that somebody types stays as it is until it is finished: meanwhile the scene may be drawn anew. */
+function useTyped(shown: string, onFinish: (text: string) => void) {
+  const [typed, setTyped] = useState<string | undefined>(undefined);
+  return {
+    value: typed ?? shown,
+    onInput: (event: JSX.TargetedInputEvent<HTMLInputElement>) => setTyped(event.currentTarget.value),
+    onChange: (event: JSX.TargetedEvent<HTMLInputElement>) => {
+      setTyped(undefined);
+      onFinish(event.currentTarget.value);
+    },
+    onBlur: () => setTyped(undefined),
+  };
+}
+
 export function NumberInput({ field, value, onChange, id, label }: ControlProps<number> & { id?: string; label?: string }) {
+  const typed = useTyped(value === undefined ? '' : shortNumber(value), (text) => {
+    if (text !== '') onChange(Number(text));
+    else if (field.automatic) onChange(null);
+  });
   return (
     <input
       id={id}
@@ -87,12 +105,7 @@ export function NumberInput({ field, value, onChange, id, label }: ControlProps<
       max={field.maximum}
       aria-label={label}
       placeholder={field.automatic ? '–' : undefined}
-      value={value === undefined ? '' : shortNumber(value)}
-      onChange={(event) => {
-        const text = event.currentTarget.value;
-        if (text !== '') onChange(Number(text));
-        else if (field.automatic) onChange(null);
-      }}
+      {...typed}
     />
   );
 }
@@ -171,9 +184,10 @@ export function ColorControl({ field, value, onChange }: ControlProps<string>) {
 
 export function TextControl({ field, value, onChange }: ControlProps<string>) {
   const id = useId();
+  const typed = useTyped(value ?? '', (text) => onChange(text || null));
   return (
     <Row field={field} id={id}>
-      <input id={id} type="text" value={value ?? ''} onChange={(event) => onChange(event.currentTarget.value || null)} />
+      <input id={id} type="text" {...typed} />
     </Row>
   );
 }

@@ -26,6 +26,7 @@ class SharedBuilds {
   /// Throws what `make` throws, and Error(cancelled) once `stop` is requested. `make` is asked to stop when
   /// nobody waits for its value any more.
   Result get(const Key& key, const Make& make, const std::stop_token& stop) {
+    if (stop.stop_requested()) throwCancelled();
     std::shared_ptr<Build> build;
     {
       const std::lock_guard lock(mutex_);
@@ -47,6 +48,10 @@ class SharedBuilds {
   }
 
  private:
+  [[noreturn]] static void throwCancelled() {
+    throw Error(ErrorCode::cancelled, "nobody waits for what was to be built");
+  }
+
   /// Owned by its waiters only; when the last one leaves, the build is stopped.
   class Build {
    public:
@@ -55,8 +60,7 @@ class SharedBuilds {
 
     Result wait(const std::stop_token& stop) {
       std::unique_lock lock(mutex_);
-      if (!ended_.wait(lock, stop, [this] { return done_; }))
-        throw Error(ErrorCode::cancelled, "nobody waits for what was to be built");
+      if (!ended_.wait(lock, stop, [this] { return done_; })) throwCancelled();
       if (failure_) std::rethrow_exception(failure_);
       return value_;
     }

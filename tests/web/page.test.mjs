@@ -13,6 +13,7 @@ import {
   openPage,
   patchFromOutside,
   samplesShown,
+  sceneOnServer,
   scratchFolder,
   startServer,
   steadyPicture,
@@ -183,6 +184,22 @@ test('the opacity curve is edited by the keyboard', async () => {
   assert.ok(Math.abs((await value()) - added - 0.01) < 1e-6);
   await page.keyboard.press('Delete');
   assert.equal(await points.count(), before);
+});
+
+test('a number that is being typed stays when the scene changes meanwhile', async () => {
+  const gamma = page.getByLabel('Gamma', { exact: true }).first();
+  const before = await gamma.inputValue();
+  await gamma.fill('1.5');
+  await patchFromOutside(page, { channels: { 0: { color: '#00c8ff' } } });
+  await eventually(async () => (await firstColour().inputValue()) === '#00c8ff', 'the change does not show');
+  assert.equal(await gamma.inputValue(), '1.5');
+  await gamma.press('Enter');
+  await eventually(async () => (await sceneOnServer(page)).scene.channels[0].gamma === 1.5, 'gamma did not arrive');
+  await gamma.fill(before);
+  await gamma.press('Enter');
+  await gamma.fill('');
+  await gamma.blur();
+  assert.equal(await gamma.inputValue(), before, 'nothing was typed, and nothing is shown');
 });
 
 test('what the server refuses is said with the name of the field, and taken back', async () => {

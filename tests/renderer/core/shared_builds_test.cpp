@@ -89,6 +89,19 @@ TEST(SharedBuilds, EndABuildWhenTheLastWhoWaitedHasGone) {
   EXPECT_EQ(gate.stopped, gate.entered);  // whether the second found the first's build or began its own
 }
 
+TEST(SharedBuilds, BeginNothingForWhoeverHasGoneAlready) {
+  Builds builds;
+  int begun = 0;
+  const Builds::Make make = [&](const std::stop_token&) {
+    ++begun;
+    return std::make_shared<const int>(7);
+  };
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_EQ(codeOf([&] { builds.get(1, make, stop.get_token()); }), ErrorCode::cancelled);
+  EXPECT_EQ(begun, 0);
+}
+
 TEST(SharedBuilds, TellEachWhoWaitedWhyThereIsNoValueAndTryAgain) {
   Builds builds;
   const Builds::Make fail = [](const std::stop_token&) -> Builds::Result {
