@@ -46,6 +46,7 @@ struct Exclusive {
 
 inline constexpr std::size_t kMaxChannelItems = 32;
 inline constexpr std::size_t kMaxLightItems = 8;
+inline constexpr std::size_t kMaxClipItems = 8;
 inline constexpr std::size_t kMaxControlPoints = 4096;
 
 /// Specialised below: title, doc, exclusive pairs and the tuple of fields of one struct.
@@ -149,6 +150,36 @@ struct Table<Camera> {
 };
 
 template <>
+struct Table<ClipPlane> {
+  static constexpr std::string_view title = "ClipPlane";
+  static constexpr std::string_view doc = "Cuts away what lies behind a plane.";
+  static constexpr auto fields = std::tuple{
+      field("point", &ClipPlane::point, "A point of the plane; null is the volume's centre.",
+            {.unit = "world units"}),
+      field("normal", &ClipPlane::normal, "Points to the side that is kept; need not be normalised, not 0."),
+      field("media", &ClipPlane::media, "Indices of the channels that are clipped; null is all.",
+            {.atLeast = 0, .atMost = double(kMaxChannelItems - 1), .maxItems = kMaxChannelItems}),
+  };
+};
+
+template <>
+struct Table<Crop> {
+  static constexpr std::string_view title = "Crop";
+  static constexpr std::string_view doc =
+      "Two planes along every axis part the volume into 27 regions, of which some are kept.";
+  static constexpr auto fields = std::tuple{
+      field("x", &Crop::x, "[a, b]: the planes across the first axis; null is the volume's faces.",
+            {.unit = "voxels"}),
+      field("y", &Crop::y, "[a, b]: the planes across the second axis; null is the volume's faces.",
+            {.unit = "voxels"}),
+      field("z", &Crop::z, "[a, b]: the planes across the third axis; null is the volume's faces.",
+            {.unit = "voxels"}),
+      field("regions", &Crop::regions,
+            "Whether region ix + 3 iy + 9 iz is kept; 0 is below a, 1 is from a to below b, 2 is from b on."),
+  };
+};
+
+template <>
 struct Table<Integrator> {
   static constexpr std::string_view title = "Integrator";
   static constexpr std::string_view doc =
@@ -206,6 +237,8 @@ struct Table<Scene> {
             {.maxItems = kMaxChannelItems}),
       field("blend", &Scene::blend, "How the channels are combined."),
       field("camera", &Scene::camera, "Where one looks from."),
+      field("clip", &Scene::clip, "Planes that cut away what lies behind them.", {.maxItems = kMaxClipItems}),
+      field("crop", &Scene::crop, "Boxes that are cut away."),
       field("lights", &Scene::lights, "Lights for shading and shadows; none means one headlight, at the eye.",
             {.maxItems = kMaxLightItems}),
       field("shading", &Scene::shading,

@@ -40,12 +40,29 @@ void readValue(const nlohmann::json& json, const Path& path, const Traits& trait
 void readValue(const nlohmann::json& json, const Path& path, const Traits& traits, ReadContext context,
                Colormap& out);
 
-template <std::size_t N>
+template <class T>
+constexpr std::string_view kPluralOf = "";
+template <>
+inline constexpr std::string_view kPluralOf<double> = "numbers";
+template <>
+inline constexpr std::string_view kPluralOf<bool> = "times true or false";
+template <>
+inline constexpr std::string_view kPluralOf<std::uint32_t> = "integers";
+
+template <class T, std::size_t N>
 void readValue(const nlohmann::json& json, const Path& path, const Traits& traits, ReadContext context,
-               std::array<double, N>& out) {
+               std::array<T, N>& out) {
   if (!json.is_array() || json.size() != N)
-    failExpected(path, "a list of " + std::to_string(N) + " numbers", json);
+    failExpected(path, "a list of " + std::to_string(N) + " " + std::string(kPluralOf<T>), json);
   for (std::size_t i = 0; i < N; ++i) readValue(json[i], path / i, traits, context, out[i]);
+}
+
+inline void readValue(const nlohmann::json& json, const Path& path, const Traits& traits, ReadContext context,
+                      std::vector<std::uint32_t>& out) {
+  if (!json.is_array() || json.size() > traits.maxItems)
+    failExpected(path, "a list of at most " + std::to_string(traits.maxItems) + " integers", json);
+  out.resize(json.size());
+  for (std::size_t i = 0; i < json.size(); ++i) readValue(json[i], path / i, traits, context, out[i]);
 }
 
 template <class T>
@@ -117,10 +134,11 @@ inline nlohmann::json writeValue(std::uint32_t value) { return value; }
 inline nlohmann::json writeValue(const std::string& value) { return value; }
 nlohmann::json writeValue(const std::vector<ControlPoint>& value);
 nlohmann::json writeValue(const Colormap& value);
-template <std::size_t N>
-nlohmann::json writeValue(const std::array<double, N>& value) {
+template <class T, std::size_t N>
+nlohmann::json writeValue(const std::array<T, N>& value) {
   return value;
 }
+inline nlohmann::json writeValue(const std::vector<std::uint32_t>& value) { return value; }
 template <class T>
 nlohmann::json writeValue(const std::optional<T>& value) {
   return value ? writeValue(*value) : nlohmann::json();

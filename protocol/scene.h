@@ -65,6 +65,20 @@ struct Camera {
   std::optional<double> orthoHeight;  ///< when set, fovY is not used
 };
 
+/// Kept is dot(normal, x - point) >= 0.
+struct ClipPlane {
+  std::optional<std::array<double, 3>> point;
+  std::array<double, 3> normal{0, 0, 1};
+  std::optional<std::vector<std::uint32_t>> media;
+};
+
+struct Crop {
+  std::optional<std::array<double, 2>> x, y, z;
+  std::array<bool, 27> regions{false, false, false, false, false, false, false, false, false,
+                               false, false, false, false, true,  false, false, false, false,
+                               false, false, false, false, false, false, false, false, false};
+};
+
 struct Integrator {
   std::string method = "auto";
   std::uint32_t macrocell = 4;
@@ -91,6 +105,8 @@ struct Scene {
   std::vector<Channel> channels;
   Blend blend;
   Camera camera;
+  std::vector<ClipPlane> clip;
+  Crop crop;
   std::vector<Light> lights;
   bool shading = false;
   bool shadows = false;

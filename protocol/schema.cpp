@@ -68,9 +68,15 @@ Json valueSchema(Tag<std::string>, const Traits& traits, Writer& writer) {
   if (traits.names != nullptr) return nameSchema(writer.lists.*traits.names);
   return {{"type", "string"}, {"maxLength", traits.maxLength}};
 }
-template <std::size_t N>
-Json valueSchema(Tag<std::array<double, N>>, const Traits&, Writer&) {
-  return {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", N}, {"maxItems", N}};
+template <class T, std::size_t N>
+Json valueSchema(Tag<std::array<T, N>>, const Traits& traits, Writer& writer) {
+  return {
+      {"type", "array"}, {"items", valueSchema(Tag<T>{}, traits, writer)}, {"minItems", N}, {"maxItems", N}};
+}
+Json valueSchema(Tag<std::vector<std::uint32_t>>, const Traits& traits, Writer& writer) {
+  return {{"type", "array"},
+          {"items", valueSchema(Tag<std::uint32_t>{}, traits, writer)},
+          {"maxItems", traits.maxItems}};
 }
 Json valueSchema(Tag<std::vector<ControlPoint>>, const Traits& traits, Writer& writer) {
   writer.definitions["ControlPoint"] = {
@@ -158,9 +164,12 @@ std::string valueWords(Tag<std::string>, const Traits& traits) {
   if (traits.names != nullptr) return "name";
   return "text, at most " + std::to_string(traits.maxLength) + " characters";
 }
-template <std::size_t N>
-std::string valueWords(Tag<std::array<double, N>>, const Traits&) {
-  return "list of " + std::to_string(N) + " numbers";
+template <class T, std::size_t N>
+std::string valueWords(Tag<std::array<T, N>>, const Traits&) {
+  return "list of " + std::to_string(N) + " " + text(kPluralOf<T>);
+}
+std::string valueWords(Tag<std::vector<std::uint32_t>>, const Traits& traits) {
+  return "list of " + expectedNumber("integers", traits);
 }
 std::string valueWords(Tag<std::vector<ControlPoint>>, const Traits& traits) {
   return "`[[position, value], ...]`, 1 to " + std::to_string(traits.maxItems);

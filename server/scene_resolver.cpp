@@ -7,10 +7,12 @@
 #include <string>
 #include <utility>
 
+#include "protocol/fields.h"
 #include "protocol/patch.h"
 #include "protocol/problem.h"
 #include "protocol/scene_json.h"
 #include "renderer/core/error.h"
+#include "renderer/data/clip_view.h"
 #include "renderer/data/colormap.h"
 #include "renderer/data/defaults.h"
 #include "renderer/data/image.h"
@@ -19,6 +21,9 @@
 
 namespace scolopax::server {
 namespace {
+
+static_assert(protocol::kMaxClipItems == std::size_t(kernel::kMaxClipPlanes));
+static_assert(std::tuple_size_v<decltype(protocol::Crop::regions)> == std::size_t(kernel::kCropRegions));
 
 using nlohmann::json;
 using protocol::ProtocolError;
@@ -115,6 +120,40 @@ void resolveCamera(protocol::Scene& scene, Scene& render, const Grid& grid) {
   refuseAt("/camera", [&] { makeCameraRays(render.camera, grid, 1, 1); });
 }
 
+void resolveClipping(protocol::Scene& scene, Scene& render, const Volume& volume) {
+  const Grid& grid = volume.grid();
+  const glm::dvec3 centre(grid.worldFromVoxel * glm::dvec4(glm::dvec3(grid.dims - 1) * 0.5, 1));
+  for (std::size_t i = 0; i < scene.clip.size(); ++i) {
+    protocol::ClipPlane& wire = scene.clip[i];
+    if (!wire.point) wire.point = arrayOf(centre);
+    ClipPlane plane{vectorOf(*wire.point), vectorOf(wire.normal), {}};
+    const std::string pointer = "/clip/" + std::to_string(i);
+    if (plane.normal == glm::dvec3(0))
+      throw ProtocolError(422, pointer + "/normal", "expected a direction that is not 0");
+    if (wire.media) plane.channels.emplace(wire.media->begin(), wire.media->end());
+    refuseAt(pointer, [&] { checkClipping({&plane, 1}, std::nullopt, volume.channels().size()); });
+    render.clip.push_back(std::move(plane));
+  }
+
+  protocol::Crop& wire = scene.crop;
+  Crop crop{{}, {}, 0};
+  for (std::size_t i = 0; i < wire.regions.size(); ++i) crop.regions |= std::uint32_t(wire.regions[i]) << i;
+  bool everything = wire.regions[13];  // in the middle
+  const auto resolveAxis = [&](std::optional<std::array<double, 2>>& ends, int axis, const char* name) {
+    if (!ends) ends = {-0.5, grid.dims[axis] - 0.5};
+    const auto [low, high] = *ends;
+    if (low > high)
+      throw ProtocolError(422, std::string("/crop/") + name, "expected two numbers that do not decrease");
+    everything = everything && low <= -0.5 && high >= grid.dims[axis] - 0.5;
+    crop.low[axis] = low;
+    crop.high[axis] = high;
+  };
+  resolveAxis(wire.x, 0, "x");
+  resolveAxis(wire.y, 1, "y");
+  resolveAxis(wire.z, 2, "z");
+  if (!everything) render.crop = crop;
+}
+
 void resolveLights(const protocol::Scene& scene, Scene& render) {
   render.shading = scene.shading;
   render.shadows = scene.shadows;
@@ -206,6 +245,7 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
   scene.dataset = result->dataset->id;
   resolveChannels(scene, render, volume);
   resolveCamera(scene, render, volume.grid());
+  resolveClipping(scene, render, volume);
   resolveLights(scene, render);
   render.blend = valueOf<BlendMode>(kBlendModes, scene.blend.mode);
   render.method = valueOf<Method>(kMethods, scene.integrator.method);

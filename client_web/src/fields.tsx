@@ -10,9 +10,13 @@ import {
   ToggleControl,
   VectorControl,
 } from './controls';
+import { ChannelsControl, RegionsControl } from './clipping-controls';
 import { ListControl } from './list-control';
 import { choicesOf, fieldAt, type Path } from './schema';
 import type { Store } from './store';
+
+const channelNames = (store: Store) =>
+  (store.scene.value?.channels ?? []).map(({ name }, i) => name ?? `Channel ${i + 1}`);
 
 export function FieldControl({ store, path, label }: { store: Store; path: Path; label?: string }) {
   const found = fieldAt(path);
@@ -34,6 +38,10 @@ export function FieldControl({ store, path, label }: { store: Store; path: Path;
       return <TextControl {...props} value={value as string | undefined} />;
     case 'vector':
       return <VectorControl {...props} value={value as number[] | undefined} />;
+    case 'channels':
+      return <ChannelsControl {...props} value={value as number[] | undefined} names={channelNames(store)} />;
+    case 'regions':
+      return <RegionsControl {...props} value={value as boolean[] | undefined} />;
     case 'list':
       return <ListControl store={store} path={path} />;
     default:

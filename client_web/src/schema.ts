@@ -26,7 +26,22 @@ interface SchemaNode {
   default?: unknown;
 }
 
-export type Kind = 'number' | 'integer' | 'toggle' | 'enum' | 'color' | 'text' | 'vector' | 'list' | 'object' | 'other';
+export type Kind =
+  | 'number'
+  | 'integer'
+  | 'toggle'
+  | 'enum'
+  | 'color'
+  | 'text'
+  | 'vector'
+  | 'channels'
+  | 'regions'
+  | 'list'
+  | 'object'
+  | 'other';
+
+/** Of a volume that is cut twice along every axis. */
+export const kRegions = 27;
 
 export interface Field {
   /** The key, or '' for the whole scene. */
@@ -104,7 +119,10 @@ function kindOf(node: SchemaNode): Kind {
 function kindOfList(node: SchemaNode): Kind {
   const items = node.items ? kindOf(resolve(node.items)) : 'other';
   if (items === 'object') return 'list';
-  return items === 'number' && node.minItems === node.maxItems ? 'vector' : 'other';
+  const fixed = node.minItems === node.maxItems;
+  if (items === 'integer' && !fixed) return 'channels';
+  if (items === 'toggle' && node.minItems === kRegions) return 'regions';
+  return items === 'number' && fixed ? 'vector' : 'other';
 }
 
 const inWords = (key: string) => {

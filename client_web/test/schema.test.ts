@@ -34,6 +34,12 @@ describe('the schema', () => {
     expect(leavesBelow(['lights', 2])).toContainEqual(['lights', 2, 'intensity']);
   });
 
+  it('knows lists of channels and the regions of a volume', () => {
+    expect(fieldAt(['clip', 0, 'media'])).toMatchObject({ kind: 'channels', automatic: true });
+    expect(fieldAt(['crop', 'regions']).kind).toBe('regions');
+    expect(fieldAt(['crop', 'x'])).toMatchObject({ kind: 'vector', length: 2 });
+  });
+
   it('takes choices from that list of the running server which has the names, else from itself', () => {
     const capabilities = {
       version: '1',

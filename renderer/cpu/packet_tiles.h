@@ -40,7 +40,7 @@ SCOLOPAX_LANES_APART void renderPacket(const Pass& pass, const Blend& blend, int
     across = toFloat(columns) + kernel::uniformOf(jitter.x),
     down = toFloat(rows) + kernel::uniformOf(jitter.y);
   const kernel::RayOf<Lanes> ray = scene.rays.through<Lanes>(across, down);
-  kernel::IntervalOf<Lanes> inside = kernel::clipToBox(ray, scene.dims);
+  kernel::IntervalOf<Lanes> inside = kernel::clipToScene(scene, ray);
   inside.exit = where(wanted, inside.exit);
   kernel::CostOf<Lanes> cost{};
   kernel::FirstCollisionOf<Lanes> met{};

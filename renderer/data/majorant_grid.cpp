@@ -92,8 +92,7 @@ BoundTable buildBounds(const ValueLevels& levels, const TransferFunction& transf
 }
 
 std::size_t MajorantGrid::sizeBytes(const MacrocellGrid& macrocells) {
-  const bool active = macrocells.levels.size() > kFewColumns;
-  return macrocells.cellCount() * (sizeof(TotalCode) + (active ? sizeof(std::uint32_t) : 0)) +
+  return macrocells.cellCount() * (sizeof(TotalCode) + sizeof(std::uint32_t)) +
          CellBlocks(macrocells.cells).count();
 }
 

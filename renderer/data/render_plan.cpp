@@ -9,6 +9,8 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
+#include "renderer/data/clip_view.h"
+
 #include "renderer/data/shared_macrocells.h"
 
 namespace scolopax {
@@ -55,6 +57,7 @@ void checkScene(const Scene& scene, const Volume& volume) {
     fail("lights: at most " + std::to_string(kernel::kMaxLights) + " are possible, found " +
          std::to_string(scene.lights.size()));
   for (const Light& light : scene.lights) checkLight(light);
+  checkClipping(scene.clip, scene.crop, volume.channels().size());
   if (!(scene.step >= 0.01 && scene.step <= 100))
     fail("integrator.step: expected 0.01 to 100, found " + shortText(scene.step));
   if (scene.macrocell < 1 || scene.macrocell > 64)
@@ -162,17 +165,19 @@ RebuildStats RenderPlan::update(const Scene& scene, const std::stop_token& stop)
     visible.push_back(int(i));
     bounds.push_back(*plan->bounds);
   }
+  const auto clip = clipView(scene.clip, scene.crop, volume_->grid(), visible);
+
   views.reserve(visible.size());
   for (const int i : visible)
     views.push_back(plans[std::size_t(i)]->transfer.view(volume_->channels()[std::size_t(i)]));
   std::optional<Scene> next = scene;
-  // Where channels hide each other, or segments may cross values that are nowhere, rays that are marched
-  // together must not take segments for each other.
+  // Packets need to know every ray's channels where channels hide each other, where clipping differs between
+  // channels or regions, and where voxels are not finite.
   const auto& all = volume_->channels();
   const bool sums = sumsExtinction(scene.blend);
-  const bool apart = (!sums && all.size() > 1) || std::any_of(all.begin(), all.end(), [](const Channel& c) {
-                       return c.histogram.nonFiniteCount > 0;
-                     });
+  const bool apart =
+      (!sums && all.size() > 1) || (clip && clip->parts) ||
+      std::any_of(all.begin(), all.end(), [](const Channel& c) { return c.histogram.nonFiniteCount > 0; });
   stats.majorantCells = majorants_.update(macrocells, std::move(bounds), sums, apart);
 
   scene_ = std::move(next);
@@ -189,7 +194,8 @@ RebuildStats RenderPlan::update(const Scene& scene, const std::stop_token& stop)
   view_.seed = scene.seed;
   view_.filterBox = scene.filter == PixelFilter::box;
   view_.dims = volume_->grid().dims;
-  view_.channelCount = int(channelViews_.size());
+  view_.clip = clip.value_or(kernel::ClipView{});
+  view_.channelCount = clip ? int(channelViews_.size()) : 0;
   view_.channels = channelViews_.data();
   view_.step = view_.smallestSpacing * float(scene.step);
   view_.stratum = stratumOf(scene.method);

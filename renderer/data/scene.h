@@ -4,9 +4,11 @@
 #pragma once
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <vector>
 
 #include "renderer/data/camera.h"
+#include "renderer/data/clipping.h"
 #include "renderer/data/light.h"
 #include "renderer/data/method.h"
 
@@ -44,6 +46,8 @@ struct Scene {
   BlendMode blend = BlendMode::density;
   bool shading = false;  ///< by the gradient of the scalar field
   bool shadows = false;
+  std::vector<ClipPlane> clip;  ///< at most kernel::kMaxClipPlanes
+  std::optional<Crop> crop;
   std::vector<Light> lights;  ///< at most kernel::kMaxLights; none means one headlight
   Method method = Method::superposed;
   int macrocell = 4;  ///< voxels per macrocell edge

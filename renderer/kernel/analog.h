@@ -6,14 +6,42 @@
 
 namespace scolopax::kernel {
 
+/// The first collision that track(span) finds in the spans of a ray in which some of `channels`, by their
+/// bits, are left.
+template <class Track>
+SCOLOPAX_HD std::optional<Collision> firstInSpans(const SceneView& scene, const Ray& ray, Interval inside,
+                                                  std::uint32_t channels, Track&& track) {
+  Spans<One> spans(scene, ray, inside, channels);
+  std::optional<Collision> hit;
+  do {
+    const Interval span = spans.next(true);
+    if (span.enter < span.exit) hit = track(span);
+  } while (!hit && !spans.done(true));
+  return hit;
+}
+template <class Tracker, class Blend>
+SCOLOPAX_HD std::optional<Collision> trackAll(const SceneView& scene, const Ray& ray, Interval inside,
+                                              Sampler& sampler, SampleCost* cost) {
+  return firstInSpans(scene, ray, inside, ~0u, [&](Interval span) {
+    return Tracker::template track<Blend>(scene, ray, span, sampler, cost);
+  });
+}
+template <class Blend>
+SCOLOPAX_HD std::optional<Collision> trackAlone(const SceneView& scene, int n, const Ray& ray,
+                                                Interval inside, Sampler& sampler, SampleCost* cost) {
+  return firstInSpans(scene, ray, inside, 1u << n, [&](Interval span) {
+    return trackChannel<Blend>(scene, n, {}, ray, span, sampler, cost);
+  });
+}
+
 /// Whether a shadow ray meets anything; in separate blend modes, anything of the channel that cast it.
 template <class Tracker, class Blend>
 SCOLOPAX_HD bool isBlocked(const SceneView& scene, const Ray& ray, Interval inside, int channel,
                            Sampler& sampler, SampleCost* cost) {
   if constexpr (Blend::kSeparate) {
-    return trackChannel<Blend>(scene, channel, {}, ray, inside, sampler, cost).has_value();
+    return trackAlone<Blend>(scene, channel, ray, inside, sampler, cost).has_value();
   } else {
-    return Tracker::template track<Blend>(scene, ray, inside, sampler, cost).has_value();
+    return trackAll<Tracker, Blend>(scene, ray, inside, sampler, cost).has_value();
   }
 }
 
@@ -22,7 +50,7 @@ SCOLOPAX_HD bool isBlocked(const SceneView& scene, const Ray& ray, Interval insi
 template <class Tracker, class Blend, class Features>
 SCOLOPAX_HD glm::vec3 radiance(const SceneView& scene, const Ray& ray, const Collision& hit, Sampler& sampler,
                                SampleCost* cost) {
-  const LitPoint<One> at{ray, hit.place.t(), hit.point};
+  const LitPoint<One> at{ray, hit.place.t(), insideOf<One>(scene.clip, hit.point)};
   Visibility<One> visibility;
   if constexpr (Features::kAny)
     visibility = visibilityAt<Features>(scene, at, true, [&](const Ray& shadowRay, Interval part) {
@@ -36,7 +64,10 @@ SCOLOPAX_HD glm::vec3 radiance(const SceneView& scene, const Ray& ray, const Col
   if constexpr (Blend::kMixes) {
     glm::vec3 sum(0.0f);
     float largest = 0.0f;
+    const std::uint32_t left =
+        scene.clip.parts ? channelsAt<One>(scene.clip, hit.point) | 1u << hit.channel : ~0u;
     for (int n = 0; n < scene.channelCount; ++n) {
+      if (!(left >> n & 1)) continue;
       const Classified c = classify(scene, n, hit.point, cost);
       if (!(c.extinction > 0.0f)) continue;
       largest = maximum(largest, c.extinction);
@@ -60,7 +91,7 @@ struct Analog {
       // alpha_n).
       glm::vec4 sum(0.0f);
       for (int n = 0; n < scene.channelCount; ++n) {
-        const auto hit = trackChannel<Blend>(scene, n, {}, ray, inside, sampler, cost);
+        const auto hit = trackAlone<Blend>(scene, n, ray, inside, sampler, cost);
 
         if (!hit) continue;
         if (first) keepNearer(first, {hit->place.t(), n});
@@ -69,7 +100,7 @@ struct Analog {
       }
       return sum;
     } else {
-      const auto hit = Tracker::template track<Blend>(scene, ray, inside, sampler, cost);
+      const auto hit = trackAll<Tracker, Blend>(scene, ray, inside, sampler, cost);
       if (!hit) return glm::vec4(0.0f);
       if (first) *first = {hit->place.t(), hit->channel};
       return glm::vec4(radiance<Tracker, Blend, Features>(scene, ray, *hit, sampler, cost), 1.0f);

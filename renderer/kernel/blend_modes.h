@@ -3,6 +3,7 @@
 // them, trackers and shading ask only for what is declared here.
 #pragma once
 #include "renderer/kernel/classify.h"
+#include "renderer/kernel/clip.h"
 #include "renderer/kernel/sample_volume.h"
 
 namespace scolopax::kernel {
@@ -21,15 +22,17 @@ SCOLOPAX_HD inline Classified classify(const SceneView& scene, int channel, glm:
   return {extinctionAt(scene.channels[channel], position), position};
 }
 
-/// Channel of the largest extinction; the lowest of equal ones.
+/// Channel of the largest extinction, of those by their bits; the lowest of equal ones.
 struct Largest {
   float extinction = 0.0f;
   int channel = 0;
   float position = 0.0f;
 };
-SCOLOPAX_HD inline Largest largestOf(const SceneView& scene, glm::vec3 point, SampleCost* cost) {
+SCOLOPAX_HD inline Largest largestOf(const SceneView& scene, std::uint32_t channels, glm::vec3 point,
+                                     SampleCost* cost) {
   Largest largest;
   for (int n = 0; n < scene.channelCount; ++n) {
+    if (!(channels >> n & 1)) continue;
     const Classified c = classify(scene, n, point, cost);
     if (c.extinction > largest.extinction) largest = {c.extinction, n, c.position};
   }

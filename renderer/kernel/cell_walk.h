@@ -1,39 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a ray meets the volume's box, and its way through the macrocells (Amanatides and Woo 1987).
+// A ray's way through the macrocells (Amanatides and Woo 1987).
 // Every step moves one index by one, so no input, NaN included, can make a walk endless.
 #pragma once
-#include "renderer/kernel/math.h"
-#include "renderer/kernel/views.h"
+#include "renderer/kernel/clip.h"
 
 namespace scolopax::kernel {
-
-template <class L>
-struct IntervalOf {
-  typename L::Float enter, exit;  ///< along the ray; empty when enter >= exit
-};
-using Interval = IntervalOf<One>;
-
-/// The part of the ray with t >= 0 inside the box [-1/2, dims - 1/2]; faces belong to the box. A ray that is
-/// not finite, or has no direction at all, sees nothing.
-template <class L>
-SCOLOPAX_LANES IntervalOf<L> clipToBox(const RayOf<L>& ray, glm::ivec3 dims) {
-  using Float = typename L::Float;
-  using Mask = typename L::Mask;
-  IntervalOf<L> inside{Float(0.0f), Float(kInfinity)};
-  Mask meets = L::everywhere();
-  for (int axis = 0; axis < 3; ++axis) {
-    const float lo = -0.5f, hi = float(dims[axis]) - 0.5f;
-    const Float o = ray.origin[axis], d = ray.direction[axis];
-    const Mask along = d == 0.0f;
-    const Float a = (lo - o) / d, b = (hi - o) / d;
-    const Float near = minimum(a, b), far = maximum(a, b);
-    meets = meets & (without(near <= far, along) | (along & (o >= lo) & (o <= hi)));
-    inside.enter = select(along, inside.enter, maximum(inside.enter, near));
-    inside.exit = select(along, inside.exit, minimum(inside.exit, far));
-  }
-  meets = meets & (inside.exit < kInfinity);
-  return {where(meets, inside.enter), where(meets, inside.exit)};
-}
 
 /// Cell after cell along a ray; but where blocks of cells are empty, many cells are one step: from the entry
 /// of the first to the exit of the last, at which the walk then stands. What is not empty is visited as

@@ -28,7 +28,8 @@ class PointSegments {
         offset_(offset),
         step_(step),
         cost_(cost),
-        walk_(rays, inside_, scene.majorants, columnsOf(channels)) {
+        walk_(rays, inside_, scene.majorants,
+              scene.clip.parts ? columnsOf(inside.channels) : Word(columnsOf(channels))) {
     live_ = more_ = walk_.meets();
     counted_ = without(live_, live_);
     if (any(live_)) k_ = firstSegment(walk_.enter()) - 1;
@@ -88,6 +89,15 @@ class PointSegments {
     std::uint32_t columns = 0;
     for (std::uint32_t left = channels; left != 0; left &= left - 1)
       columns |= 1u << scene_.majorants.tables[std::countr_zero(left)].column;
+    return columns;
+  }
+  SCOLOPAX_LANES Word columnsOf(Word channels) const {
+    Word columns(0u);
+    for (std::uint32_t left = channels_; left != 0; left &= left - 1) {
+      const int n = std::countr_zero(left);
+      const Word bit(1u << n);
+      columns = columns | where((channels & bit) == bit, Word(1u << scene_.majorants.tables[n].column));
+    }
     return columns;
   }
   SCOLOPAX_LANES std::uint32_t channelsOf(std::uint32_t columns) const {

@@ -19,10 +19,10 @@ class PointWalk {
   /// Only the part of the interval in which there are cells that are not empty. Where the grid has them, bits
   /// of `columns` say which channels matter.
   SCOLOPAX_LANES PointWalk(const RayOf<L>& rays, const IntervalOf<L>& inside, const MajorantView& grid,
-                           std::uint32_t columns)
+                           Word columns)
       : rays_(rays), grid_(grid), inverseSize_(1.0f / grid.cellSize), end_(inside.exit) {
     enter_ = inside.enter;
-    columns_ = Word(columns);
+    columns_ = columns;
     active_ = Word(0u);
     meets_ = inside.enter < inside.exit;
     for (int axis = 0; axis < 3; ++axis) {

@@ -11,10 +11,13 @@
 #endif
 
 // What most of the time is spent in, with all that it calls; and what is seldom called, out of its way. On a
-// device everything is inlined.
+// device everything is inlined; with sanitizers, whose code is long, nothing must be.
 #if defined(__CUDACC__)
 #define SCOLOPAX_HOT SCOLOPAX_HD
 #define SCOLOPAX_APART SCOLOPAX_HD
+#elif defined(__SANITIZE_ADDRESS__)
+#define SCOLOPAX_HOT
+#define SCOLOPAX_APART
 #else
 #define SCOLOPAX_HOT __attribute__((flatten))
 #define SCOLOPAX_APART __attribute__((noinline))

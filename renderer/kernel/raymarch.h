@@ -79,36 +79,42 @@ SCOLOPAX_LANES Radiance<L> marchRay(const SceneView& scene, const Blend& blend, 
   [[maybe_unused]] OfStrata strata(memory, scene, blend, ray, channels, set, ofStrata, cost);
   SegmentEnds<L> ends;
   Hidden<L, Blend::kSums> hidden;
-  Segments<L> along(ends, scene, ray, inside, channels, uniformOf(random.x), scene.step, cost);
   Segment<L> segment;
-  for (bool more = true; more;) {
-    more = along.next(segment);
-    const Float length = segment.length(), before = opacity;
-    Vec emission(0.0f);
-    const Float extinction = visitParts<kDetail>(scene, blend, segment, ends, hidden,
-                                                 [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
-                                                   if constexpr (Features::kAny) memory.parts[n] = part;
-                                                   emission = emission + part.emission;
-                                                 });
-    const Mask some = extinction > 0.0f;
-    if (any(some)) {
-      const Float alpha = absorbed(where(some, extinction * length)), absorbedHere = transmittance * alpha;
-      opacity = opacity + absorbedHere;
-      transmittance = transmittance * (1.0f - alpha);
-      more = more && along.keep(transmittance > kOpaqueTransmittance);
-      emission = emission * where(some, absorbedHere / extinction);
-      if constexpr (!Features::kAny) color = color + emission;
-      if (first) [[unlikely]]
-        if (const Mask met = open & some & (opacity > end); any(met)) {
-          open = without(open, met);
-          // A copy, so that the segment itself need not be in memory.
-          SegmentCollision<L> collision{segment, extinction, (end - before) / absorbedHere, met};
-          meet<L>(scene, blend, ends, hidden, collision, first);
-        }
-    } else if (more) {
-      continue;
+  Spans<L> spans(scene, ray, inside, channels);
+  for (bool last = false; !last;) {
+    const auto span = spans.next(transmittance > kOpaqueTransmittance);
+    Segments<L> along(ends, scene, ray, span, channels, uniformOf(random.x), scene.step, cost);
+    for (bool more = true; more;) {
+      more = along.next(segment);
+      const Float length = segment.length(), before = opacity;
+      Vec emission(0.0f);
+      const Float extinction = visitParts<kDetail>(scene, blend, segment, ends, hidden,
+                                                   [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
+                                                     if constexpr (Features::kAny) memory.parts[n] = part;
+                                                     emission = emission + part.emission;
+                                                   });
+      const Mask some = extinction > 0.0f;
+      if (any(some)) {
+        const Float alpha = absorbed(where(some, extinction * length)), absorbedHere = transmittance * alpha;
+        opacity = opacity + absorbedHere;
+        transmittance = transmittance * (1.0f - alpha);
+        more = more && along.keep(transmittance > kOpaqueTransmittance);
+        emission = emission * where(some, absorbedHere / extinction);
+        if constexpr (!Features::kAny) color = color + emission;
+        if (first) [[unlikely]]
+          if (const Mask met = open & some & (opacity > end); any(met)) {
+            open = without(open, met);
+            // A copy, so that the segment itself need not be in memory.
+            SegmentCollision<L> collision{segment, extinction, (end - before) / absorbedHere, met};
+            meet<L>(scene, blend, ends, hidden, collision, first);
+          }
+      } else if (more) {
+        continue;
+      }
+      last = !more && spans.done(transmittance > kOpaqueTransmittance);
+      if constexpr (Features::kAny)
+        strata.absorb(before, opacity, last, segment, extinction, emission, color);
     }
-    if constexpr (Features::kAny) strata.absorb(before, opacity, !more, segment, extinction, emission, color);
   }
   return {color, minimum(opacity, 1.0f)};
 }

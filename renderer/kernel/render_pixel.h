@@ -25,7 +25,7 @@ struct RenderPixel {
     const float x = float(column) + (scene.filterBox ? uniformOf(jitter.x) : 0.5f);
     const float y = float(row) + (scene.filterBox ? uniformOf(jitter.y) : 0.5f);
     const Ray ray = scene.rays(x, y);
-    const Interval inside = clipToBox(ray, scene.dims);
+    const Interval inside = clipToScene(scene, ray);
 
 #if defined(__CUDA_ARCH__)
     constexpr FirstCollision* const first = nullptr;  // devices are not asked, and need not compile it

@@ -58,13 +58,14 @@ SCOLOPAX_HD inline std::uint32_t activeChannels(const SceneView& scene, std::siz
 class CellSegments {
  public:
   /// Of channels by their bits.
-  SCOLOPAX_HD CellSegments(SegmentEnds<One>& ends, const SceneView& scene, const Ray& ray, Interval inside,
-                           std::uint32_t channels, float offset, float step, SampleCost* cost)
+  SCOLOPAX_HD CellSegments(SegmentEnds<One>& ends, const SceneView& scene, const Ray& ray,
+                           const Interval& inside, std::uint32_t channels, float offset, float step,
+                           SampleCost* cost)
       : ends_(ends),
         scene_(scene),
         ray_(ray),
         inside_(inside),
-        channels_(channels),
+        channels_(channels & inside.channels),
         offset_(offset),
         step_(step),
         cost_(cost),

@@ -13,7 +13,7 @@ struct LightFeatures {
   static constexpr bool kAny = kShading || kShadows;
 };
 
-/// Points of rays that light falls on.
+/// Points of rays that light falls on, inside the clipped volume.
 template <class L>
 struct LitPoint {
   RayOf<L> ray;  ///< that ends here
@@ -102,7 +102,7 @@ SCOLOPAX_LANES Visibility<L> visibilityAt(const SceneView& scene, const LitPoint
     if constexpr (Features::kShadows) {
       const ToLight<L> way = toLight(scene, scene.lights[i], hit);
       const RayOf<L> shadowRay{hit.point, way.direction};
-      IntervalOf<L> inside = clipToBox(shadowRay, scene.dims);
+      IntervalOf<L> inside = clipToScene(scene, shadowRay);
       inside.exit = where(which, minimum(inside.exit, way.distance));
       const auto meets = inside.enter < inside.exit;
       if (any(meets)) visibility.lights[i] = select(meets, shadow(shadowRay, inside), Float(1.0f));

@@ -22,13 +22,17 @@ SCOLOPAX_LANES typename L::Float marchTransmittance(const SceneView& scene, cons
                                                     CostOf<L>* cost) {
   SegmentEnds<L> ends;
   Hidden<L, Blend::kSums> hidden;
-  Segments<L> along(ends, scene, ray, inside, channels, offset, kShadowSteps * scene.step, cost);
   Segment<L> segment;
   typename L::Float depth(0.0f);
-  for (bool more = true; more && along.next(segment); more = along.keep(depth < kOpaqueDepth))
-    depth = depth + visitParts<Detail::extinction>(scene, blend, segment, ends, hidden,
-                                                   [](int, const PartOf<L>&) SCOLOPAX_LANES_LAMBDA {}) *
-                        segment.length();
+  Spans<L> spans(scene, ray, inside, channels);
+  do {
+    const auto span = spans.next(depth < kOpaqueDepth);
+    Segments<L> along(ends, scene, ray, span, channels, offset, kShadowSteps * scene.step, cost);
+    for (bool more = true; more && along.next(segment); more = along.keep(depth < kOpaqueDepth))
+      depth = depth + visitParts<Detail::extinction>(scene, blend, segment, ends, hidden,
+                                                     [](int, const PartOf<L>&) SCOLOPAX_LANES_LAMBDA {}) *
+                          segment.length();
+  } while (!spans.done(depth < kOpaqueDepth));
   return 1.0f - absorbed(depth);
 }
 
@@ -63,9 +67,8 @@ SCOLOPAX_LANES typename L::Vec lightOf(const SceneView& scene, const Blend& blen
                                        typename L::Mask which, CostOf<L>* cost) {
   using Word = typename L::Word;
   using Vec = typename L::Vec;
-  LitPoint<L> hit{ray, places.t, ray.origin + places.t * ray.direction};
-  for (int axis = 0; axis < 3; ++axis)  // rounding may have left the box, and a ray from there sees nothing
-    hit.point[axis] = clamp(hit.point[axis], -0.5f, float(scene.dims[axis]) - 0.5f);
+  const LitPoint<L> hit{ray, places.t, insideOf<L>(scene.clip, ray.origin + places.t * ray.direction)};
+
   const Visibility<L> visibility = visibilityAt<Features>(
       scene, hit, which, [&](const RayOf<L>& shadow, const IntervalOf<L>& part) SCOLOPAX_LANES_LAMBDA {
         return marchTransmittance<L>(scene, blend, shadow, part, channels, places.offset, cost);

@@ -45,6 +45,27 @@ struct MaterialView {
   float ambient, diffuse, specular, shininess;
 };
 
+/// Points with dot(normal, point) + offset >= 0, in voxel coordinates, are kept.
+struct ClipPlaneView {
+  glm::vec3 normal;
+  float offset;
+  std::uint32_t channels;  ///< bit n: visible channel n is clipped
+};
+inline constexpr int kMaxClipPlanes = 8;
+inline constexpr int kCropRegions = 27;
+
+/// What clip planes and crop leave of the volume, in voxel coordinates. Nothing lies outside of the box and
+/// of the planes that clip all channels; inside, parts may be cut out of some.
+struct ClipView {
+  glm::vec3 low, high;
+  int wholePlanes;  ///< the first of the planes: they clip all channels
+  int planeCount;
+  ClipPlaneView planes[kMaxClipPlanes];
+  bool parts;                           ///< planes of some channels, or regions of crop that are not a box
+  glm::vec3 cropAt[2];                  ///< crop planes; infinite where they cut nothing off
+  std::uint32_t regions[kCropRegions];  ///< at x + 3 y + 9 z: all bits where the region is kept, or none
+};
+
 enum class LightKind : std::uint8_t { directional, point, headlight };
 
 struct LightView {
@@ -79,6 +100,7 @@ struct SceneView {
   std::uint32_t seed;
   bool filterBox;  ///< false: every sample at the pixel's centre
   glm::ivec3 dims;
+  ClipView clip;
   int channelCount;
   const ChannelView* channels;
   MajorantView majorants;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 #include <string>
 #include <unordered_map>
 
@@ -77,6 +78,7 @@ Integrator::Integrator(const Volume& volume, const Scene& scene, double toleranc
       worldFromVoxel_(volume.grid().worldFromVoxel),
       voxelFromWorld_(glm::inverse(worldFromVoxel_)),
       voxelZero_(volume.grid().worldFromVoxel[3]),
+      clipping_(scene, volume.grid()),
       lighting_(scene, voxelZero_),
       lightCuts_(lighting_, worldFromVoxel_, 1e-2 * tolerance) {
   if (scene.channels.size() != volume.channels().size())
@@ -97,8 +99,8 @@ Integrator::Integrator(const Volume& volume, const Scene& scene, double toleranc
     const double radiance = lighting_.brightest(appearance.material, curves.brightest());
     brightest_ =
         blend_ == BlendMode::mix ? brightest_ + appearance.weight * radiance : std::max(brightest_, radiance);
-    channels_.push_back({ScalarField(volume.channels()[n], dims_), std::move(curves), appearance.weight,
-                         appearance.gamma != 1, appearance.material,
+    channels_.push_back({int(n), ScalarField(volume.channels()[n], dims_), std::move(curves),
+                         appearance.weight, appearance.gamma != 1, appearance.material,
                          std::abs(appearance.rangeHi - appearance.rangeLo)});
   }
 }
@@ -121,30 +123,41 @@ RayResult Integrator::trace(const glm::dvec3& originWorld, const glm::dvec3& dir
   return {glm::dvec4(all.color, -std::expm1(-all.opticalDepth)), all.error};
 }
 
+/// At the cells' faces and at planes of clipping.
+RayCells Integrator::cutAtAll(const glm::dvec3& originVoxel, const glm::dvec3& directionWorld,
+                              double length) const {
+  RayCells cells = cutAtCells(originVoxel, voxelFromWorld_ * directionWorld, dims_, length);
+  clipping_.cut(cells);
+  return cells;
+}
+
 /// What the given channels make of a ray.
 Integrator::Path Integrator::follow(const Ray& ray, Channels channels) const {
-  const RayCells cells = cutAtCells(voxelFromWorld_ * ray.origin, voxelFromWorld_ * ray.direction, dims_);
+  const RayCells cells =
+      cutAtAll(voxelFromWorld_ * ray.origin, ray.direction, std::numeric_limits<double>::infinity());
   Path path;
-  forEachSmoothPart(cells, dims_, blend_, channels, [&](const Stretch& stretch, double begin, double end) {
-    const auto medium = [&](double u) { return mediumAt(ray, channels, stretch, u); };
-    if (lighting_.any()) {
-      const std::vector<double> cuts = lightCuts_.of(stretch, begin, end, ray.direction);
-      for (std::size_t k = 0; k + 1 < cuts.size(); ++k) {
-        // A step away from the cuts, and every point once: it may cost rays.
-        const double step = 1e-9 * (cuts[k + 1] - cuts[k]);
-        std::unordered_map<double, Medium> known;
-        const auto inside = [&](double u) {
-          const auto [place, isNew] = known.try_emplace(u);
-          if (isNew) place->second = medium(std::clamp(u, cuts[k] + step, cuts[k + 1] - step));
-          return place->second;
-        };
-        integrate(roughPiece, inside, stretch.length, cuts[k], cuts[k + 1], path);
-      }
-    } else {
-      integrate(smoothPiece, medium, stretch.length, begin, end, path);
-    }
-    return path.opticalDepth <= opaqueDepth_;
-  });
+  forEachSmoothPart(cells, dims_, clipping_, blend_, channels,
+                    [&](const Stretch& stretch, double begin, double end) {
+                      const auto medium = [&](double u) { return mediumAt(ray, channels, stretch, u); };
+                      if (lighting_.any()) {
+                        const std::vector<double> cuts = lightCuts_.of(stretch, begin, end, ray.direction);
+                        for (std::size_t k = 0; k + 1 < cuts.size(); ++k) {
+                          // A step away from the cuts, and every point once: it may cost rays.
+                          const double step = 1e-9 * (cuts[k + 1] - cuts[k]);
+                          std::unordered_map<double, Medium> known;
+                          const auto inside = [&](double u) {
+                            const auto [place, isNew] = known.try_emplace(u);
+                            if (isNew)
+                              place->second = medium(std::clamp(u, cuts[k] + step, cuts[k + 1] - step));
+                            return place->second;
+                          };
+                          integrate(roughPiece, inside, stretch.length, cuts[k], cuts[k + 1], path);
+                        }
+                      } else {
+                        integrate(smoothPiece, medium, stretch.length, begin, end, path);
+                      }
+                      return path.opticalDepth <= opaqueDepth_;
+                    });
   if (path.opticalDepth > opaqueDepth_)  // what is hidden
     path.error += std::exp(-path.opticalDepth) * std::max(1.0, brightest_);
   if (lighting_.shadows())
@@ -206,15 +219,16 @@ Medium Integrator::mediumAt(const Ray& ray, Channels channels, const Stretch& st
 double Integrator::transmittance(const glm::dvec3& pointVoxel, const glm::dvec3& direction, double distance,
                                  Channels channels) const {
   if (!(distance > 0)) return 1;
-  const RayCells cells = cutAtCells(pointVoxel, voxelFromWorld_ * direction, dims_, distance);
+  const RayCells cells = cutAtAll(pointVoxel, direction, distance);
   // Of kShadowError the darkness takes a third, and the cells of the way, or all of its depth, another each.
   const double dark = -std::log(kShadowError / 3 * tolerance_);
   const double allowed = kShadowError / 3 * tolerance_ / double(std::max<std::size_t>(cells.cuts.size(), 1));
   double depth = 0;
-  forEachSmoothPart(cells, dims_, blend_, channels, [&](const Stretch& stretch, double begin, double end) {
-    depth += opticalDepth(stretch, begin, end, allowed * (end - begin));
-    return depth <= dark;
-  });
+  forEachSmoothPart(cells, dims_, clipping_, blend_, channels,
+                    [&](const Stretch& stretch, double begin, double end) {
+                      depth += opticalDepth(stretch, begin, end, allowed * (end - begin));
+                      return depth <= dark;
+                    });
   return depth <= dark ? std::exp(-depth) : 0.0;
 }
 

@@ -61,6 +61,7 @@ class Integrator {
   };
   struct Path;
   Path follow(const Ray& ray, Channels channels) const;
+  RayCells cutAtAll(const glm::dvec3& originVoxel, const glm::dvec3& directionWorld, double length) const;
   using Rule = PieceEstimate(const MediumAt&, double length);
   void integrate(const Rule& rule, const MediumAt& mediumAt, double stretchLength, double begin, double end,
                  Path& path) const;
@@ -78,6 +79,7 @@ class Integrator {
   glm::dmat3 worldFromVoxel_, voxelFromWorld_;
   double smallestSpacing_;
   glm::dvec3 voxelZero_;  // world position of voxel (0,0,0)
+  Clipping clipping_;
   Lighting lighting_;
   LightCuts lightCuts_;
   std::vector<ActiveChannel> channels_;

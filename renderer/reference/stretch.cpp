@@ -82,7 +82,7 @@ void appendHandovers(const Stretch& stretch, double begin, double end, std::vect
 
 }  // namespace
 
-void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, BlendMode blend,
+void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, const Clipping& clipping, BlendMode blend,
                        std::span<const ActiveChannel> channels,
                        const std::function<bool(const Stretch&, double begin, double end)>& visit) {
   const bool handovers = blend == BlendMode::max || blend == BlendMode::mix;
@@ -93,11 +93,12 @@ void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, BlendMode bl
     if (!(begin < end)) continue;
     // Cell [cell, cell+1) between voxel centres; the outer half voxels, where values are clamped to the edge,
     // belong to the outermost cells.
-    const glm::dvec3 cell = glm::clamp(glm::floor(ray.origin + 0.5 * (begin + end) * ray.direction),
-                                       glm::dvec3(0), glm::max(glm::dvec3(dims) - 2.0, 0.0));
+    const glm::dvec3 middle = ray.origin + 0.5 * (begin + end) * ray.direction;
+    const glm::dvec3 cell =
+        glm::clamp(glm::floor(middle), glm::dvec3(0), glm::max(glm::dvec3(dims) - 2.0, 0.0));
     // There coordinates are 0 or 1 exactly, at the cut as well: what is equal is equal to the last bit, and
     // max can tell which of two channels comes first.
-    const glm::dvec3 between = ray.origin + 0.5 * (begin + end) * ray.direction - cell;
+    const glm::dvec3 between = middle - cell;
     const auto inCell = [&](double t) {
       glm::dvec3 p = glm::clamp(ray.origin + t * ray.direction - cell, glm::dvec3(0), glm::dvec3(1));
       for (int axis = 0; axis < 3; ++axis)
@@ -110,6 +111,7 @@ void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, BlendMode bl
     stretch.channels.clear();
     knots = {0, 1};
     for (const ActiveChannel& channel : channels) {
+      if (!clipping.keeps(channel.number, middle)) continue;
       const auto corners = channel.field.corners(glm::ivec3(cell));
       if (!corners) continue;
       stretch.channels.push_back({&channel, CellScalar(*corners, inCell(begin), inCell(end))});
@@ -121,8 +123,8 @@ void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, BlendMode bl
       if (!(knots[j] < knots[j + 1])) continue;
       for (ChannelInCell& channel : stretch.channels) {
         const ChannelCurves& curves = channel.channel->curves;
-        const double middle = channel.scalar(0.5 * (knots[j] + knots[j + 1]));
-        channel.piece = curves.pieceAt(curves.position(middle));
+        const double scalar = channel.scalar(0.5 * (knots[j] + knots[j + 1]));
+        channel.piece = curves.pieceAt(curves.position(scalar));
       }
       cuts = {knots[j], knots[j + 1]};
       if (handovers) appendHandovers(stretch, knots[j], knots[j + 1], cuts);

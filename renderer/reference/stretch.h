@@ -10,6 +10,7 @@
 #include "renderer/data/scene.h"
 #include "renderer/reference/cell_scalar.h"
 #include "renderer/reference/channel_curves.h"
+#include "renderer/reference/clipping.h"
 #include "renderer/reference/ray_cells.h"
 #include "renderer/reference/scalar_field.h"
 
@@ -17,6 +18,7 @@ namespace scolopax::reference {
 
 /// A channel that can be seen.
 struct ActiveChannel {
+  int number;  ///< in the volume
   ScalarField field;
   ChannelCurves curves;
   double weight;  ///< in blend mode mix
@@ -39,7 +41,7 @@ struct ChannelInCell {
 struct Stretch {
   double length = 0;                    ///< world units
   glm::dvec3 begin{0}, end{0};          ///< voxel coordinates
-  std::vector<ChannelInCell> channels;  ///< those that are finite here
+  std::vector<ChannelInCell> channels;  ///< those that are finite and not clipped here
   glm::dvec3 point(double u) const { return begin + u * (end - begin); }
 };
 
@@ -48,8 +50,8 @@ inline constexpr double kEqualExtinction = 1e-12;
 
 /// Calls visit(stretch, begin, end) front to back for every part [begin, end] of u in which extinction and
 /// colour of all channels are smooth and, in max and mix, one and the same channel has the largest
-/// extinction; until visit returns false.
-void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, BlendMode blend,
+/// extinction; until visit returns false. The ray is cut at the planes of `clipping`.
+void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, const Clipping& clipping, BlendMode blend,
                        std::span<const ActiveChannel> channels,
                        const std::function<bool(const Stretch&, double begin, double end)>& visit);
 

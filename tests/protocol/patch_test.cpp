@@ -105,7 +105,7 @@ TEST(ApplyPatch, RefusesIndicesThatAreNone) {
 }
 
 TEST(ApplyPatch, NamesUnknownFieldsEvenWhenTheyAreNull) {
-  EXPECT_EQ(refusedAt("{}", R"({"clip": null})"), "/clip");
+  EXPECT_EQ(refusedAt("{}", R"({"fog": null})"), "/fog");
   EXPECT_EQ(refusedAt("{}", R"({"channels": {"0": {"colour": "#ffffff"}}})"), "/channels/0/colour");
   EXPECT_EQ(refusedAt("{}", R"({"channels": [{"colour": 1}]})"), "/channels/0/colour");
 }

@@ -70,6 +70,10 @@ TEST(ParseScene, ReadsEveryField) {
                   "opacity": [[0, 0], [0.5, 0], [0.5, 1]], "gamma": 2, "density": 0, "weight": 0.5,
                   "material": {"ambient": 0, "diffuse": 1, "specular": 0.5, "shininess": 8}},
                  {"colormap": "fire"}, {"colormap": [[0, "#000000"], [1, "#ffffff"]]}],
+    "clip": [{"point": [1, 2, 3], "normal": [0, 1, 0], "media": [2, 0]}],
+    "crop": {"x": [1, 2.5], "y": [-3, 4], "z": [5, 5], "regions": [
+      true, false, false, false, false, false, false, false, false, false, false, false, false, false, false,
+      false, false, false, false, false, false, false, false, false, false, false, true]},
     "blend": {"mode": "mix"}, "shading": true, "shadows": true,
     "lights": [{"type": "point", "position": [1, 2, 3], "direction": [0, 0, 1], "color": "#ff0000", "intensity": 2}],
     "camera": {"eye": [1, 2, 3], "target": [4, 5, 6], "up": [0, 0, 1], "fovY": 90, "orthoHeight": 7},
@@ -91,6 +95,9 @@ TEST(ParseScene, ReadsEveryField) {
   EXPECT_EQ(std::get<std::vector<ColorPoint>>(*scene.channels[2].colormap).at(1).color, "#ffffff");
   EXPECT_EQ(scene.camera.eye, (std::array<double, 3>{1, 2, 3}));
   EXPECT_EQ(scene.camera.orthoHeight, 7.0);
+  EXPECT_EQ(scene.clip.at(0).media, (std::vector<std::uint32_t>{2, 0}));
+  EXPECT_EQ(scene.crop.x, (std::array<double, 2>{1, 2.5}));
+  EXPECT_TRUE(scene.crop.regions[0] && scene.crop.regions[26] && !scene.crop.regions[13]);
   EXPECT_EQ(scene.integrator.method, "sync-dda");
   EXPECT_EQ(scene.integrator.sampling, "independent");
   EXPECT_EQ(scene.integrator.seed, 4294967295U);
@@ -120,8 +127,23 @@ TEST(ParseScene, TakesNullForWhatIsAutomaticAndForNothingElse) {
   EXPECT_EQ(refusedAt({{"channels", json::array({nullptr})}}), "/channels/0");
 }
 
+TEST(ParseScene, NamesWhatIsWrongWithClipping) {
+  const auto clip = [](const json& plane) { return json{{"clip", {plane}}}; };
+  EXPECT_EQ(refusedAt(clip({{"point", {1, 2}}})), "/clip/0/point");
+  EXPECT_EQ(refusedAt(clip({{"normal", nullptr}})), "/clip/0/normal");
+  EXPECT_EQ(refusedAt(clip({{"media", 1}})), "/clip/0/media");
+  EXPECT_EQ(refusedAt(clip({{"media", {0, 0.5}}})), "/clip/0/media/1");
+  EXPECT_EQ(refusedAt(clip({{"media", {32}}})), "/clip/0/media/0");
+  EXPECT_EQ(refusedAt({{"clip", json::array({{}, {}, {}, {}, {}, {}, {}, {}, {}})}}), "/clip");
+  EXPECT_EQ(refusedAt({{"crop", {{"x", {1}}}}}), "/crop/x");
+  EXPECT_EQ(refusedAt({{"crop", {{"regions", {true}}}}}), "/crop/regions");
+  json regions = std::vector<bool>(27);
+  regions[3] = 1;
+  EXPECT_EQ(refusedAt({{"crop", {{"regions", regions}}}}), "/crop/regions/3");
+}
+
 TEST(ParseScene, NamesUnknownFields) {
-  EXPECT_EQ(refusedAt({{"clip", json::array()}}), "/clip");
+  EXPECT_EQ(refusedAt({{"fog", json::array()}}), "/fog");
   EXPECT_EQ(channelRefusedAt({{"colour", "#ffffff"}}), "/channels/0/colour");
   EXPECT_EQ(refusedAt({{"camera", {{"a/b~c", 1}}}}), "/camera/a~1b~0c") << "RFC 6901 escapes";
   EXPECT_EQ(refusedAt({{"", 1}}), "/");

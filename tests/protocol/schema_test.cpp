@@ -73,7 +73,7 @@ TEST(Schema, GivesEveryFieldADescriptionAndADefaultThatIsTaken) {
     EXPECT_TRUE(isTaken(path, field["default"]));
     ++fields;
   });
-  EXPECT_EQ(fields, 35);
+  EXPECT_EQ(fields, 40);
 }
 
 TEST(Schema, SaysTheSameOfBoundsAsReadingDoes) {

@@ -141,9 +141,34 @@ TEST(SceneResolver, BoundsTheNumberOfMacrocellsButTakesTheDefaultSizeAlways) {
   EXPECT_EQ(bounded(0, 4), "");
 }
 
+TEST(SceneResolver, FillsInWhereClippingIs) {
+  const SceneResolver resolver(testing::smallStore(), {});
+  const auto plain = resolver.replace(json::object());
+  EXPECT_TRUE(plain->render.clip.empty());
+  EXPECT_FALSE(plain->render.crop);
+  EXPECT_EQ(resolver.replace(plain->resolved)->render, plain->render);
+  const auto& grid = plain->dataset->volume->grid();
+  EXPECT_EQ(plain->resolved["crop"]["x"], json({-0.5, grid.dims.x - 0.5}));
+  const auto clipped =
+      resolver.replace({{"clip", {json::object(), {{"media", {1}}}}}, {"crop", {{"y", {1, 1.5}}}}});
+  const glm::dvec3 centre(grid.worldFromVoxel * glm::dvec4(glm::dvec3(grid.dims - 1) * 0.5, 1));
+  EXPECT_EQ(clipped->resolved["clip"][0]["point"], json({centre.x, centre.y, centre.z}));
+  EXPECT_EQ(clipped->render.clip.at(0), (ClipPlane{centre, {0, 0, 1}, {}}));
+  EXPECT_EQ(clipped->render.clip.at(1).channels, std::vector<int>{1});
+  ASSERT_TRUE(clipped->render.crop);
+  EXPECT_EQ(clipped->render.crop->low, glm::dvec3(-0.5, 1, -0.5));
+  EXPECT_EQ(clipped->render.crop->regions, Crop::kInnermost);
+  // Sent back, it is the same scene.
+  EXPECT_EQ(resolver.replace(clipped->resolved)->render, clipped->render);
+}
+
 TEST(SceneResolver, RefusesWhatTheRendererWouldRefuseLater) {
   using Expected = std::pair<int, std::string>;
   const json far = {1e308, 1e308, 1e308};
+  EXPECT_EQ(errorOf({{"clip", {{{"normal", {0, 0, 0}}}}}}), Expected(422, "/clip/0/normal"));
+  EXPECT_EQ(errorOf({{"clip", {json::object(), {{"point", far}}}}}), Expected(422, "/clip/1"));
+  EXPECT_EQ(errorOf({{"clip", {{{"media", {2}}}}}}), Expected(422, "/clip/0"));
+  EXPECT_EQ(errorOf({{"crop", {{"z", {2, 1}}}}}), Expected(422, "/crop/z"));
   EXPECT_EQ(errorOf({{"lights", {{{"type", "headlight"}}, {{"type", "point"}, {"position", far}}}}}),
             Expected(422, "/lights/1"));
   EXPECT_EQ(errorOf({{"lights", {{{"direction", far}}}}}), Expected(422, "/lights/0"));

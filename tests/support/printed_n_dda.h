@@ -35,7 +35,7 @@ struct PrintedNDda {
         if (!(t < walk.exit())) break;
         const kernel::Place place{t, 0};
         if (const auto hit =
-                kernel::testChannel<Blend>(scene, n, bound, place, walk.pointAt(t), random, cost)) {
+                kernel::testChannel<Blend>(scene, ~0u, n, bound, place, walk.pointAt(t), random, cost)) {
           *nearest = hit;
           return;
         }

@@ -8,14 +8,14 @@
 
 namespace scolopax::kernel {
 
-/// Bound of all channels together ahead of a point, as boundAhead gives it of one.
+/// Bound of channels, by their bits, together ahead of a point, as boundAhead gives it of one.
 template <bool kSums>
-SCOLOPAX_HD float boundAheadOfAll(const SceneView& scene, std::size_t macrocell, const Ray& ray,
-                                  const VoxelCell& cell, glm::vec3 point, float least, float* way,
-                                  SampleCost* cost) {
+SCOLOPAX_HD float boundAheadOf(std::uint32_t channels, const SceneView& scene, std::size_t macrocell,
+                               const Ray& ray, const VoxelCell& cell, glm::vec3 point, float least,
+                               float* way, SampleCost* cost) {
   float all = 0.0f;
   for (int n = 0; n < scene.channelCount; ++n) {
-    if (!(scene.majorants.bound(macrocell, n) > 0.0f)) continue;
+    if (!(channels >> n & 1) || !(scene.majorants.bound(macrocell, n) > 0.0f)) continue;
     const float bound = boundAhead(scene, n, ray, cell, point, least, way, cost);
     all = kSums ? all + bound : maximum(all, bound);
   }
@@ -36,7 +36,7 @@ struct OneProcess {
     std::uint32_t tentative = 0;
     do {
       ++cost->cellSteps;
-      const float bound = scene.majorants.total(walk.index());
+      const float bound = scene.majorants.totalOf(inside.channels, walk.index(), scene.channelCount, kSums);
       if (!(bound > 0.0f)) continue;
       // Optical depth since the cell's entry: kept instead of t, so that a step shorter than the resolution
       // of t still makes progress.
@@ -46,8 +46,8 @@ struct OneProcess {
       while (depth < total - passed) {
         passed += depth;
         const Place place{walk.enter(), passed / bound};
-        if (const auto hit =
-                Test::test(scene, walk.index(), bound, place, walk.pointAt(place.t()), random, cost))
+        if (const auto hit = Test::test(scene, inside.channels, walk.index(), bound, place,
+                                        walk.pointAt(place.t()), random, cost))
           return hit;
         random = sampler.next();
         depth = opticalDepth(uniformOf(random.x));
@@ -67,10 +67,12 @@ struct OneProcess {
                 scene, ray, walk, passed / bound, walk.exit() - walk.enter(), sampler, &random, &depth,
                 &tentative, &hit,
                 [&](const VoxelCell& cell, glm::vec3 point, float least, float* way) {
-                  return boundAheadOfAll<kSums>(scene, walk.index(), ray, cell, point, least, way, cost);
+                  return boundAheadOf<kSums>(inside.channels, scene, walk.index(), ray, cell, point, least,
+                                             way, cost);
                 },
                 [&](float all, Place at, glm::vec3 point, const RandomBlock& numbers) {
-                  return TestClosely::test(scene, walk.index(), all, at, point, numbers, cost);
+                  return TestClosely::test(scene, inside.channels, walk.index(), all, at, point, numbers,
+                                           cost);
                 });
             if (outcome == CellOutcome::exhausted) cost->truncated = 1;
             if (outcome != CellOutcome::nothing) return hit;

@@ -6,11 +6,14 @@
 
 namespace scolopax::kernel {
 
-/// Tracks channel n through the walk's current cell, as far as `nearest`, which a hit replaces.
+/// Tracks channel n of `channels`, by their bits, through the walk's current cell, as far as `nearest`, which
+/// a hit replaces.
 template <bool kClosely, class Blend>
-SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, int n, [[maybe_unused]] const Ray& ray,
-                                  const CellWalk& walk, Sampler& sampler, std::optional<Collision>* nearest,
-                                  std::uint32_t* tentative, SampleCost* cost) {
+SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, std::uint32_t channels, int n,
+                                  [[maybe_unused]] const Ray& ray, const CellWalk& walk, Sampler& sampler,
+                                  std::optional<Collision>* nearest, std::uint32_t* tentative,
+                                  SampleCost* cost) {
+  if (!(channels >> n & 1)) return CellOutcome::nothing;
   const float bound = scene.majorants.bound(walk.index(), n);
   if (!(bound > 0.0f)) return CellOutcome::nothing;
   const float total = bound * (walk.exit() - walk.enter());
@@ -24,7 +27,8 @@ SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, int n, [[maybe_unused]
     if (!(passed < total)) return CellOutcome::nothing;
     const Place place{walk.enter(), passed / bound};
     if (*nearest && !nearer(place, (*nearest)->place)) return CellOutcome::nothing;
-    if (const auto hit = testChannel<Blend>(scene, n, bound, place, walk.pointAt(place.t()), random, cost)) {
+    if (const auto hit =
+            testChannel<Blend>(scene, channels, n, bound, place, walk.pointAt(place.t()), random, cost)) {
       *nearest = hit;
       return CellOutcome::hit;
     }
@@ -44,7 +48,7 @@ SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, int n, [[maybe_unused]
             return boundAhead(scene, n, ray, cell, point, least, way, cost);
           },
           [&](float own, Place at, glm::vec3 point, const RandomBlock& numbers) {
-            return testChannel<Blend>(scene, n, own, at, point, numbers, cost);
+            return testChannel<Blend>(scene, channels, n, own, at, point, numbers, cost);
           });
     }
   }
@@ -66,7 +70,7 @@ struct AlongChannel {
       if (hit && nearer(hit->place, {walk.enter(), 0.0f})) return hit;
       ++cost->cellSteps;
       const CellOutcome outcome =
-          trackCell<kClosely, Blend>(scene, n, ray, walk, sampler, &hit, &tentative, cost);
+          trackCell<kClosely, Blend>(scene, inside.channels, n, ray, walk, sampler, &hit, &tentative, cost);
       if (outcome == CellOutcome::exhausted) cost->truncated = 1;
       if (outcome == CellOutcome::stuck) *stuck = true;
       if (outcome != CellOutcome::nothing) return hit;
@@ -108,8 +112,8 @@ struct AlongCells {
       if (!(scene.majorants.total(walk.index()) > 0.0f)) continue;
       std::optional<Collision> nearest;
       for (int n = 0; n < scene.channelCount; ++n) {
-        const CellOutcome outcome =
-            trackCell<kClosely, Blend>(scene, n, ray, walk, sampler, &nearest, &tentative, cost);
+        const CellOutcome outcome = trackCell<kClosely, Blend>(scene, inside.channels, n, ray, walk, sampler,
+                                                               &nearest, &tentative, cost);
         if (outcome == CellOutcome::exhausted) cost->truncated = 1;
         if (outcome == CellOutcome::stuck) *stuck = true;
         if (outcome == CellOutcome::exhausted || outcome == CellOutcome::stuck) return std::nullopt;

@@ -35,7 +35,7 @@ struct FlippedShadows {
                                                 kernel::SampleCost* cost) {
     if (isShadowRay(inside)) {
       ray.direction = -ray.direction;
-      inside = kernel::clipToBox(ray, scene.dims);
+      inside = kernel::clipToScene(scene, ray);
       if (!(inside.enter < inside.exit)) return std::nullopt;
     }
     return kernel::Superposed::track<Blend>(scene, ray, inside, sampler, cost);
@@ -64,6 +64,21 @@ struct ShadowsThatBeginLate {
                                                 kernel::SampleCost* cost) {
     if (isShadowRay(inside)) inside.enter += 0.5f * scene.smallestSpacing;
     if (!(inside.enter < inside.exit)) return std::nullopt;
+    return kernel::Superposed::track<Blend>(scene, ray, inside, sampler, cost);
+  }
+};
+
+/// Shadow rays see what planes and crop cut away.
+struct ShadowsOfWhatIsClipped {
+  template <class Blend>
+  static std::optional<kernel::Collision> track(SceneView scene, const kernel::Ray& ray,
+                                                kernel::Interval inside, kernel::Sampler& sampler,
+                                                kernel::SampleCost* cost) {
+    if (isShadowRay(inside)) {
+      const kernel::ClipView whole{glm::vec3(-0.5f), glm::vec3(scene.dims) - 0.5f, 0, 0, {}, false, {}, {}};
+      scene.clip = whole;
+      inside = kernel::clipToScene(scene, ray);
+    }
     return kernel::Superposed::track<Blend>(scene, ray, inside, sampler, cost);
   }
 };
@@ -250,6 +265,41 @@ TEST_F(Defect, OfHalfAVoxelIsFound) {
   use(TestScene::lumps, BlendMode::density, false, false);
   EXPECT_FALSE(
       (passes<kernel::Superposed, kernel::BlendDensity>([](SceneView& view) { view.rays.origin0 += 0.5f; })));
+}
+
+/// A plane of all channels, one of the first, and regions that are not a box.
+void clipOften(Scene& scene, const Grid& grid) {
+  const glm::dvec3 centre(grid.worldFromVoxel * glm::dvec4(glm::dvec3(grid.dims - 1) * 0.5, 1));
+  scene.clip = {{centre, {0.2, -1, 0.4}, {}}, {centre, {1, 0.3, -0.2}, std::vector<int>{0}}};
+  scene.crop = Crop{0.3 * glm::dvec3(grid.dims), 0.6 * glm::dvec3(grid.dims), 0x7f3c9e7u};
+}
+
+TEST_F(Defect, OfClippingIsFound) {
+  made_ = *testScene(TestScene::lumps);
+  clipOften(made_.scene, made_.volume->grid());
+  expected_ = reference::renderReference(*made_.volume, made_.scene, 1);
+  const auto passesChanged = [&](auto&& change) {
+    return passes<kernel::Superposed, kernel::BlendDensity>(change);
+  };
+  EXPECT_TRUE(passesChanged([](SceneView&) {}));
+  EXPECT_FALSE(passesChanged([](SceneView& view) { view.clip.planes[0].offset += 0.5f; }));
+  EXPECT_FALSE(passesChanged([](SceneView& view) { view.clip.planes[1].channels = 2; }));
+  EXPECT_FALSE(passesChanged([](SceneView& view) { view.clip.planes[1].normal *= -1.0f; }));
+  EXPECT_FALSE(passesChanged([](SceneView& view) { view.clip.parts = false; }));
+  EXPECT_FALSE(passesChanged([](SceneView& view) {  // axes in the wrong order
+    const auto regions = std::to_array(view.clip.regions);
+    for (std::size_t i = 0; i < 27; ++i) view.clip.regions[i] = regions[i / 9 + i / 3 % 3 * 3 + i % 3 * 9];
+  }));
+  EXPECT_FALSE(passesWith([](Scene& scene) { scene.crop->high.x -= 0.5; }));
+}
+
+TEST_F(Defect, OfShadowsOfWhatIsClippedIsFound) {
+  made_ = *testScene(TestScene::lumps);
+  made_.scene.shadows = true;
+  clipOften(made_.scene, made_.volume->grid());
+  expected_ = reference::renderReference(*made_.volume, made_.scene, 1);
+  EXPECT_TRUE((passes<kernel::Superposed, kernel::BlendDensity, Shadowed>()));
+  EXPECT_FALSE((passes<ShadowsOfWhatIsClipped, kernel::BlendDensity, Shadowed>()));
 }
 
 TEST_F(Defect, OfWeightsThatAreForgottenIsFound) {

@@ -98,6 +98,24 @@ Light anyLight(Draw& draw, const Grid& grid) {
   return light;
 }
 
+/// Planes of all channels and of some, and regions of crop.
+void clipAnyhow(Draw& draw, const Volume& volume, Scene& scene) {
+  const glm::dvec3 size(volume.grid().dims);
+  const auto inside = [&] {
+    return glm::dvec3(draw.between(0, 1), draw.between(0, 1), draw.between(0, 1)) * size - 0.5;
+  };
+  for (int n = draw.upTo(3); n > 0; --n) {
+    ClipPlane plane{glm::dvec3(volume.grid().worldFromVoxel * glm::dvec4(inside(), 1)),
+                    {draw.between(-1, 1), draw.between(-1, 1), draw.between(-1, 1)},
+                    {}};
+    if (draw.upTo(1)) plane.channels = std::vector<int>{draw.upTo(int(scene.channels.size()) - 1)};
+    scene.clip.push_back(std::move(plane));
+  }
+  if (draw.upTo(1)) return;
+  const glm::dvec3 a = inside(), b = inside();
+  scene.crop = Crop{glm::min(a, b), glm::max(a, b), draw.of({Crop::kInnermost, 0x5a3c96bu, 0x3ffdfffu})};
+}
+
 /// From outside or within, in any light.
 Scene anyScene(Draw& draw, const Volume& volume) {
   Scene scene = frontScene(volume, 1 + draw.upTo(40), 1 + draw.upTo(40));
@@ -116,6 +134,7 @@ Scene anyScene(Draw& draw, const Volume& volume) {
   scene.shading = draw.upTo(1) == 1;
   scene.shadows = draw.upTo(2) == 0;
   for (int n = draw.upTo(3); n > 0; --n) scene.lights.push_back(anyLight(draw, volume.grid()));
+  if (draw.upTo(2) == 0) clipAnyhow(draw, volume, scene);
   return scene;
 }
 

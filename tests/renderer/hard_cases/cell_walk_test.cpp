@@ -14,6 +14,11 @@
 namespace scolopax::kernel {
 namespace {
 
+/// To the box [-1/2, dims - 1/2].
+kernel::Interval clipToVolume(const kernel::Ray& ray, glm::ivec3 dims) {
+  return kernel::clipToBox(ray, glm::vec3(-0.5f), glm::vec3(dims) - 0.5f);
+}
+
 constexpr float kDenormal = std::numeric_limits<float>::denorm_min();
 constexpr float kLargest = std::numeric_limits<float>::max();
 
@@ -64,7 +69,7 @@ TEST(CellWalk, VisitsTheCellsOfARayWithoutGapsAndEndsWithIt) {
         }
         if (ray.direction == glm::vec3(0)) continue;
         ray.origin -= ray.direction * float(random() % 3) * 32.0f;  // exact for direction 1
-        const Interval inside = clipToBox(ray, dims), exact = clipInDouble(ray, dims);
+        const Interval inside = clipToVolume(ray, dims), exact = clipInDouble(ray, dims);
         if (exact.exit - exact.enter > 1e-3f) {  // else rounding decides
           ASSERT_NEAR(inside.enter, exact.enter, 1e-4f + exact.enter * 1e-5f);
           ASSERT_NEAR(inside.exit, exact.exit, 1e-4f + exact.exit * 1e-5f);
@@ -95,7 +100,7 @@ TEST(CellWalk, VisitsTheCellsOfARayWithoutGapsAndEndsWithIt) {
 TEST(CellWalk, CountsTheFacesOfTheBoxAsInsideAndNothingBeside) {
   const glm::ivec3 dims(6, 4, 9);
   const auto lengthAt = [&](glm::vec3 origin, glm::vec3 direction) {
-    const Interval inside = clipToBox<One>({origin, direction}, dims);
+    const Interval inside = clipToVolume({origin, direction}, dims);
     return inside.enter < inside.exit ? inside.exit - inside.enter : 0.0f;
   };
   for (const float x : {-0.5f, 0.0f, 2.0f, 5.5f})
@@ -126,7 +131,7 @@ TEST(CellWalk, TakesADenormalDirectionForNone) {
         ray.origin[along] = -3;
         ray.direction[along] = 1;
         ray.direction[axis] = tiny;
-        const Interval inside = clipToBox(ray, dims);
+        const Interval inside = clipToVolume(ray, dims);
         ASSERT_EQ(inside.enter, 2.5f);
         ASSERT_EQ(inside.exit, 11.5f);
         CellWalk walk(ray, inside, grid);
@@ -154,7 +159,7 @@ TEST(CellWalk, OfRaysWithoutSenseIsBoundedAndSeesNothingWhereTheyAreNotFinite) {
         component = values[random() % std::size(values)];
         finite = finite && isFinite(component);
       }
-      const Interval inside = clipToBox(ray, dims);
+      const Interval inside = clipToVolume(ray, dims);
       ASSERT_TRUE(finite || !(inside.enter < inside.exit)) << trial;
       // Whatever the interval, also one that no caller would walk.
       for (const Interval interval :
@@ -226,7 +231,7 @@ TEST(CellWalk, LeapsOverEmptyBlocksAndVisitsWhatIsNotEmptyAsItWouldWithout) {
           }
           if (ray.direction == glm::vec3(0)) continue;
           ray.origin -= ray.direction * float(random() % 3) * 64.0f;
-          const Interval inside = clipToBox(ray, dims);
+          const Interval inside = clipToVolume(ray, dims);
           if (!(inside.enter < inside.exit)) continue;
           const auto follow = [&](const std::vector<TotalCode>& codes, long* steps) {
             grid.totals = codes.data();
@@ -267,7 +272,7 @@ TEST(CellWalk, OfRaysWithoutSenseThroughEmptyBlocksIsBounded) {
     for (int i = 0; i < 6; ++i)
       (i < 3 ? ray.origin[i] : ray.direction[i - 3]) = values[random() % std::size(values)];
     for (const Interval interval :
-         {clipToBox(ray, dims), Interval{0, 10}, Interval{-kInfinity, kInfinity}, Interval{kNaN, kNaN}}) {
+         {clipToVolume(ray, dims), Interval{0, 10}, Interval{-kInfinity, kInfinity}, Interval{kNaN, kNaN}}) {
       CellWalk walk(ray, interval, grid);
       int steps = 0;
       do {

@@ -51,7 +51,7 @@ template <class Tracker>
 Outcome track(const RenderPlan& plan, RandomBlock block) {
   ScriptedSampler sampler{block};
   Outcome outcome;
-  const Interval inside = clipToBox(kAlongZ, plan.view().dims);
+  const Interval inside = clipToScene(plan.view(), kAlongZ);
   outcome.hit = Tracker::template track<BlendDensity>(plan.view(), kAlongZ, inside, sampler, &outcome.cost);
   return outcome;
 }

@@ -28,6 +28,7 @@ class Decisions {
 
 /// One channel's values, and how it looks.
 struct Matter {
+  int number;                  // of the channel
   std::vector<double> values;  // data values, x fastest
   glm::ivec3 dims;
   const ChannelAppearance* look;
@@ -109,7 +110,7 @@ class Marcher {
     for (std::size_t n = 0; n < source.channels.size(); ++n) {
       const ChannelSource& channel = source.channels[n];
       if (!scene.channels[n].visible) continue;
-      Matter matter{{}, grid_.dims, &scene.channels[n]};
+      Matter matter{int(n), {}, grid_.dims, &scene.channels[n]};
       visitScalarType(channel.voxels.type(), [&](auto zero) {
         for (const auto voxel : channel.voxels.template as<decltype(zero)>())
           matter.values.push_back(channel.slope * double(voxel) + channel.intercept);
@@ -185,6 +186,23 @@ class Marcher {
     return *begin < *end && std::isfinite(*end);
   }
 
+  /// Whether planes and crop leave a channel at a point in voxel coordinates.
+  bool isLeft(int channel, const dvec3& p) const {
+    const dvec3 world(grid_.worldFromVoxel * glm::dvec4(p, 1));
+    for (const ClipPlane& plane : scene_.clip) {
+      const auto& some = plane.channels;
+      if (some && std::find(some->begin(), some->end(), channel) == some->end()) continue;
+      if (dot(plane.normal, world - plane.point) < 0) return false;
+    }
+    if (!scene_.crop) return true;
+    const auto slab = [&](int axis) {
+      const double far = grid_.dims[axis] - 0.5;
+      const auto isBelow = [&](double at) { return at >= far || (at > -0.5 && p[axis] < at); };
+      return isBelow(scene_.crop->low[axis]) ? 0 : isBelow(scene_.crop->high[axis]) ? 1 : 2;
+    };
+    return (scene_.crop->regions >> (slab(0) + 3 * slab(1) + 9 * slab(2))) & 1;
+  }
+
   struct Classified {
     double value = 0, extinction = 0;
     dvec3 color{0};
@@ -203,8 +221,9 @@ class Marcher {
     for (const Matter& m : matters) {
       Classified c;
       c.value = m.at(p);
-      decisions->note(std::isfinite(c.value));
-      if (std::isfinite(c.value)) {
+      const bool isThere = std::isfinite(c.value) && isLeft(m.number, p);
+      decisions->note(isThere);
+      if (isThere) {
         const double position = m.position(c.value);
         decisions->note(std::uint64_t((position > 0) + (position >= 1)));
         c.extinction = m.look->density * Matter::curve(m.look->opacity, position, decisions,

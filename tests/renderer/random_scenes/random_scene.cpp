@@ -19,6 +19,7 @@ struct Surroundings {
   std::uint64_t scene;
   const Grid& grid;
   glm::dvec3 corner, edge[3];  // the box in world space
+  std::size_t channels = 0;    // of the volume
   const ChannelSource* channel = nullptr;
 
   glm::dvec3 point(const glm::dvec3& share) const {
@@ -189,12 +190,61 @@ json drawCamera(Draw& draw, const Surroundings& around) {
   return {{"camera", camera}};
 }
 
+/// Through anything, along the axes and through voxel centres and faces, of all channels or some or none.
+json drawClip(Draw& draw, const Surroundings& around) {
+  if (draw.chance(0.6)) return json::object();
+  json planes = json::array();
+  const int count = draw.chance(0.1) ? 8 : draw.integer(1, 3);
+  for (int i = 0; i < count; ++i) {
+    glm::dvec3 normal = draw.direction() * draw.decades(1e-3, 1e3);
+    glm::dvec3 share = draw.vector(-0.05, 1.05);
+    if (draw.chance(0.3)) {
+      const int axis = draw.integer(0, 2), halves = 2 * around.grid.dims[axis];
+      share[axis] = double(draw.integer(0, halves)) / halves;
+      normal = glm::cross(around.edge[(axis + 1) % 3], around.edge[(axis + 2) % 3]);
+      if (draw.chance(0.5)) normal = -normal;
+    }
+    json plane{{"point", arrayOf(around.point(share))}, {"normal", arrayOf(normal)}};
+    if (draw.chance(0.5)) {
+      plane["media"] = json::array();
+      for (std::size_t n = 0; n < around.channels; ++n)
+        if (draw.chance(0.5)) plane["media"].push_back(n);
+    }
+    planes.push_back(std::move(plane));
+  }
+  return {{"clip", planes}};
+}
+
+json drawCrop(Draw& draw, const Surroundings& around) {
+  if (draw.chance(0.75)) return json::object();
+  constexpr const char* kAxes[] = {"x", "y", "z"};
+  json crop = json::object();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (draw.chance(0.3)) continue;
+    const double size = around.grid.dims[axis];
+    const auto end = [&] {
+      const double at = draw.between(-1, size + 0.5);
+      return draw.chance(0.3) ? std::floor(2 * at) / 2 : at;
+    };
+    const double a = end(), b = draw.chance(0.1) ? a : end();
+    crop[kAxes[axis]] = {std::min(a, b), std::max(a, b)};
+  }
+  if (draw.chance(0.5)) {
+    json regions = json::array();
+    for (int i = 0; i < 27; ++i) regions.push_back(draw.chance(0.6));
+    crop["regions"] = regions;
+  }
+  return {{"crop", crop}};
+}
+
 const Field kSceneFields[] = {
     {"blend",
      [](Draw& d, const Surroundings&) -> json {
        return {{"blend", {{"mode", nameFrom(d, kBlendModes)}}}};
      }},
     {"camera", drawCamera},
+    {"clip", drawClip},
+    {"crop", drawCrop},
     {"shading",
      [](Draw& d, const Surroundings&) -> json {
        return {{"shading", d.chance(0.4)}};
@@ -240,7 +290,7 @@ json drawFields(const Field (&fields)[N], const Surroundings& around, const std:
 }
 
 json drawWire(std::uint64_t number, const VolumeSource& source) {
-  Surroundings around{number, source.grid, {}, {}};
+  Surroundings around{number, source.grid, {}, {}, source.channels.size()};
   const glm::dmat4& m = source.grid.worldFromVoxel;
   around.corner = glm::dvec3(m * glm::dvec4(glm::dvec3(-0.5), 1));
   for (int axis = 0; axis < 3; ++axis)
@@ -294,6 +344,8 @@ std::string describe(const RandomScene& drawn) {
     for (const Light& light : s.lights) text << nameOf(light.type) << " ";
     text << s.lights.size() << " lights)";
   }
+  if (!s.clip.empty()) text << ", " << s.clip.size() << " clip planes";
+  if (s.crop) text << ", crop";
   text << (s.camera.orthoHeight ? ", orthographic" : ", perspective") << ", " << s.width << "x" << s.height
        << " " << nameOf(s.filter) << ", macrocell " << s.macrocell << ", step " << s.step << ", "
        << nameOf(s.sampling) << ", thickness";
@@ -307,7 +359,7 @@ std::string writeScene(const RandomScene& drawn, const std::string& folder) {
   const std::string scene = folder + "/scene.json";
   std::ofstream(scene) << drawn.wire.dump(2) << "\n";
   std::string command = "scolopax reference " + scene + " -o picture.exr --data";
-  for (const auto& path : writeVolume(drawn.source, folder)) command += " " + path.string();
+  for (const auto& path : writeVolume(drawn.source, folder)) command.append(" ").append(path.string());
   return command;
 }
 

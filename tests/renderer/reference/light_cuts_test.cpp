@@ -73,7 +73,8 @@ struct Lines {
   void forEachPiece(int rays, const Visit& visit) {
     const Lighting lighting(scene, glm::dvec3(0));
     const LightCuts lightCuts(lighting, worldFromVoxel, 1e-6);
-    const ActiveChannel channel{ScalarField(volume.channels()[0], dims),
+    const ActiveChannel channel{0,
+                                ScalarField(volume.channels()[0], dims),
                                 ChannelCurves(scene.channels[0]),
                                 1,
                                 false,
@@ -84,7 +85,7 @@ struct Lines {
       const glm::dvec3 through = glm::dvec3(unit(), unit(), unit()) * glm::dvec3(dims) - 0.5;
       const RayCells cells = cutAtCells(through, glm::inverse(worldFromVoxel) * direction, dims);
       forEachSmoothPart(
-          cells, dims, BlendMode::density, {&channel, 1},
+          cells, dims, Clipping(Scene(), volume.grid()), BlendMode::density, {&channel, 1},
           [&](const Stretch& stretch, double begin, double end) {
             const auto cuts = lightCuts.of(stretch, begin, end, direction);
             EXPECT_EQ(cuts.front(), begin);

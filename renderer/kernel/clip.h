@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+// Clipping: the interval of a ray inside the crop box and clip planes, the channels that are left at a point,
+// and the spans of a ray in which the same channels are left.
+#pragma once
+#include "renderer/kernel/math.h"
+#include "renderer/kernel/views.h"
+
+namespace scolopax::kernel {
+
+template <class L>
+struct IntervalOf {
+  typename L::Float enter, exit;   ///< along the ray; empty when enter >= exit
+  typename L::Word channels{~0u};  ///< bit n: visible channel n is left there
+};
+using Interval = IntervalOf<One>;
+
+/// The part of the ray with t >= 0 inside the box [low, high], low < high; faces belong to the box. A ray
+/// that is not finite, or has no direction at all, sees nothing.
+template <class L>
+SCOLOPAX_LANES IntervalOf<L> clipToBox(const RayOf<L>& ray, glm::vec3 low, glm::vec3 high) {
+  using Float = typename L::Float;
+  using Mask = typename L::Mask;
+  IntervalOf<L> inside{Float(0.0f), Float(kInfinity)};
+  Mask meets = L::everywhere();
+  for (int axis = 0; axis < 3; ++axis) {
+    const float lo = low[axis], hi = high[axis];
+    const Float o = ray.origin[axis], d = ray.direction[axis];
+    const Mask along = d == 0.0f;
+    const Float a = (lo - o) / d, b = (hi - o) / d;
+    const Float near = minimum(a, b), far = maximum(a, b);
+    meets = meets & (without(near <= far, along) | (along & (o >= lo) & (o <= hi)));
+    inside.enter = select(along, inside.enter, maximum(inside.enter, near));
+    inside.exit = select(along, inside.exit, minimum(inside.exit, far));
+  }
+  meets = meets & (inside.exit < kInfinity);
+  return {where(meets, inside.enter), where(meets, inside.exit)};
+}
+
+/// How far a point is on the kept side of a plane, in voxels.
+template <class L>
+SCOLOPAX_LANES typename L::Float sideOf(const ClipPlaneView& plane, const typename L::Vec& point) {
+  return dot(typename L::Vec(plane.normal), point) + plane.offset;
+}
+template <class Vec>
+SCOLOPAX_LANES auto sumOfMagnitudes(const Vec& v) {
+  return maximum(v[0], -v[0]) + maximum(v[1], -v[1]) + maximum(v[2], -v[2]);
+}
+/// What rounding makes of a slope, and of a side, relative to what they are sums of.
+inline constexpr float kAlongPlane = 0x1p-21f;
+
+/// A plane as a ray meets it.
+template <class L>
+struct PlaneHit {
+  typename L::Float side, slope;  ///< of the start, and per t; above 0 is kept
+  typename L::Float t;            ///< where the ray passes the plane; not finite or NaN along it
+
+  SCOLOPAX_LANES PlaneHit(const ClipPlaneView& plane, const RayOf<L>& ray)
+      : side(sideOf<L>(plane, ray.origin)),
+        slope(dot(typename L::Vec(plane.normal), ray.direction)),
+        t(-side / slope) {}
+};
+
+/// The interval of the ray in which there may be anything: inside the box that crop leaves, on the kept side
+/// of all planes that clip all channels.
+template <class L>
+SCOLOPAX_LANES IntervalOf<L> clipToScene(const SceneView& scene, const RayOf<L>& ray) {
+  using Mask = typename L::Mask;
+  IntervalOf<L> inside = clipToBox(ray, scene.clip.low, scene.clip.high);
+  for (int i = 0; i < scene.clip.wholePlanes; ++i) {
+    const ClipPlaneView& plane = scene.clip.planes[i];
+    const PlaneHit<L> hit(plane, ray);
+    // Rounding tilts a ray along the plane, and puts its start a little beside it.
+    const auto reach = sumOfMagnitudes(ray.direction) * kAlongPlane;
+    const Mask begins = hit.slope > reach, ends = hit.slope < -reach;
+    const Mask kept = hit.side + sumOfMagnitudes(ray.origin) * kAlongPlane >= 0.0f;
+    inside.enter = select(begins, maximum(inside.enter, hit.t), inside.enter);
+    inside.exit = select(ends, minimum(inside.exit, hit.t), inside.exit);
+    inside.exit = select(begins | ends | kept, inside.exit, inside.enter);
+  }
+  return inside;
+}
+
+/// A point of the clipped volume, moved back where rounding has put it outside of the crop box or behind a
+/// plane of all channels: a ray from outside may see nothing.
+template <class L>
+SCOLOPAX_LANES typename L::Vec insideOf(const ClipView& clip, typename L::Vec point) {
+  for (int axis = 0; axis < 3; ++axis) point[axis] = clamp(point[axis], clip.low[axis], clip.high[axis]);
+  for (int i = 0; i < clip.wholePlanes; ++i) {
+    const auto beyond = minimum(sideOf<L>(clip.planes[i], point), 0.0f);
+    point = point - typename L::Vec(clip.planes[i].normal) * beyond;
+  }
+  return point;
+}
+
+/// Bits of the visible channels that planes of some channels and regions of crop leave at a point.
+template <class L>
+SCOLOPAX_LANES typename L::Word channelsAt(const ClipView& clip, const typename L::Vec& point) {
+  using Int = typename L::Int;
+  using Word = typename L::Word;
+  Int region(0);
+  for (int axis = 2; axis >= 0; --axis)
+    region = region * 3 + onesOf(point[axis] >= clip.cropAt[0][axis]) +
+             onesOf(point[axis] >= clip.cropAt[1][axis]);
+  Word channels = Word(gather(clip.regions, region));
+  for (int i = clip.wholePlanes; i < clip.planeCount; ++i) {
+    const auto kept = sideOf<L>(clip.planes[i], point) >= 0.0f;
+    channels = channels & select(kept, Word(~0u), Word(~clip.planes[i].channels));
+  }
+  return channels;
+}
+
+/// The spans of rays, front to back, in each of which the same channels are left.
+template <class L>
+class Spans {
+ public:
+  using Float = typename L::Float;
+  using Word = typename L::Word;
+  using Mask = typename L::Mask;
+
+  /// Of channels by their bits: what else is clipped does not matter.
+  SCOLOPAX_LANES Spans(const SceneView& scene, const RayOf<L>& ray, const IntervalOf<L>& inside,
+                       std::uint32_t channels)
+      : clip_(scene.clip), ray_(ray), rest_(inside), channels_(channels) {}
+
+  /// Returns the next span of every ray in `wants`. It is empty for other rays, where no channel is left, and
+  /// at the end.
+  SCOLOPAX_LANES IntervalOf<L> next(Mask wants) {
+    IntervalOf<L> span = rest_;
+    Mask some = wants;
+    if (clip_.parts) {
+      for (int axis = 0; axis < 3; ++axis)
+        for (int side = 0; side < 2; ++side)
+          end(span, (clip_.cropAt[side][axis] - ray_.origin[axis]) / ray_.direction[axis]);
+      for (int i = clip_.wholePlanes; i < clip_.planeCount; ++i)
+        if ((clip_.planes[i].channels & channels_) != 0) end(span, PlaneHit<L>(clip_.planes[i], ray_).t);
+      const Float middle = 0.5f * (span.enter + span.exit);
+      span.channels = channelsAt<L>(clip_, ray_.origin + middle * ray_.direction);
+      some = without(some, (span.channels & Word(channels_)) == Word(0u));
+    }
+    rest_.enter = span.exit;
+    span.exit = select(some, span.exit, span.enter);
+    return span;
+  }
+  /// Whether no ray in `wants` has a further span.
+  SCOLOPAX_LANES bool done(Mask wants) const { return !any(wants & (rest_.enter < rest_.exit)); }
+
+ private:
+  /// A face at t ends the span. Along the face, t is infinite or not a number, and ends nothing.
+  SCOLOPAX_LANES static void end(IntervalOf<L>& span, Float t) {
+    span.exit = select((t > span.enter) & (t < span.exit), t, span.exit);
+  }
+
+  const ClipView& clip_;
+  const RayOf<L>& ray_;
+  IntervalOf<L> rest_;
+  std::uint32_t channels_;
+};
+
+}  // namespace scolopax::kernel

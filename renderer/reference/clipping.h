@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Clip planes and crop, in double: where rays are cut, and which channels are left at a point.
+#pragma once
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "renderer/data/scene.h"
+#include "renderer/data/volume.h"
+#include "renderer/reference/ray_cells.h"
+
+namespace scolopax::reference {
+
+class Clipping {
+ public:
+  Clipping(const Scene& scene, const Grid& grid);
+  /// Adds the points at which the ray passes a plane to its cuts.
+  void cut(RayCells& ray) const;
+  /// Whether a channel of the volume is left at a point in voxel coordinates. Points on a plane, but for
+  /// rounding, are on its kept side, and in the upper of two regions.
+  bool keeps(int channel, const glm::dvec3& voxel) const;
+
+ private:
+  /// Kept is dot(normal, voxel) + offset >= 0; the normal has length 1 in voxels.
+  struct Plane {
+    glm::dvec3 normal;
+    double offset;
+    std::optional<std::vector<int>> channels;
+  };
+  glm::ivec3 dims_;
+  std::vector<Plane> planes_;
+  std::optional<Crop> crop_;
+};
+
+}  // namespace scolopax::reference
