@@ -22,17 +22,26 @@ SCOLOPAX_HD inline Classified classify(const SceneView& scene, int channel, glm:
   return {extinctionAt(scene.channels[channel], position), position};
 }
 
-/// Channel of the largest extinction, of those by their bits; the lowest of equal ones.
+/// Which visible channels matter: all, and the loops over them need not ask; or some, by their bits.
+struct AllChannels {
+  SCOLOPAX_HD static constexpr bool has(int) { return true; }
+};
+struct SomeChannels {
+  std::uint32_t bits;
+  SCOLOPAX_HD constexpr bool has(int n) const { return bits >> n & 1; }
+};
+
+/// Channel of the largest extinction; the lowest of equal ones.
 struct Largest {
   float extinction = 0.0f;
   int channel = 0;
   float position = 0.0f;
 };
-SCOLOPAX_HD inline Largest largestOf(const SceneView& scene, std::uint32_t channels, glm::vec3 point,
-                                     SampleCost* cost) {
+template <class Channels>
+SCOLOPAX_HD Largest largestOf(const SceneView& scene, Channels channels, glm::vec3 point, SampleCost* cost) {
   Largest largest;
   for (int n = 0; n < scene.channelCount; ++n) {
-    if (!(channels >> n & 1)) continue;
+    if (!channels.has(n)) continue;
     const Classified c = classify(scene, n, point, cost);
     if (c.extinction > largest.extinction) largest = {c.extinction, n, c.position};
   }

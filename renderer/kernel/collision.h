@@ -35,19 +35,20 @@ SCOLOPAX_HD inline void keepNearer(FirstCollision* first, const FirstCollision& 
 /// what any thickness that can be told from opaque needs.
 inline constexpr std::uint32_t kMaxTentativeCollisions = 1u << 20;
 
-/// Tentative collision in a macrocell of the process of several channels, by their bits, together; `bound` is
+/// Tentative collision in a macrocell of the process of several channels together; `bound` is
 /// their total.
 /// Accepts with probability extinction / bound (Eq. 4), strictly below, so that zero extinction is never hit.
 struct PickOneChannel {
   /// Draws the channel first, with probability bound_n / bound, and fetches only that one. What the bounds
   /// leave of the total belongs to none.
-  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, std::uint32_t channels,
+  template <class Channels>
+  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, Channels channels,
                                                    std::size_t cell, float bound, Place place,
                                                    glm::vec3 point, const RandomBlock& random,
                                                    SampleCost* cost) {
     float pick = uniformOf(random.y) * bound;
     for (int n = 0; n < scene.channelCount; ++n) {
-      if (!(channels >> n & 1)) continue;
+      if (!channels.has(n)) continue;
       const float own = scene.majorants.bound(cell, n);
       if (pick < own) {
         const Classified c = classify(scene, n, point, cost);
@@ -61,12 +62,13 @@ struct PickOneChannel {
 };
 struct TestAllChannels {
   /// Fetches channel after channel until the drawn share of the bound is used up.
-  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, std::uint32_t channels,
-                                                   std::size_t, float bound, Place place, glm::vec3 point,
+  template <class Channels>
+  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, Channels channels, std::size_t,
+                                                   float bound, Place place, glm::vec3 point,
                                                    const RandomBlock& random, SampleCost* cost) {
     float left = uniformOf(random.y) * bound;
     for (int n = 0; n < scene.channelCount; ++n) {
-      if (!(channels >> n & 1)) continue;
+      if (!channels.has(n)) continue;
       const Classified c = classify(scene, n, point, cost);
       if (left < c.extinction) return Collision{place, point, n, c.position};
       left -= c.extinction;
@@ -76,8 +78,9 @@ struct TestAllChannels {
 };
 /// The same for max and mix, whose bound is the largest of the channels'.
 struct TestLargest {
-  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, std::uint32_t channels,
-                                                   std::size_t, float bound, Place place, glm::vec3 point,
+  template <class Channels>
+  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, Channels channels, std::size_t,
+                                                   float bound, Place place, glm::vec3 point,
                                                    const RandomBlock& random, SampleCost* cost) {
     const Largest largest = largestOf(scene, channels, point, cost);
     if (!(uniformOf(random.z) * bound < largest.extinction)) return std::nullopt;
@@ -87,15 +90,15 @@ struct TestLargest {
 
 /// Tentative collision of the own process of one of several channels. In max and mix a channel has extinction
 /// only where it is the largest (Eq. 8).
-template <class Blend>
-SCOLOPAX_HD std::optional<Collision> testChannel(const SceneView& scene, std::uint32_t channels, int n,
+template <class Blend, class Channels>
+SCOLOPAX_HD std::optional<Collision> testChannel(const SceneView& scene, Channels channels, int n,
                                                  float bound, Place place, glm::vec3 point,
                                                  const RandomBlock& random, SampleCost* cost) {
   const Classified c = classify(scene, n, point, cost);
   if (!(uniformOf(random.z) * bound < c.extinction)) return std::nullopt;
   if constexpr (!Blend::kSums)
     for (int other = 0; other < scene.channelCount; ++other) {
-      if (other == n || !(channels >> other & 1)) continue;
+      if (other == n || !channels.has(other)) continue;
       const float extinction = classify(scene, other, point, cost).extinction;
       if (extinction > c.extinction || (extinction == c.extinction && other < n)) return std::nullopt;
     }

@@ -68,16 +68,6 @@ struct MajorantView {
   SCOLOPAX_HD float total(std::size_t cell) const {
     return totals[cell] < kEmptyCode ? std::bit_cast<float>(std::uint32_t(totals[cell]) << 16) : 0.0f;
   }
-  /// The same of some channels, by their bits; `sums`: their extinctions add up.
-  SCOLOPAX_HD float totalOf(std::uint32_t channels, std::size_t cell, int channelCount, bool sums) const {
-    if (channels == ~0u) return total(cell);
-    float all = 0.0f;
-    for (int n = 0; n < channelCount; ++n) {
-      const float own = channels >> n & 1 ? bound(cell, n) : 0.0f;
-      all = sums ? all + own : all > own ? all : own;
-    }
-    return all;
-  }
   /// Greatest r such that the blocks that are less than r blocks away from the cell's, along every axis, are
   /// empty; at most kMaxEmptyRadius.
   SCOLOPAX_HD int emptyRadius(std::size_t cell) const {

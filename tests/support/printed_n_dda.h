@@ -34,8 +34,8 @@ struct PrintedNDda {
         if (*nearest && t > (*nearest)->place.t()) return;  // the order that is printed
         if (!(t < walk.exit())) break;
         const kernel::Place place{t, 0};
-        if (const auto hit =
-                kernel::testChannel<Blend>(scene, ~0u, n, bound, place, walk.pointAt(t), random, cost)) {
+        if (const auto hit = kernel::testChannel<Blend>(scene, kernel::AllChannels{}, n, bound, place,
+                                                        walk.pointAt(t), random, cost)) {
           *nearest = hit;
           return;
         }

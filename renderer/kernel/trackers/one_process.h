@@ -8,18 +8,35 @@
 
 namespace scolopax::kernel {
 
-/// Bound of channels, by their bits, together ahead of a point, as boundAhead gives it of one.
+/// Bound of several channels together ahead of a point, as boundAhead gives it of one.
 template <bool kSums>
-SCOLOPAX_HD float boundAheadOf(std::uint32_t channels, const SceneView& scene, std::size_t macrocell,
+SCOLOPAX_HD float boundAheadOf(SomeChannels channels, const SceneView& scene, std::size_t macrocell,
                                const Ray& ray, const VoxelCell& cell, glm::vec3 point, float least,
                                float* way, SampleCost* cost) {
   float all = 0.0f;
   for (int n = 0; n < scene.channelCount; ++n) {
-    if (!(channels >> n & 1) || !(scene.majorants.bound(macrocell, n) > 0.0f)) continue;
+    if (!channels.has(n) || !(scene.majorants.bound(macrocell, n) > 0.0f)) continue;
     const float bound = boundAhead(scene, n, ray, cell, point, least, way, cost);
     all = kSums ? all + bound : maximum(all, bound);
   }
   return all;
+}
+
+/// Bound of several channels together in a macrocell.
+template <bool kSums>
+SCOLOPAX_HD float totalBound(const SceneView& scene, AllChannels, std::size_t cell) {
+  return scene.majorants.total(cell);
+}
+template <bool kSums>
+SCOLOPAX_HD float totalBound(const SceneView& scene, SomeChannels channels, std::size_t cell) {
+  const float all = scene.majorants.total(cell);
+  if (!(all > 0.0f) || channels.bits == ~0u) return all;
+  float some = 0.0f;
+  for (int n = 0; n < scene.channelCount; ++n) {
+    const float own = channels.has(n) ? scene.majorants.bound(cell, n) : 0.0f;
+    some = kSums ? some + own : maximum(some, own);
+  }
+  return some;
 }
 
 /// Independent Poisson processes add up to one: ONE optical depth is drawn per tentative collision and
@@ -30,13 +47,14 @@ struct OneProcess {
   template <bool kClosely>
   SCOLOPAX_HD std::optional<Collision> along(const SceneView& scene, const Ray& ray, Interval inside,
                                              Sampler& sampler, SampleCost* cost, bool* stuck) const {
+    const auto channels = channelsFor<kClosely>(inside);
     RandomBlock random = sampler.next();
     float depth = opticalDepth(uniformOf(random.x));
     CellWalk walk(ray, inside, scene.majorants);
     std::uint32_t tentative = 0;
     do {
       ++cost->cellSteps;
-      const float bound = scene.majorants.totalOf(inside.channels, walk.index(), scene.channelCount, kSums);
+      const float bound = totalBound<kSums>(scene, channels, walk.index());
       if (!(bound > 0.0f)) continue;
       // Optical depth since the cell's entry: kept instead of t, so that a step shorter than the resolution
       // of t still makes progress.
@@ -46,8 +64,8 @@ struct OneProcess {
       while (depth < total - passed) {
         passed += depth;
         const Place place{walk.enter(), passed / bound};
-        if (const auto hit = Test::test(scene, inside.channels, walk.index(), bound, place,
-                                        walk.pointAt(place.t()), random, cost))
+        if (const auto hit = Test::test(scene, channels, walk.index(), bound, place, walk.pointAt(place.t()),
+                                        random, cost))
           return hit;
         random = sampler.next();
         depth = opticalDepth(uniformOf(random.x));
@@ -67,12 +85,11 @@ struct OneProcess {
                 scene, ray, walk, passed / bound, walk.exit() - walk.enter(), sampler, &random, &depth,
                 &tentative, &hit,
                 [&](const VoxelCell& cell, glm::vec3 point, float least, float* way) {
-                  return boundAheadOf<kSums>(inside.channels, scene, walk.index(), ray, cell, point, least,
-                                             way, cost);
+                  return boundAheadOf<kSums>(channels, scene, walk.index(), ray, cell, point, least, way,
+                                             cost);
                 },
                 [&](float all, Place at, glm::vec3 point, const RandomBlock& numbers) {
-                  return TestClosely::test(scene, inside.channels, walk.index(), all, at, point, numbers,
-                                           cost);
+                  return TestClosely::test(scene, channels, walk.index(), all, at, point, numbers, cost);
                 });
             if (outcome == CellOutcome::exhausted) cost->truncated = 1;
             if (outcome != CellOutcome::nothing) return hit;

@@ -6,14 +6,14 @@
 
 namespace scolopax::kernel {
 
-/// Tracks channel n of `channels`, by their bits, through the walk's current cell, as far as `nearest`, which
+/// Tracks channel n of `channels` through the walk's current cell, as far as `nearest`, which
 /// a hit replaces.
-template <bool kClosely, class Blend>
-SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, std::uint32_t channels, int n,
+template <bool kClosely, class Blend, class Channels>
+SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, Channels channels, int n,
                                   [[maybe_unused]] const Ray& ray, const CellWalk& walk, Sampler& sampler,
                                   std::optional<Collision>* nearest, std::uint32_t* tentative,
                                   SampleCost* cost) {
-  if (!(channels >> n & 1)) return CellOutcome::nothing;
+  if (!channels.has(n)) return CellOutcome::nothing;
   const float bound = scene.majorants.bound(walk.index(), n);
   if (!(bound > 0.0f)) return CellOutcome::nothing;
   const float total = bound * (walk.exit() - walk.enter());
@@ -69,8 +69,8 @@ struct AlongChannel {
     do {
       if (hit && nearer(hit->place, {walk.enter(), 0.0f})) return hit;
       ++cost->cellSteps;
-      const CellOutcome outcome =
-          trackCell<kClosely, Blend>(scene, inside.channels, n, ray, walk, sampler, &hit, &tentative, cost);
+      const CellOutcome outcome = trackCell<kClosely, Blend>(scene, channelsFor<kClosely>(inside), n, ray,
+                                                             walk, sampler, &hit, &tentative, cost);
       if (outcome == CellOutcome::exhausted) cost->truncated = 1;
       if (outcome == CellOutcome::stuck) *stuck = true;
       if (outcome != CellOutcome::nothing) return hit;
@@ -112,8 +112,8 @@ struct AlongCells {
       if (!(scene.majorants.total(walk.index()) > 0.0f)) continue;
       std::optional<Collision> nearest;
       for (int n = 0; n < scene.channelCount; ++n) {
-        const CellOutcome outcome = trackCell<kClosely, Blend>(scene, inside.channels, n, ray, walk, sampler,
-                                                               &nearest, &tentative, cost);
+        const CellOutcome outcome = trackCell<kClosely, Blend>(scene, channelsFor<kClosely>(inside), n, ray,
+                                                               walk, sampler, &nearest, &tentative, cost);
         if (outcome == CellOutcome::exhausted) cost->truncated = 1;
         if (outcome == CellOutcome::stuck) *stuck = true;
         if (outcome == CellOutcome::exhausted || outcome == CellOutcome::stuck) return std::nullopt;
