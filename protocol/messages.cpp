@@ -51,6 +51,16 @@ struct Table<ResumeMessage> {
   static constexpr std::string_view required[] = {"token"};
   static constexpr auto fields = std::tuple{field("token", &ResumeMessage::token, "", {.maxLength = 256})};
 };
+template <>
+struct Table<PickMessage> {
+  static constexpr std::string_view type = "pick";
+  static constexpr std::string_view required[] = {"id", "x", "y"};
+  static constexpr Traits pixels{.atLeast = 0, .below = 16384};
+  static constexpr auto fields =
+      std::tuple{field("id", &PickMessage::id, "", {.atLeast = 1, .atMost = kU32Max}),
+                 field("x", &PickMessage::x, "", pixels), field("y", &PickMessage::y, "", pixels),
+                 field("x2", &PickMessage::x2, "", pixels), field("y2", &PickMessage::y2, "", pixels)};
+};
 
 namespace {
 
@@ -117,6 +127,17 @@ std::string errorText(const ProtocolError& error, std::uint32_t patchId) {
 }
 
 std::string noticeText(std::string_view text) { return written({{"type", "notice"}, {"text", text}}); }
+
+std::string pickedText(std::uint32_t id, const nlohmann::json& found) {
+  nlohmann::ordered_json message{{"type", "picked"}, {"id", id}};
+  for (const auto& [name, value] : found.items()) message[name] = value;
+  return written(message);
+}
+
+std::string pickedText(std::uint32_t id, const ProtocolError& error) {
+  return written(
+      {{"type", "picked"}, {"id", id}, {"problem", nlohmann::ordered_json::parse(problemJson(error))}});
+}
 
 std::string pongText(std::uint32_t id) { return written({{"type", "pong"}, {"id", id}}); }
 

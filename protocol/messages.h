@@ -32,8 +32,15 @@ struct ViewMessage {
 struct ResumeMessage {
   std::string token;
 };
+/// Pixels of the session's picture from its top left corner; x2 and y2: the other corner of a rectangle.
+struct PickMessage {
+  std::uint32_t id = 0;  ///< given back by the answer
+  double x = 0, y = 0;
+  std::optional<double> x2, y2;
+};
 
-using ClientMessage = std::variant<PatchMessage, AckMessage, PingMessage, ViewMessage, ResumeMessage>;
+using ClientMessage =
+    std::variant<PatchMessage, AckMessage, PingMessage, ViewMessage, ResumeMessage, PickMessage>;
 
 /// Throws ProtocolError: 400 and 413 as parseJson, 422 for an unknown type or a bad field.
 ClientMessage parseClientMessage(std::string_view text, const Limits& limits = {});
@@ -45,5 +52,8 @@ std::string sceneText(std::uint32_t revision, const nlohmann::json& patch);
 std::string errorText(const ProtocolError& error, std::uint32_t patchId = 0);
 std::string noticeText(std::string_view text);
 std::string pongText(std::uint32_t id);
+/// `found`: the members of the answer, as GET .../pick has them.
+std::string pickedText(std::uint32_t id, const nlohmann::json& found);
+std::string pickedText(std::uint32_t id, const ProtocolError& error);
 
 }  // namespace scolopax::protocol

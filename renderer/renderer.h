@@ -12,6 +12,7 @@
 #include "renderer/core/memory_budget.h"
 #include "renderer/data/aov.h"
 #include "renderer/data/image.h"
+#include "renderer/data/pick.h"
 #include "renderer/data/scene.h"
 #include "renderer/data/volume.h"
 
@@ -84,6 +85,12 @@ class Renderer {
   virtual void recordAovs() = 0;
   /// All values not defined unless recording.
   virtual AovValues aov(Aov which) const = 0;
+  /// Looks up what is visible in an area of the picture, by the method's own samples, without the film. The
+  /// same for the same scene, whatever has been rendered. `scene`: that of setScene, but size, filter, method
+  /// and step may differ: what is shown for a while may be smaller and coarser. Automatic looks as superposed
+  /// does. Valid until the next setScene; between these, and while others use what is const or add pixels,
+  /// from any thread.
+  virtual std::unique_ptr<Picking> pick(const Scene& scene, const PixelArea& area) const = 0;
   virtual Image image() const = 0;
 };
 

@@ -141,6 +141,21 @@ net::Response frame(ApiContext& context, const net::Request& request) {
   return response;
 }
 
+PickQuery pickQuery(const net::Request& request) {
+  PickQuery query{queryNumber(request, "x"), queryNumber(request, "y")};
+  if (request.queryValue("x2")) query.x2 = queryNumber(request, "x2");
+  if (request.queryValue("y2")) query.y2 = queryNumber(request, "y2");
+  return query;
+}
+
+net::Response pick(ApiContext& context, const net::Request& request) {
+  const auto session = sessionOf(context, request);
+  const auto found = session->waitForPick(pickQuery(request), context.config.pollTimeout, request.gone);
+  if (!found && context.stopping) throw ProtocolError(503, "", "the server is stopping");
+  if (!found) throw ProtocolError(503, "", "the scene was not ready in time to be picked from");
+  return jsonResponse(200, *found);
+}
+
 }  // namespace
 
 std::vector<Route> sessionRoutes(ApiContext& context) {
@@ -226,6 +241,18 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
        net::RouteKind::slow,
        [&context](const net::Request& request) { return frame(context, request); },
        {200, 204}},
+      {"GET",
+       "/api/v1/sessions/{id}/pick",
+       "What is visible at a pixel of the picture, or in a rectangle of it",
+       {id,
+        {"x", "query", "number", "Pixels from the picture's left edge"},
+        {"y", "query", "number", "Pixels from the picture's upper edge"},
+        {"x2", "query", "number", "With y2: the rectangle's other corner"},
+        {"y2", "query", "number", "With x2: the rectangle's other corner"}},
+       "",
+       kJson,
+       net::RouteKind::slow,
+       [&context](const net::Request& request) { return pick(context, request); }},
   };
 }
 

@@ -80,7 +80,9 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
             {"clients", config.maxClients},
             {"renders", config.maxRenders},
             {"renderSeconds", config.maxRenderSeconds},
-            {"waitingPolls", Session::kMaxPolls}}}};
+            {"waitingPolls", Session::kMaxPolls},
+            {"waitingPicks", Session::kMaxPicks},
+            {"pickPixels", kMaxPickPixels}}}};
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/matrix.hpp>
 #include <glm/vec4.hpp>
 #include <nlohmann/json.hpp>
@@ -113,20 +114,25 @@ json histogramJson(const Dataset& dataset, int channel) {
           {"bins", histogram.bins}};
 }
 
+json valuesJson(const Volume& volume, const glm::dvec3& voxel) {
+  const glm::dvec3 last(volume.grid().dims - 1);
+  json values = json::array();
+  for (const Channel& channel : volume.channels()) {
+    const double value =
+        interpolate(channel, volume.grid().dims, glm::min(glm::max(voxel, glm::dvec3(0)), last));
+    values.push_back(std::isfinite(value) ? json(value) : json(nullptr));
+  }
+  return values;
+}
+
 json probeJson(const Dataset& dataset, double x, double y, double z) {
   const Grid& grid = dataset.volume->grid();
   const auto voxel = glm::dvec3(glm::inverse(grid.worldFromVoxel) * glm::dvec4(x, y, z, 1));
   bool inside = true;
-  glm::dvec3 clamped;
-  for (int axis = 0; axis < 3; ++axis) {
+  for (int axis = 0; axis < 3; ++axis)
     inside = inside && voxel[axis] >= -0.5 && voxel[axis] <= grid.dims[axis] - 0.5;
-    clamped[axis] = std::clamp(voxel[axis], 0.0, double(grid.dims[axis] - 1));
-  }
-  json values = json::array();
-  for (const Channel& channel : dataset.volume->channels()) {
-    const double value = inside ? interpolate(channel, grid.dims, clamped) : NAN;
-    values.push_back(std::isfinite(value) ? json(value) : json(nullptr));
-  }
+  json values = inside ? valuesJson(*dataset.volume, voxel)
+                       : json(std::vector<json>(dataset.volume->channels().size()));
   return {{"inside", inside}, {"voxel", list(voxel)}, {"values", std::move(values)}};
 }
 

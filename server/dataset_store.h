@@ -37,8 +37,10 @@ std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesys
 nlohmann::json describeJson(const Dataset& dataset);
 /// 256 bins over the finite values. Throws ProtocolError(422) when there is no such channel.
 nlohmann::json histogramJson(const Dataset& dataset, int channel);
-/// Data values at a world point, trilinear between voxel centres as the renderer interpolates; a channel is
-/// null outside the box and where a corner is not finite.
+/// Data values of all channels at a voxel position in the box, trilinear between voxel centres as the
+/// renderer interpolates; null where a corner is not finite.
+nlohmann::json valuesJson(const Volume& volume, const glm::dvec3& voxel);
+/// The same at a world point; a channel is null outside the box too.
 nlohmann::json probeJson(const Dataset& dataset, double x, double y, double z);
 
 }  // namespace scolopax::server

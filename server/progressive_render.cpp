@@ -126,6 +126,7 @@ ProgressiveRender::~ProgressiveRender() {
 
 /// Memory of large films takes its time to be given back.
 void ProgressiveRender::dropRenderer() {
+  pick_.forget();
   scene_.reset();
   volume_.reset();
   recording_ = unfinished_ = false;
@@ -159,6 +160,11 @@ bool ProgressiveRender::firstOfEdit(const RenderRequest& request) const {
   return request.interactive && shown_.revision != request.revision;
 }
 
+/// Whether the renderer has the scene that a pick asks about, and is not at work on another.
+bool ProgressiveRender::pickable(const RenderRequest& request) const {
+  return request.pick && scene_ && !taking_ && revision_ == request.revision;
+}
+
 bool ProgressiveRender::finished(const RenderRequest& request) const {
   return stopMet(request.scene->stop, *renderer_, filmSeconds_);
 }
@@ -181,8 +187,9 @@ bool ProgressiveRender::showDue(const RenderRequest& request) const {
 }
 
 ProgressiveRender::Work ProgressiveRender::work() const {
-  if (job_ && !job_->done()) return Work::none;
   const RenderRequest request = session_->request();
+  if (pickable(request)) return Work::urgent;
+  if (job_ && !job_->done()) return Work::none;
   if (job_) return firstOfEdit(request) ? Work::urgent : Work::still;
   if (!request.wanted || !(sceneStale(request) || !finished(request) || showDue(request))) return Work::none;
   return firstOfEdit(request) ? Work::urgent : request.interactive ? Work::refine : Work::still;
@@ -271,6 +278,7 @@ void ProgressiveRender::supervise() {
 }
 
 void ProgressiveRender::takeScene(const RenderRequest& request, const Others& others, PassResult& result) {
+  pick_.forget();
   if (small_) learnFromUnfinished();
   const auto volume = request.scene->dataset->volume;
   if (volume_ != volume) {
@@ -389,16 +397,31 @@ void ProgressiveRender::pictureMade(PassResult&) {
   session_->submit(std::move(showing->frame));
 }
 
+/// A slice of a pick, if there is one and the last turn was not for one.
+bool ProgressiveRender::pickIn(const RenderRequest& request) {
+  pickedLast_ = pickable(request) && !pickedLast_;
+  if (pickedLast_)
+    pick_.run(*request.pick, *request.scene, revision_, *renderer_, context_.policy.politeSlice, *session_);
+  return pickedLast_;
+}
+
 void ProgressiveRender::turn(const RenderRequest& request, const Others& others, PassResult& result) {
+  if (pickIn(request)) return;
+  if (job_ && !job_->done()) return;
   const bool collected = job_ != nullptr;
+  bool took = taking_ != nullptr;
   if (collected) collect(result);
   if (!request.wanted || job_) return;
-  if ((sceneStale(request) && !keepsPass(request)) || lateForEdit(request))
+  if ((sceneStale(request) && !keepsPass(request)) || lateForEdit(request)) {
     takeScene(request, others, result);
+    took = true;
+  }
   if (job_ || !scene_) return;
+  if (took && pickIn(request)) return;  // who waits for it need not wait for a pass
   // What was added in the background is shown before the next pass begins.
   if (collected && !unfinished_ && showDue(request)) return show(request, result);
-  if (!finished(request)) addSample(firstOfEdit(request), others.urgent, result);
+  const bool othersWait = others.urgent || request.pick;
+  if (!finished(request)) addSample(firstOfEdit(request), othersWait, result);
   if (!job_ && !unfinished_ && showDue(request)) show(request, result);
 }
 

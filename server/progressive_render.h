@@ -82,9 +82,9 @@ class ProgressiveRender {
   std::optional<TimePoint> dueAt() const;
   /// Gives up what is built or measured in the background, once nobody wants it any more.
   void supervise();
-  /// One sample pass at most, with the rebuild before it and the submission after it, of which what takes
-  /// long goes on in the background until a later turn. Never throws: what cannot be rendered is told to the
-  /// session.
+  /// A part of a pick, or one sample pass at most, with the rebuild before it and the submission after it, of
+  /// which what takes long goes on in the background until a later turn. Never throws: what cannot be
+  /// rendered is told to the session.
   PassResult run(const Others& others);
 
  private:
@@ -98,6 +98,7 @@ class ProgressiveRender {
   bool showDue(const RenderRequest& request) const;
   bool firstOfEdit(const RenderRequest& request) const;
   bool lateForEdit(const RenderRequest& request) const;
+  bool pickable(const RenderRequest& request) const;
   double wantedDivisor(const RenderRequest& request, int editedOthers) const;
   std::uint64_t filmSize() const;
   bool largeFilm() const;
@@ -105,6 +106,7 @@ class ProgressiveRender {
   void fail(const RenderRequest& request, const Error& error);
   void dropRenderer();
 
+  bool pickIn(const RenderRequest& request);
   void turn(const RenderRequest& request, const Others& others, PassResult& result);
   /// Does the work, here or in the background, and then what is next, here.
   void perform(bool inBackground, Background::Work work, Next next, PassResult& result);
@@ -124,6 +126,9 @@ class ProgressiveRender {
   Next next_ = nullptr;                   ///< what follows it
   std::shared_ptr<Taking> taking_;        ///< the scene that is being built; else null
   std::shared_ptr<Showing> showing_;      ///< the picture that is being made; else null
+
+  PickTurn pick_;
+  bool pickedLast_ = false;  ///< the last turn was for a pick: the picture has the next
 
   std::shared_ptr<const Volume> volume_;
   std::shared_ptr<Renderer> renderer_;

@@ -147,6 +147,41 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
   return nullptr;
 }
 
+PickId Session::pick(const PickQuery& query, OnPicked answered) {
+  const std::lock_guard lock(mutex_);
+  return addPick(query, std::move(answered));
+}
+
+PickId Session::addPick(const PickQuery& query, OnPicked answered) {
+  if (closed_) throw protocol::ProtocolError(404, "", "the session has ended");
+  areaOf(query, scene_->render.width, scene_->render.height);
+  if (picks_.size() >= kMaxPicks)
+    throw protocol::ProtocolError(
+        429, "",
+        "expected at most " + std::to_string(kMaxPicks) + " picks to wait in a session, found another");
+  retryIfBusy();
+  if (failedRevision_ == revision_) throw Error(*failure_);
+  lastUsed_ = hooks_.now();
+  picks_.push_back({{++lastPick_, query}, std::move(answered)});
+  hooks_.interruptRender();
+  hooks_.wakeRender();
+  return lastPick_;
+}
+
+std::optional<nlohmann::json> Session::waitForPick(const PickQuery& query, std::chrono::milliseconds timeout,
+                                                   const std::stop_token& gone) {
+  std::unique_lock lock(mutex_);
+  const auto came = std::make_shared<std::optional<PickAnswer>>();
+  const PickId id = addPick(query, [came](const PickAnswer& answer) { *came = answer; });
+  frameCame_.wait_for(lock, gone, timeout, [&] { return closed_ || came->has_value(); });
+  if (!*came) {
+    std::erase_if(picks_, [&](const WaitingPick& pick) { return pick.id == id; });
+    return std::nullopt;
+  }
+  if ((*came)->failure) std::rethrow_exception((*came)->failure);
+  return std::make_optional<nlohmann::json>(std::move((*came)->found));
+}
+
 std::shared_ptr<const EncodedFrame> Session::latestFrame() const {
   const std::lock_guard lock(mutex_);
   return frame_;
@@ -158,12 +193,13 @@ void Session::close(const std::string& reason) {
   hooks_.interruptRender();
   for (auto& [id, viewer] : viewers_) viewer.sink->sessionClosed(reason);
   viewers_.clear();
+  picks_.clear();
   frameCame_.notify_all();
 }
 
 TimePoint Session::lastUsed() const {
   const std::lock_guard lock(mutex_);
-  return viewers_.empty() && pollSamples_.empty() ? lastUsed_ : hooks_.now();
+  return viewers_.empty() && pollSamples_.empty() && picks_.empty() ? lastUsed_ : hooks_.now();
 }
 
 RenderRequest Session::request() const {
@@ -176,7 +212,8 @@ RenderRequest Session::request() const {
   const bool seen =
       std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.visible; });
   request.failures = failures_;
-  request.wanted = !closed_ && (seen || !pollSamples_.empty());
+  if (!picks_.empty()) request.pick = picks_.front();
+  request.wanted = !closed_ && (seen || !pollSamples_.empty() || request.pick);
   if (failedRevision_ == revision_) {
     if (request.wanted) request.retryAt = retryAt_;
     request.wanted = request.retryAt && hooks_.now() >= *request.retryAt;
@@ -208,6 +245,18 @@ void Session::fail(std::uint32_t revision, const Error& error) {
   failure_ = error;
   retryAt_.reset();
   if (busy) retryAt_ = hooks_.now() + kRetryTime;
+  for (const WaitingPick& pick : std::exchange(picks_, {}))
+    pick.answered({{}, std::make_exception_ptr(error)});
+  frameCame_.notify_all();
+}
+
+void Session::answerPick(PickId id, const PickAnswer& answer) {
+  const std::lock_guard lock(mutex_);
+  const auto pick = std::find_if(picks_.begin(), picks_.end(), [&](const auto& p) { return p.id == id; });
+  if (pick == picks_.end()) return;
+  pick->answered(answer);
+  picks_.erase(pick);
+  lastUsed_ = hooks_.now();
   frameCame_.notify_all();
 }
 

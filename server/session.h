@@ -9,7 +9,7 @@
 //  3. The mutex is never held while rendering or encoding: both work on snapshots (shared_ptr to const).
 //  4. The renderer and its film belong to the render thread (ProgressiveRender) or, while there is one, to
 //  the
-//     background job that it began; no lock guards them.
+//     background job that it began; no lock guards them. Beside a job that builds no scene, picks go on.
 //  5. Only the encoder thread offers frames to viewers, and a frame of an older scene is not published,
 //  whoever
 //     encoded it, so that none can replace a newer one.
@@ -27,9 +27,11 @@
 #include <set>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "renderer/core/error.h"
 #include "server/frame.h"
+#include "server/pick.h"
 #include "server/scene_resolver.h"
 
 namespace scolopax::server {
@@ -78,6 +80,7 @@ struct RenderRequest {
   bool aovs = false;                       ///< somebody has asked for AOVs
   std::optional<TimePoint> retryAt;        ///< when to try again what others' memory has refused
   std::uint32_t failures = 0;              ///< so far; after another one, the last picture may be lost
+  std::optional<PendingPick> pick;         ///< the first that waits for its answer
 };
 
 /// Functions that act on the loops; called with or without the session's mutex held.
@@ -98,6 +101,8 @@ class Session {
 
   /// Scripts that may wait at once.
   static constexpr std::size_t kMaxPolls = 8;
+  /// Picks that may wait at once.
+  static constexpr std::size_t kMaxPicks = 8;
 
   Session(std::string id, std::string token, std::shared_ptr<const SceneResolver> resolver,
           std::shared_ptr<const ResolvedScene> scene, SessionHooks hooks);
@@ -130,6 +135,14 @@ class Session {
   std::shared_ptr<const EncodedFrame> waitForFrame(const FrameQuery& query,
                                                    std::chrono::milliseconds timeout);
   std::shared_ptr<const EncodedFrame> latestFrame() const;
+  /// Asks what is visible in the scene as it is now or newer. `answered` is called once, on whatever thread,
+  /// with the session's mutex held: it only queues; never, when the session is closed before. Throws
+  /// ProtocolError: areaOf()'s, and 429 when too many wait already; and the Error with which the scene could
+  /// not be rendered.
+  PickId pick(const PickQuery& query, OnPicked answered);
+  /// The same, and waits; nothing when no answer came in time or the session was closed. Throws what failed.
+  std::optional<nlohmann::json> waitForPick(const PickQuery& query, std::chrono::milliseconds timeout,
+                                            const std::stop_token& gone = {});
   /// Ends waiting and viewing; nothing is rendered any more.
   void close(const std::string& reason);
   /// When somebody last looked, edited or asked; now while there is a viewer or a waiting script.
@@ -143,6 +156,8 @@ class Session {
   /// Nothing is rendered until the next edit; what failed because others held the memory, for kRetryTime or
   /// until somebody comes and asks for it. Viewers hear of it once.
   void fail(std::uint32_t revision, const Error& error);
+  /// Nobody may wait any more for the answer.
+  void answerPick(PickId id, const PickAnswer& answer);
 
   // --- encoder thread
   // ----------------------------------------------------------------------------------------
@@ -171,6 +186,11 @@ class Session {
   SceneState edit(std::shared_ptr<const ResolvedScene> next, const EditOrigin& origin);
   void checkRevision(const EditOrigin& origin) const;
   void retryIfBusy();
+  PickId addPick(const PickQuery& query, OnPicked answered);
+
+  struct WaitingPick : PendingPick {
+    OnPicked answered;
+  };
 
   const std::string id_, token_;
   const std::shared_ptr<const SceneResolver> resolver_;
@@ -190,6 +210,8 @@ class Session {
   std::map<ViewerId, Viewer> viewers_;
   ViewerId nextViewer_ = 1;
   std::multiset<std::uint32_t> pollSamples_;  ///< one per waiting script
+  std::vector<WaitingPick> picks_;            ///< the oldest first
+  PickId lastPick_ = 0;
   bool aovs_ = false;
   std::optional<RenderedFrame> rendered_;  ///< waits for the encoder
   std::shared_ptr<const EncodedFrame> frame_;

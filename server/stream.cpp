@@ -106,12 +106,33 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
     if ((message.maxWidth || message.maxHeight) && !std::exchange(sizeNoticeSent_, true))
       sendText(protocol::noticeText("maxWidth and maxHeight are not used; set image.width and image.height"));
   }
+  void handle(const protocol::PickMessage& message) {
+    const auto answered = [stream = weak_from_this(), id = message.id](const PickAnswer& answer) {
+      if (const auto self = stream.lock()) self->sendPicked(id, answer);
+    };
+    try {
+      session_->pick({message.x, message.y, message.x2, message.y2}, answered);
+    } catch (...) {
+      sendPicked(message.id, {{}, std::current_exception()});
+    }
+  }
   void handle(const protocol::ResumeMessage& message) {
     auto session = store_.findByToken(message.token);
     if (!session) throw ProtocolError(404, "/token", "there is no session of this token; it may have ended");
     if (session == session_) return;  // joined by the stream's address already
     leave();
     join(std::move(session));
+  }
+
+  void sendPicked(std::uint32_t id, const PickAnswer& answer) {
+    try {
+      if (answer.failure) std::rethrow_exception(answer.failure);
+      sendText(protocol::pickedText(id, answer.found));
+    } catch (const ProtocolError& error) {
+      sendText(protocol::pickedText(id, error));
+    } catch (const Error& error) {
+      sendText(protocol::pickedText(id, ProtocolError(statusOf(error.code()), "", error.what())));
+    }
   }
 
   void sendText(std::string text) {

@@ -5,6 +5,7 @@ import { CameraPanel } from './camera-panel';
 import { ChannelCard } from './channel-card';
 import { DatasetPanel } from './dataset-panel';
 import type { FrameView } from './frame-view';
+import { PickReadout } from './pick-readout';
 import { PictureView } from './picture-view';
 import { savePicture } from './save-picture';
 import { ListSections, SettingsPanel } from './settings-panel';
@@ -38,6 +39,7 @@ export function App({ store, attach }: { store: Store; attach(view: FrameView): 
             <span class="unseen">Settings</span>
           </button>
         </div>
+        <PickReadout store={store} />
         <Toasts store={store} />
         <StatusBar store={store} />
       </main>

@@ -3,6 +3,7 @@
 // is gone. Knows nothing of scenes and pictures beyond handing them on.
 import { ApiError, api, streamUrl, type Capabilities, type Problem, type SessionInfo } from './api';
 import type { Json, JsonObject } from './merge-patch';
+import type { Picked } from './pointer-pick';
 
 export type ConnectionState =
   | { kind: 'connecting' }
@@ -23,6 +24,7 @@ export interface ConnectionEvents {
   onNotice(text: string): void;
   /** The server has dealt with all that was sent before the ping of this id. */
   onPong(id: number): void;
+  onPicked(picked: Picked): void;
   /** The scene that a new session shall begin with; undefined for the server's default. */
   currentScene(): JsonObject | undefined;
 }
@@ -163,6 +165,9 @@ export class Connection {
         break;
       case 'pong':
         this.events.onPong(Number(message.id));
+        break;
+      case 'picked':
+        this.events.onPicked(message as unknown as Picked);
         break;
       default: // a later server may say more than this page understands
     }

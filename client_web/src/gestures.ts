@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Turns pointers, wheel and keys over the picture into turns, shifts and zooms. Units: fractions of the
 // element's height for shifts, radians for turns, a factor for zooms.
+import type { Spot } from './image-size';
 
 export interface GestureEvents {
   orbit(yaw: number, pitch: number): void;
@@ -13,11 +14,6 @@ const kRadiansPerHeight = Math.PI; // a drag over the whole height turns the obj
 const kKeyTurn = Math.PI / 36;
 const kKeyShift = 0.04;
 const kKeyZoom = 1.12;
-
-interface Spot {
-  x: number;
-  y: number;
-}
 
 /** The pointers' middle and spread. */
 function summary(pointers: Spot[]): Spot & { spread: number } {

@@ -4,6 +4,7 @@ import { useEffect, useRef } from 'preact/hooks';
 import { FrameView } from './frame-view';
 import { attachGestures } from './gestures';
 import { orbitControls } from './orbit-controls';
+import { attachPointerPick } from './pointer-pick';
 import type { Store } from './store';
 
 /** More than two device pixels to a CSS pixel costs rays that nobody sees. */
@@ -32,9 +33,9 @@ export function PictureView({ store, attach }: { store: Store; attach(view: Fram
     observer.observe(element);
     const showHide = () => store.setVisible(document.visibilityState === 'visible');
     document.addEventListener('visibilitychange', showHide);
-    const detach = attachGestures(element, orbitControls(store));
+    const detach = [attachGestures(element, orbitControls(store)), attachPointerPick(element, store.pick, fullSize)];
     return () => {
-      detach();
+      for (const one of detach) one();
       clearTimeout(timer);
       observer.disconnect();
       document.removeEventListener('visibilitychange', showHide);

@@ -14,6 +14,7 @@ import { fitSize, type Size } from './image-size';
 import { isObject, patchAt, type Json, type JsonObject } from './merge-patch';
 import { cameraPatch, type Camera } from './orbit-camera';
 import type { Scene } from './scene.generated';
+import { PointerPick } from './pointer-pick';
 import { sayPointer, type Path } from './schema';
 import { ToastList } from './toast-list';
 
@@ -46,6 +47,8 @@ export class Store {
   });
   /** The server is at work on an edit. */
   readonly wait = new EditWait(() => this.edits.waitedMs);
+  /** What is visible under the pointer. */
+  readonly pick = new PointerPick((id, { x, y }) => void this.link.send({ type: 'pick', id, x, y }));
   private readonly link: Connection;
   private revision = 0;
   private settleTimer: ReturnType<typeof setTimeout> | undefined;
@@ -62,6 +65,7 @@ export class Store {
         onProblem: (problem, patch) => this.receiveProblem(problem, patch),
         onNotice: (text) => this.toasts.say(text),
         onPong: (id) => this.receivePong(id),
+        onPicked: (picked) => this.pick.answered(picked),
         currentScene: () => this.scene.peek() as JsonObject | undefined,
       },
       this.remembered(),
@@ -114,6 +118,7 @@ export class Store {
     this.link.send({ type: 'ack', frame: header.frame });
     if (!drawn) return;
     this.revision = Math.max(this.revision, header.revision);
+    if (header.revision !== this.frame.peek()?.revision) this.pick.pictureChanged();
     batch(() => {
       this.frame.value = header;
       this.meter.drawn(this.edits.seen(header.patch));

@@ -68,6 +68,7 @@ function connect(more: Partial<ConnectionEvents> = {}): Connection {
     onProblem: (problem) => void problems.push(problem.detail ?? ''),
     onNotice: () => undefined,
     onPong: () => undefined,
+    onPicked: () => undefined,
     currentScene: () => scene,
     ...more,
   };
@@ -183,6 +184,7 @@ describe('the connection', () => {
       onProblem: (problem, id) => heard.push(id === undefined ? { problem } : { problem, id }),
       onNotice: (text) => heard.push({ text }),
       onPong: (id) => heard.push({ id }),
+      onPicked: (picked) => heard.push(picked),
       onHello: (session) => heard.push({ token: session.token }),
     }).open();
     await settle();

@@ -14,6 +14,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/cpu/pass.h"
+#include "renderer/cpu/pick.h"
 #include "renderer/cpu/ray_packets.h"
 #include "renderer/cpu/thumbnails.h"
 #include "renderer/data/film.h"
@@ -160,6 +161,12 @@ class CpuRenderer final : public Renderer {
         break;
     }
     return result;
+  }
+
+  std::unique_ptr<Picking> pick(const Scene& scene, const PixelArea& area) const override {
+    Scene unlit = scene;
+    unlit.shading = unlit.shadows = false;
+    return makeCpuPicking(plan_, scene, area, chooseKernel(unlit, plan_.view()));
   }
 
  private:

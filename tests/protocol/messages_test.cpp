@@ -51,6 +51,12 @@ TEST(ParseClientMessage, ReadsEveryField) {
   EXPECT_EQ(view.maxWidth, 640U);
   EXPECT_EQ(view.maxHeight, 480U);
   EXPECT_EQ(view.maxFps, 7.5);
+  const auto pick = std::get<PickMessage>(
+      parseClientMessage(R"({"type": "pick", "id": 9, "x": 4.5, "y": 3, "x2": 8, "y2": 0})"));
+  EXPECT_EQ(pick.id, 9U);
+  EXPECT_EQ(std::tuple(pick.x, pick.y, pick.x2, pick.y2), std::tuple(4.5, 3.0, 8.0, 0.0));
+  EXPECT_EQ(std::get<PickMessage>(parseClientMessage(R"({"type": "pick", "id": 1, "x": 4, "y": 3})")).x2,
+            std::nullopt);
   EXPECT_TRUE(std::get<ViewMessage>(parseClientMessage(R"({"type": "view"})")).visible);
 }
 
@@ -80,6 +86,14 @@ TEST(ServerMessages, AreWrittenAsTheFixtures) {
             serverFixture("error of something else"));
   EXPECT_EQ(json::parse(noticeText("The server is stopping.")), serverFixture("notice"));
   EXPECT_EQ(json::parse(pongText(3)), serverFixture("pong"));
+  const json hit = json::parse(R"({"revision": 8, "hit": true, "point": [10.5, -3.25, 0],
+    "voxel": [139, 124, 63], "channel": 0, "name": "T1", "depth": 214.5, "values": [411.25]})");
+  EXPECT_EQ(json::parse(pickedText(3, hit)), serverFixture("picked"));
+  EXPECT_EQ(json::parse(pickedText(4, json{{"revision", 8}, {"truncated", false}, {"hits", json::array()}})),
+            serverFixture("picked in a rectangle"));
+  EXPECT_EQ(
+      json::parse(pickedText(5, ProtocolError(422, "/x", "/x: expected a number >= 0 and < 800, found 900"))),
+      serverFixture("picked in vain"));
 }
 
 TEST(ServerMessages, AreUtf8WhateverTheyTell) {

@@ -334,6 +334,20 @@ TEST(Api, RefusesOneWaitingScriptTooManyWith429) {
   for (auto& thread : waiting) thread.join();
 }
 
+TEST(Api, RefusesAPickThatIsNone) {
+  Api api;
+  const auto session = api.workshop.store.create({{"image", {{"width", 64}, {"height", 48}}}});
+  const std::string path = "/api/v1/sessions/" + session->id() + "/pick";
+  EXPECT_EQ(api.errorOf("GET", "/api/v1/sessions/none/pick?x=1&y=1").first, 404);
+  for (const char* query : {"", "?x=1", "?x=1&y=b", "?x=nan&y=1", "?x=1&y=1&x2=&y2=2"})
+    EXPECT_EQ(api.errorOf("GET", path + query).first, 422) << query;
+  EXPECT_EQ(api.errorOf("GET", path + "?x=64&y=1"), Expected(422, "/x"));
+  EXPECT_EQ(api.errorOf("GET", path + "?x=1&y=-1"), Expected(422, "/y"));
+  EXPECT_EQ(api.errorOf("GET", path + "?x=1&y=1&x2=2&y2=48"), Expected(422, "/y2"));
+  EXPECT_EQ(api.errorOf("GET", path + "?x=1&y=1&x2=2"), Expected(422, "/y2"));
+  EXPECT_EQ(api.errorOf("GET", path + "?x=1&y=1").first, 503);  // nobody renders, and there is no time
+}
+
 TEST(Api, WeighsTheAcceptHeader) {
   const auto best = [](const std::string& accept) {
     const ImageType* type = acceptedImageType(&accept);

@@ -45,6 +45,9 @@ struct FakeControl {
   std::shared_ptr<MemoryBudget> memory;           ///< of which films take a byte a pixel
   std::uint32_t longErrorFrom = ~0u;  ///< samples from which the error takes long, until it is measured
   std::function<void(std::stop_token)> measuring;  ///< called while it is
+  int incompletePicks = 0;           ///< calls that use up their budget before a pick is complete
+  std::vector<std::uint32_t> picks;  ///< the seed of the scene of each that was begun
+  std::vector<Picked> found;         ///< what each finds
 };
 
 /// Begins no job before it is told to, or each at once.
@@ -69,6 +72,21 @@ class FakeBackground : public Background {
   void finish() {
     for (const auto& run : std::exchange(waiting, {})) run();
   }
+};
+
+class FakePicking : public Picking {
+ public:
+  explicit FakePicking(std::shared_ptr<FakeControl> control) : control_(std::move(control)) {}
+  bool run(std::chrono::nanoseconds budget) override {
+    if (control_->incompletePicks == 0) return true;
+    if (control_->clock)
+      control_->clock->advance(std::chrono::duration_cast<std::chrono::microseconds>(budget));
+    return --control_->incompletePicks, false;
+  }
+  const std::vector<Picked>& found() const override { return control_->found; }
+
+ private:
+  const std::shared_ptr<FakeControl> control_;
 };
 
 /// Its picture tells which scenes its samples were of: red is the seed when it was one scene, else -1.
@@ -123,6 +141,10 @@ class FakeRenderer : public Renderer {
   RenderStats stats() const override { return {}; }
   void recordAovs() override { samples_ = 0; }
   AovValues aov(Aov which) const override { return {which, 1, 1, {float(samples_)}}; }
+  std::unique_ptr<Picking> pick(const Scene&, const PixelArea&) const override {
+    control_->picks.push_back(scene_.seed);
+    return std::make_unique<FakePicking>(control_);
+  }
   Image image() const override {
     Image image{scene_.width, scene_.height, {}};
     image.pixels.assign(std::size_t(scene_.width) * std::size_t(scene_.height),

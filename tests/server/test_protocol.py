@@ -107,8 +107,8 @@ class Description(unittest.TestCase):
         self.assertEqual(told["imageFormats"], list(PICTURES))
         self.assertEqual((told["limits"]["sessions"], told["limits"]["messageBytes"]), (4, 65536))
         self.assertEqual(set(told["limits"]), set(
-            "bodyBytes messageBytes imageWidth imageHeight imagePixels memoryBytes renders waitingPolls sessions clients "
-            "renderSeconds sceneDepth".split()))
+            "bodyBytes messageBytes imageWidth imageHeight imagePixels memoryBytes renders waitingPolls waitingPicks "
+            "pickPixels sessions clients renderSeconds sceneDepth".split()))
 
     def test_the_schema_is_the_file_beside_the_document(self):
         status, headers, body = call(server, "GET", "/api/v1/schema.json")
@@ -284,7 +284,8 @@ class Sessions(unittest.TestCase):
     def test_that_are_deleted_are_not_found(self):
         session = begin(self, {"image": SMALL})
         self.assertEqual(call(server, "DELETE", path_of(session))[::2], (204, b""))
-        for method, rest in (("GET", ""), ("GET", "/scene"), ("PATCH", "/scene"), ("GET", "/frame"), ("DELETE", "")):
+        for method, rest in (("GET", ""), ("GET", "/scene"), ("PATCH", "/scene"), ("GET", "/frame"),
+                             ("GET", "/pick?x=1&y=1"), ("DELETE", "")):
             body = {} if method == "PATCH" else None
             self.assertEqual(call(server, method, path_of(session, rest), body)[0], 404, method + rest)
 

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/pick.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <string>
+
+#include "protocol/problem.h"
+#include "renderer/renderer.h"
+#include "server/session.h"
+
+namespace scolopax::server {
+namespace {
+
+using nlohmann::json;
+using protocol::ProtocolError;
+
+/// The pixel that a coordinate lies in.
+int pixelOf(const std::string& name, double coordinate, int size) {
+  if (!(coordinate >= 0 && coordinate < size))
+    throw ProtocolError(422, "/" + name,
+                        "/" + name + ": expected a number >= 0 and < " + std::to_string(size) + ", found " +
+                            json(coordinate).dump());
+  return int(coordinate);
+}
+
+struct Span {
+  int first, count;
+};
+Span spanBetween(int a, int b) { return {std::min(a, b), std::abs(a - b) + 1}; }
+
+std::array<int, 3> nearestVoxel(const Picked& picked, const glm::ivec3& dims) {
+  std::array<int, 3> voxel{};
+  for (int axis = 0; axis < 3; ++axis)
+    voxel[std::size_t(axis)] = std::clamp(int(std::floor(picked.voxel[axis] + 0.5)), 0, dims[axis] - 1);
+  return voxel;
+}
+
+json hitJson(const ResolvedScene& scene, const Picked& picked) {
+  const Volume& volume = *scene.dataset->volume;
+  return {{"point", {picked.point.x, picked.point.y, picked.point.z}},
+          {"voxel", nearestVoxel(picked, volume.grid().dims)},
+          {"channel", picked.channel},
+          {"name", scene.resolved["channels"][std::size_t(picked.channel)]["name"]},
+          {"depth", picked.depth},
+          {"values", valuesJson(volume, picked.voxel)}};
+}
+
+}  // namespace
+
+PixelArea areaOf(const PickQuery& query, int width, int height) {
+  if (query.x2.has_value() != query.y2.has_value()) {
+    const std::string missing = query.x2 ? "y2" : "x2";
+    throw ProtocolError(422, "/" + missing,
+                        "/" + missing + ": expected both x2 and y2 or neither, found one");
+  }
+  const int x = pixelOf("x", query.x, width), y = pixelOf("y", query.y, height);
+  const Span columns = spanBetween(x, query.x2 ? pixelOf("x2", *query.x2, width) : x);
+  const Span rows = spanBetween(y, query.y2 ? pixelOf("y2", *query.y2, height) : y);
+  return {columns.first, rows.first, columns.count, rows.count};
+}
+
+json pickedJson(const ResolvedScene& scene, std::uint32_t revision, const PickQuery& query,
+                const std::vector<Picked>& found) {
+  json answer = {{"revision", revision}};
+  if (!query.x2) {
+    answer["hit"] = !found.empty();
+    if (!found.empty()) answer.update(hitJson(scene, found.front()));
+    return answer;
+  }
+  const PixelArea area = areaOf(query, scene.render.width, scene.render.height);
+  answer["truncated"] = std::int64_t(area.width) * area.height > kMaxPickPixels;
+  json& hits = answer["hits"] = json::array();
+  std::set<std::array<int, 3>> seen;
+  for (const Picked& picked : found)
+    if (seen.insert(nearestVoxel(picked, scene.dataset->volume->grid().dims)).second)
+      hits.push_back(hitJson(scene, picked));
+  return answer;
+}
+
+void PickTurn::run(const PendingPick& pick, const ResolvedScene& scene, std::uint32_t revision,
+                   const Renderer& renderer, std::chrono::nanoseconds slice, Session& session) {
+  PickAnswer answer;
+  try {
+    if (!picking_ || id_ != pick.id) {
+      // The picture may have become smaller since the question was put.
+      const PixelArea area = areaOf(pick.query, scene.render.width, scene.render.height);
+      picking_ = renderer.pick(scene.render, area);
+      id_ = pick.id;
+    }
+    if (!picking_->run(slice)) return;
+    answer.found = pickedJson(scene, revision, pick.query, picking_->found());
+  } catch (const ProtocolError&) {
+    answer.failure = std::current_exception();
+  }
+  picking_.reset();
+  session.answerPick(pick.id, answer);
+}
+
+}  // namespace scolopax::server

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/pick.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <thread>
+
+#include "protocol/problem.h"
+#include "tests/server/fakes.h"
+
+namespace scolopax::server {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+using protocol::ProtocolError;
+using testing::FakeViewer;
+using testing::seedPatch;
+using testing::Workshop;
+
+std::string pointerOf(const PickQuery& query) {
+  try {
+    areaOf(query, 64, 48);
+    return "none";
+  } catch (const ProtocolError& error) {
+    EXPECT_EQ(error.status, 422);
+    EXPECT_NE(std::string(error.what()).find("expected"), std::string::npos);
+    return error.pointer;
+  }
+}
+
+TEST(PickArea, IsThePixelOrTheRectangleBetweenTwoInAnyOrder) {
+  const auto isArea = [](const PickQuery& query, int left, int top, int width, int height) {
+    const PixelArea area = areaOf(query, 64, 48);
+    return area.left == left && area.top == top && area.width == width && area.height == height;
+  };
+  EXPECT_TRUE(isArea({0, 0}, 0, 0, 1, 1));
+  EXPECT_TRUE(isArea({63.99, 47.5}, 63, 47, 1, 1));
+  EXPECT_TRUE(isArea({3.9, 4.1, 3.1, 4.9}, 3, 4, 1, 1));
+  EXPECT_TRUE(isArea({10, 4, 3, 20.5}, 3, 4, 8, 17));
+}
+
+TEST(PickArea, IsRefusedOutsideOfThePicture) {
+  EXPECT_EQ(pointerOf({64, 0}), "/x");
+  EXPECT_EQ(pointerOf({-0.01, 0}), "/x");
+  EXPECT_EQ(pointerOf({0, 48}), "/y");
+  EXPECT_EQ(pointerOf({std::numeric_limits<double>::quiet_NaN(), 0}), "/x");
+  EXPECT_EQ(pointerOf({0, 0, 64, 0}), "/x2");
+  EXPECT_EQ(pointerOf({0, 0, 0, 1e300}), "/y2");
+  EXPECT_EQ(pointerOf({0, 0, 3, {}}), "/y2");
+  EXPECT_EQ(pointerOf({0, 0, {}, 3}), "/x2");
+}
+
+/// A session and what it is answered.
+struct Picker {
+  Workshop workshop;
+  std::shared_ptr<Session> session = workshop.store.create(seedPatch(5));
+  std::vector<PickAnswer> answers;
+
+  void pick(const PickQuery& query = {1, 2}) {
+    session->pick(query, [this](const PickAnswer& answer) { answers.push_back(answer); });
+  }
+  /// At a voxel position of the fakes' volume.
+  Picked at(glm::dvec3 voxel) const { return {voxel, voxel, 1, 7.5}; }
+};
+
+TEST(Pick, TellsTheValuesOfAllChannelsAlsoOfHiddenOnes) {
+  Picker picker;
+  picker.session->patch({{"channels", {{{"visible", false}}, {{"name", "leaves"}}}}}, {});
+  picker.workshop.control->found = {picker.at({2, 1, 1})};
+  picker.pick();
+  picker.workshop.step();
+  ASSERT_EQ(picker.answers.size(), 1u);
+  // Of 4 x 3 x 2 voxels, (2, 1, 1) is the one of index 18.
+  EXPECT_EQ(picker.answers[0].found, (json{{"revision", 2},
+                                           {"hit", true},
+                                           {"point", {2.0, 1.0, 1.0}},
+                                           {"voxel", {2, 1, 1}},
+                                           {"channel", 1},
+                                           {"name", "leaves"},
+                                           {"depth", 7.5},
+                                           {"values", {18.0, 180.0}}}));
+}
+
+TEST(Pick, InterpolatesAndNamesTheNearestVoxelOfTheVolume) {
+  Picker picker;
+  picker.workshop.control->found = {picker.at({1.25, 0, -0.5000001})};  // on the box's face
+  picker.pick();
+  picker.workshop.step();
+  ASSERT_EQ(picker.answers.size(), 1u);
+  EXPECT_EQ(picker.answers[0].found["voxel"], (json{1, 0, 0}));
+  EXPECT_EQ(picker.answers[0].found["values"], (json{1.25, 12.5}));
+}
+
+TEST(Pick, OfNothingIsNoHit) {
+  Picker picker;
+  picker.pick();
+  picker.pick({1, 2, 3, 4});
+  picker.workshop.steps(4);
+  ASSERT_EQ(picker.answers.size(), 2u);
+  EXPECT_EQ(picker.answers[0].found, (json{{"revision", 1}, {"hit", false}}));
+  EXPECT_EQ(picker.answers[1].found, (json{{"revision", 1}, {"truncated", false}, {"hits", json::array()}}));
+}
+
+TEST(Pick, OfARectangleNamesEveryVoxelOnce) {
+  Picker picker;
+  picker.workshop.control->found = {picker.at({1, 1, 0}), picker.at({1.3, 0.8, 0}), picker.at({2, 1, 0})};
+  picker.pick({0, 0, 31, 31});
+  picker.pick({0, 0, 32, 31});
+  picker.workshop.steps(4);
+  ASSERT_EQ(picker.answers.size(), 2u);
+  const json& found = picker.answers[0].found;
+  ASSERT_EQ(found["hits"].size(), 2u);
+  EXPECT_EQ(found["hits"][0]["point"], (json{1.0, 1.0, 0.0}));
+  EXPECT_EQ(found["hits"][1]["voxel"], (json{2, 1, 0}));
+  EXPECT_EQ(found["truncated"], false);
+  EXPECT_EQ(picker.answers[1].found["truncated"], true);  // 33 x 32 pixels
+}
+
+TEST(Pick, NeedsNobodyWhoLooksAndNoPicture) {
+  Picker picker;
+  picker.workshop.step();
+  EXPECT_EQ(picker.workshop.control->renderersMade, 0);
+  picker.pick();
+  picker.workshop.steps(3);
+  EXPECT_EQ(picker.answers.size(), 1u);
+  EXPECT_EQ(picker.workshop.control->picks, std::vector<std::uint32_t>{5});
+  EXPECT_TRUE(picker.workshop.control->passes.empty());
+}
+
+TEST(Pick, IsOfTheSceneAsItIsNow) {
+  Picker picker;
+  picker.session->addViewer(std::make_shared<FakeViewer>());
+  picker.workshop.steps(3);
+  picker.session->patch(seedPatch(6), {});
+  picker.pick();
+  picker.workshop.step();
+  ASSERT_EQ(picker.answers.size(), 1u);
+  EXPECT_EQ(picker.answers[0].found["revision"], 2);
+  EXPECT_EQ(picker.workshop.control->picks, std::vector<std::uint32_t>{6});
+}
+
+TEST(Pick, WaitsForTheSceneButNotForWhatElseIsDoneInTheBackground) {
+  Picker picker;
+  Workshop& workshop = picker.workshop;
+  workshop.background.atOnce = false;
+  picker.session->addViewer(std::make_shared<FakeViewer>());
+  picker.pick();
+  workshop.steps(3);
+  EXPECT_TRUE(picker.answers.empty());  // the scene is being built
+  workshop.background.finish();
+  workshop.step();
+  EXPECT_EQ(picker.answers.size(), 1u);
+  workshop.control->longErrorFrom = 1;
+  workshop.steps(3);
+  ASSERT_EQ(workshop.background.waiting.size(), 1u);  // the picture's error is being measured
+  picker.pick();
+  workshop.step();
+  EXPECT_EQ(picker.answers.size(), 2u);
+  EXPECT_EQ(workshop.background.waiting.size(), 1u);
+}
+
+TEST(Pick, InterruptsAPass) {
+  Picker picker;
+  picker.session->addViewer(std::make_shared<FakeViewer>());
+  picker.workshop.steps(2);
+  const auto passes = picker.workshop.control->passes.size();
+  picker.workshop.control->duringPass = [&] {
+    picker.workshop.control->duringPass = nullptr;
+    picker.pick();
+  };
+  picker.workshop.step();
+  EXPECT_EQ(picker.workshop.control->passes.size(), passes);
+  picker.workshop.step();
+  EXPECT_EQ(picker.answers.size(), 1u);
+}
+
+TEST(Pick, ThatTakesLongLeavesThePictureEveryOtherTurn) {
+  Picker picker;
+  picker.session->addViewer(std::make_shared<FakeViewer>());
+  picker.workshop.steps(2);
+  const auto passes = picker.workshop.control->passes.size();
+  picker.workshop.control->incompletePicks = 3;
+  picker.pick();
+  picker.workshop.steps(6);
+  EXPECT_TRUE(picker.answers.empty());
+  EXPECT_EQ(picker.workshop.control->passes.size(), passes + 3);
+  picker.workshop.step();
+  EXPECT_EQ(picker.answers.size(), 1u);
+  EXPECT_EQ(picker.workshop.control->picks.size(), 1u);  // it went on where it was
+}
+
+TEST(Pick, BeginsAnewAfterAnEdit) {
+  Picker picker;
+  picker.workshop.control->incompletePicks = 1;
+  picker.pick();
+  picker.workshop.step();
+  EXPECT_TRUE(picker.answers.empty());
+  picker.session->patch(seedPatch(6), {});
+  picker.workshop.steps(2);
+  ASSERT_EQ(picker.answers.size(), 1u);
+  EXPECT_EQ(picker.answers[0].found["revision"], 2);
+  EXPECT_EQ(picker.workshop.control->picks, (std::vector<std::uint32_t>{5, 6}));
+}
+
+TEST(Pick, OutsideOfAPictureThatHasBecomeSmallerIsRefused) {
+  Picker picker;
+  EXPECT_THROW(picker.pick({600, 0}), ProtocolError);
+  picker.pick({500, 0});
+  picker.session->patch({{"image", {{"width", 100}}}}, {});
+  picker.workshop.step();
+  ASSERT_EQ(picker.answers.size(), 1u);
+  try {
+    std::rethrow_exception(picker.answers[0].failure);
+  } catch (const ProtocolError& error) {
+    EXPECT_EQ(error.pointer, "/x");
+  }
+}
+
+TEST(Pick, IsToldThatTheSceneCannotBeRendered) {
+  Picker picker;
+  picker.workshop.control->failure = "macrocell: expected more memory";
+  picker.pick();
+  picker.workshop.step();
+  ASSERT_EQ(picker.answers.size(), 1u);
+  EXPECT_THROW(std::rethrow_exception(picker.answers[0].failure), Error);
+  EXPECT_THROW(picker.pick(), Error);
+  EXPECT_THROW(picker.session->waitForPick({1, 2}, 0ms), Error);
+}
+
+TEST(Pick, OneTooManyIsRefusedWith429) {
+  Picker picker;
+  for (std::size_t i = 0; i < Session::kMaxPicks; ++i) picker.pick();
+  try {
+    picker.pick();
+    FAIL() << "no error";
+  } catch (const ProtocolError& error) {
+    EXPECT_EQ(error.status, 429);
+  }
+  // One that waits in vain makes room again.
+  picker.workshop.steps(2 * int(Session::kMaxPicks));
+  EXPECT_EQ(picker.answers.size(), Session::kMaxPicks);
+  for (std::size_t i = 0; i <= Session::kMaxPicks; ++i)
+    EXPECT_FALSE(picker.session->waitForPick({1, 2}, 0ms).has_value());
+}
+
+TEST(Pick, WakesWhoWaits) {
+  Picker picker;
+  picker.workshop.control->found = {picker.at({2, 1, 1})};
+  std::thread rendering([&] {
+    while (!picker.session->request().pick) std::this_thread::yield();
+    picker.workshop.step();
+  });
+  const auto found = picker.session->waitForPick({1, 2}, 60s);
+  rendering.join();
+  ASSERT_TRUE(found.has_value());
+  EXPECT_EQ((*found)["hit"], true);
+  std::thread closing([&] {
+    while (!picker.session->request().pick) std::this_thread::yield();
+    picker.session->close("the end");
+  });
+  EXPECT_FALSE(picker.session->waitForPick({1, 2}, 60s).has_value());
+  closing.join();
+  EXPECT_THROW(picker.pick(), ProtocolError);
+}
+
+}  // namespace
+}  // namespace scolopax::server
