@@ -133,8 +133,8 @@ template <>
 struct Table<Camera> {
   static constexpr std::string_view title = "Camera";
   static constexpr std::string_view doc =
-      "Right-handed, in world space. What is null of eye, target and up is chosen so that the box is in "
-      "view.";
+      "Right-handed, in world space. What is null of eye, target and up is chosen so that what can be seen "
+      "is in view.";
   static constexpr Exclusive exclusive[] = {{"fovY", "orthoHeight", false}};
   static constexpr auto fields = std::tuple{
       field("eye", &Camera::eye, "Where the camera stands; an orthographic camera's rays start in its plane.",

@@ -16,8 +16,8 @@
 #include "renderer/data/colormap.h"
 #include "renderer/data/defaults.h"
 #include "renderer/data/image.h"
-#include "renderer/data/macrocell_grid.h"
 #include "renderer/data/render_plan.h"
+#include "renderer/data/visible_hull.h"
 
 namespace scolopax::server {
 namespace {
@@ -108,9 +108,18 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
   }
 }
 
-void resolveCamera(protocol::Scene& scene, Scene& render, const Grid& grid) {
+/// Whether a patch asks for the view that is chosen automatically.
+bool resetsView(const json& patch) {
+  if (!patch.is_object()) return false;
+  const auto camera = patch.find("camera");
+  if (camera == patch.end()) return false;
+  const auto isNull = [&](const char* name) { return camera->contains(name) && (*camera)[name].is_null(); };
+  return camera->is_null() || (camera->is_object() && (isNull("eye") || isNull("target")));
+}
+
+void resolveCamera(protocol::Scene& scene, Scene& render, const Grid& grid, std::span<const glm::vec3> seen) {
   const double aspect = double(scene.image.width) / double(scene.image.height);
-  const Camera framing = framingCamera(grid, scene.camera.fovY, aspect);
+  const Camera framing = framingCamera(grid, scene.camera.fovY, aspect, seen);
   protocol::Camera& wire = scene.camera;
   if (!wire.eye) wire.eye = arrayOf(framing.eye);
   if (!wire.target) wire.target = arrayOf(framing.target);
@@ -203,7 +212,19 @@ protocol::Lists rendererLists() {
 }
 
 SceneResolver::SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options)
-    : datasets_(std::move(datasets)), options_(options), lists_(rendererLists()) {}
+    : datasets_(std::move(datasets)), options_(options), lists_(rendererLists()) {
+  for (const auto& dataset : datasets_->all())
+    coarse_.emplace(dataset.get(), buildCoarseMacrocells(*dataset->volume));
+}
+
+SceneResolver::Framed SceneResolver::frame(const Dataset& dataset, const Scene& render) const {
+  try {
+    return std::make_shared<const std::vector<glm::vec3>>(
+        visibleHull(*dataset.volume, coarse_.at(&dataset), render.channels));
+  } catch (const Error&) {  // what cannot be rendered is told when it is to be
+    return std::make_shared<const std::vector<glm::vec3>>();
+  }
+}
 
 std::shared_ptr<const Dataset> SceneResolver::datasetOf(const json& scene) const {
   const auto id = scene.is_object() ? scene.find("dataset") : scene.end();
@@ -221,17 +242,17 @@ std::shared_ptr<const Dataset> SceneResolver::datasetOf(const json& scene) const
 
 std::shared_ptr<const ResolvedScene> SceneResolver::replace(const json& scene) const {
   const auto count = datasetOf(scene)->volume->channels().size();
-  return resolve(protocol::applyPatch(json::object(), scene, count));
+  return resolve(protocol::applyPatch(json::object(), scene, count), nullptr);
 }
 
 std::shared_ptr<const ResolvedScene> SceneResolver::patch(const ResolvedScene& base,
                                                           const json& patch) const {
   const bool namesDataset = patch.is_object() && patch.contains("dataset");
   const auto count = datasetOf(namesDataset ? patch : base.sparse)->volume->channels().size();
-  return resolve(protocol::applyPatch(base.sparse, patch, count));
+  return resolve(protocol::applyPatch(base.sparse, patch, count), resetsView(patch) ? nullptr : &base);
 }
 
-std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
+std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse, const ResolvedScene* base) const {
   protocol::Scene scene = protocol::parseScene(sparse, lists_);
   auto result = std::make_shared<ResolvedScene>();
   result->dataset = datasetOf(sparse);
@@ -244,7 +265,11 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse) const {
   Scene& render = result->render;
   scene.dataset = result->dataset->id;
   resolveChannels(scene, render, volume);
-  resolveCamera(scene, render, volume.grid());
+  if (base && base->dataset == result->dataset) result->framed = base->framed;
+  if (!result->framed && !(scene.camera.eye && scene.camera.target))
+    result->framed = frame(*result->dataset, render);
+  resolveCamera(scene, render, volume.grid(),
+                result->framed ? *result->framed : std::span<const glm::vec3>());
   resolveClipping(scene, render, volume);
   resolveLights(scene, render);
   render.blend = valueOf<BlendMode>(kBlendModes, scene.blend.mode);

@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <vector>
 
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
+#include "renderer/data/visible_hull.h"
 
 namespace scolopax {
 namespace {
@@ -93,27 +96,34 @@ kernel::CameraRays makeCameraRays(const Camera& camera, const Grid& grid, int wi
   return rays;
 }
 
-Camera framingCamera(const Grid& grid, double fovY, double aspect) {
+Camera framingCamera(const Grid& grid, double fovY, double aspect, std::span<const glm::vec3> seen) {
+  std::vector<glm::dvec3> points(seen.begin(), seen.end());
+  for (int corner = 0; seen.empty() && corner < 8; ++corner)
+    points.push_back(glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2 & 1) * glm::dvec3(grid.dims) - 0.5);
+  glm::dvec3 low = points[0], high = points[0];
+  for (const glm::dvec3& p : points) low = glm::min(low, p), high = glm::max(high, p);
   Camera camera;
   camera.fovY = fovY;
-  camera.target = centreOf(grid);
+  camera.target = glm::dvec3(grid.worldFromVoxel * glm::dvec4(0.5 * (low + high), 1));
   camera.up = {0, 0, 1};
   // From the front left and a little above, in the axes of the world (RAS: front is +y).
   const glm::dvec3 direction = glm::normalize(glm::dvec3(-0.55, 0.8, 0.35));
   camera.eye = camera.target + direction;
   const Basis basis = basisOf(camera);
   const double tanY = std::tan(fovY * 0.5 * 3.14159265358979323846 / 180.0), tanX = tanY * aspect;
-  // The nearest eye from which every corner of the box lies inside the frame, and 5 % of margin.
+  // The nearest eye from which every point lies inside the frame, and 5 % of margin.
   double distance = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::dvec3 v =
-        glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2 & 1) * glm::dvec3(grid.dims) - 0.5;
-    const glm::dvec3 p = glm::dvec3(grid.worldFromVoxel * glm::dvec4(v, 1)) - camera.target;
+  for (const glm::dvec3& voxel : points) {
+    const glm::dvec3 p = glm::dvec3(grid.worldFromVoxel * glm::dvec4(voxel, 1)) - camera.target;
     const double x = std::abs(glm::dot(p, basis.right)), y = std::abs(glm::dot(p, basis.up));
     distance = std::max(distance, std::max(x / tanX, y / tanY) - glm::dot(p, basis.forward));
   }
   camera.eye = camera.target + direction * (distance * 1.05);
   return camera;
+}
+
+Camera framingCamera(const Grid& grid, double fovY, double aspect) {
+  return framingCamera(grid, fovY, aspect, {});
 }
 
 }  // namespace scolopax

@@ -67,7 +67,8 @@ std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& 
   const server::SceneResolver resolver(store, {});
   auto resolved = resolver.replace(scene);
   for (const json& patch : patches) resolved = resolver.patch(*resolved, patch);
-  return resolved;
+  // As one scene: the automatic view is that of the final curves.
+  return patches.empty() ? resolved : resolver.replace(resolved->sparse);
 }
 
 void checkOutputs(const std::vector<std::filesystem::path>& outputs, const SceneArguments& arguments) {

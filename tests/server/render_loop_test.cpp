@@ -172,8 +172,8 @@ TEST(RenderLoop, RendersSmallWhileEditsArriveAndWholeWhenTheyStop) {
   session->patch(seedPatch(1), {});
   workshop.step();
   ASSERT_EQ(viewer->frames.size(), 2u);
-  EXPECT_EQ(viewer->frames[1].width, 134);  // as much as 400 x 300 shows, and less than a pixel more
-  EXPECT_EQ(viewer->frames[1].height, 100);
+  EXPECT_EQ(viewer->frames[1].width, 160);
+  EXPECT_EQ(viewer->frames[1].height, 120);
   EXPECT_TRUE(viewer->frames[1].info.interactive);
   EXPECT_FALSE(viewer->frames[1].info.final);
   workshop.clock.advance(Session::kInteractiveTime);
@@ -248,7 +248,7 @@ TEST(RenderLoop, BeginsThePictureOfAnEditAnewCoarserWhenItTakesTooLong) {
   session->patch(seedPatch(1), {});
   workshop.control->incompletePasses = 1;  // 75 ms are used up
   workshop.steps(2);
-  EXPECT_EQ(viewer->frames.back().height, 100);
+  EXPECT_EQ(viewer->frames.back().height, 120);
   EXPECT_EQ(viewer->frames.back().info.revision, 2u);
   EXPECT_TRUE(viewer->frames.back().info.interactive);
 }
@@ -283,40 +283,6 @@ TEST(RenderLoop, SleepsUntilQualityIsDueWhenTheSmallPictureIsDone) {
   EXPECT_TRUE(viewer->frames.back().info.final);
   EXPECT_FALSE(viewer->frames.back().info.interactive);
   EXPECT_EQ(workshop.control->passes.size(), 3u);  // it was whole already: the film goes on
-}
-
-TEST(RenderLoop, ChoosesTheLargestResolutionThatFitsTheTarget) {
-  EXPECT_EQ(divisorForTarget(1000, 0, 0.04), 1);
-  EXPECT_EQ(divisorForTarget(1000, 1e-5, 0.04), 1);
-  EXPECT_EQ(divisorForTarget(1000, 8e-5, 0.04), 1.5);
-  EXPECT_EQ(divisorForTarget(1000, 1e-4, 0.04), 2);
-  EXPECT_EQ(divisorForTarget(1000, 3e-4, 0.04), 3);
-  EXPECT_EQ(divisorForTarget(1000, 1, 0.04), 16);
-}
-
-TEST(RenderLoop, KeepsItsResolutionUntilAnotherFitsClearlyBetter) {
-  const auto next = [](double current, double secondsAtOne) {
-    return divisorForTarget(100, secondsAtOne / 100, 0.04, current);
-  };
-  EXPECT_EQ(next(2, 4 * 0.047), 2);     // a little late
-  EXPECT_EQ(next(2, 4 * 0.049), 3);     // too late
-  EXPECT_EQ(next(2, 2.25 * 0.029), 2);  // 1.5 would fit, but not clearly
-  EXPECT_EQ(next(2, 2.25 * 0.027), 1.5);
-}
-
-TEST(RenderLoop, ShowsAsMuchInASmallPictureAsInTheWholeAndLessThanAPixelMore) {
-  Scene scene;
-  for (const auto& [width, height] :
-       {std::pair{643, 561}, {512, 512}, {1, 1}, {7680, 1}, {3, 4096}, {1919, 1079}})
-    for (const double divisor : {1.0, 1.5, 2.0, 3.0, 4.0, 16.0}) {
-      scene.width = width, scene.height = height;
-      const Scene small = atDivisor(scene, divisor);
-      const double scale = double(height) / small.height;  // the vertical field of view is the same
-      EXPECT_LE(scale, divisor);
-      EXPECT_GE(small.width * scale, width - 1e-9) << width << "x" << height << " by " << divisor;
-      EXPECT_LT((small.width - 1) * scale, width) << width << "x" << height << " by " << divisor;
-      EXPECT_EQ(small.filter, divisor == 1 ? PixelFilter::box : PixelFilter::point);
-    }
 }
 
 TEST(RenderLoop, SharesTheTimeForAPassBetweenTheSessionsThatAreEdited) {

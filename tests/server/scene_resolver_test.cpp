@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <glm/geometric.hpp>
+
 #include "protocol/problem.h"
 #include "tests/server/fakes.h"
 
@@ -183,6 +185,69 @@ TEST(SceneResolver, ChecksAPatchAgainstTheDatasetThatItNames) {
   EXPECT_EQ(resolve.patch(*resolve.patch(*base, {{"dataset", "other"}}), {{"dataset", nullptr}})->dataset->id,
             "small");
   EXPECT_THROW(resolve.patch(*base, {{"dataset", "none"}}), ProtocolError);
+}
+
+/// One channel of 64^3 voxels: a ball of 200 in a corner, a larger one of 100 around it, 0 elsewhere.
+SceneResolver resolverOfBalls() {
+  Grid grid;
+  grid.dims = glm::ivec3(64);
+  std::vector<ChannelSource> channels(1);
+  channels[0].voxels = VoxelBuffer(ScalarType::u8, grid.voxelCount());
+  for (std::size_t i = 0; i < grid.voxelCount(); ++i) {
+    const glm::dvec3 p(double(i % 64), double(i / 64 % 64), double(i / 4096));
+    const double r = glm::length(p - 20.0);
+    channels[0].voxels.as<std::uint8_t>()[i] = r <= 6 ? 200 : r <= 16 ? 100 : 0;
+  }
+  std::vector<Dataset> datasets;
+  datasets.push_back({"balls", "balls", {}, std::make_shared<const Volume>(grid, std::move(channels))});
+  return {std::make_shared<const DatasetStore>(std::move(datasets)), {64, 1'000'000}};
+}
+
+json rangeFrom(double lo) { return {{"channels", {{{"range", {lo, 255}}, {"density", 1}}}}}; }
+
+/// From the camera to what it looks at.
+double distanceOf(const ResolvedScene& scene) {
+  return glm::length(scene.render.camera.eye - scene.render.camera.target);
+}
+
+TEST(SceneResolver, FramesWhatTheCurvesOfTheSceneShow) {
+  const auto resolve = resolverOfBalls();
+  const auto inner = resolve.replace(rangeFrom(150)), outer = resolve.replace(rangeFrom(50)),
+             nothing = resolve.replace(rangeFrom(220));
+  EXPECT_LT(glm::length(inner->render.camera.target - 20.0), 1.5);
+  EXPECT_LT(glm::length(outer->render.camera.target - 20.0), 1.5);
+  EXPECT_LT(distanceOf(*inner), 0.6 * distanceOf(*outer));
+  EXPECT_EQ(nothing->render.camera, framingCamera(nothing->dataset->volume->grid(), 35, 1));
+  EXPECT_EQ(resolve.replace(rangeFrom(150))->resolved, inner->resolved);
+}
+
+TEST(SceneResolver, KeepsItsViewWhileCurvesAreEditedUntilItIsAskedForAnew) {
+  const auto resolve = resolverOfBalls();
+  const auto first = resolve.replace(rangeFrom(50));
+  const json narrow = {{"channels", {{"0", {{"range", {150, 255}}}}}}};
+  const auto edited = resolve.patch(*first, narrow);
+  EXPECT_EQ(edited->render.camera, first->render.camera);
+  EXPECT_EQ(resolve.patch(*edited, {{"channels", {{"0", {{"visible", false}}}}}})->render.camera,
+            first->render.camera);
+  // Another angle of view shows the same.
+  const auto wide = resolve.patch(*edited, {{"camera", {{"fovY", 60}}}});
+  EXPECT_EQ(wide->render.camera.target, first->render.camera.target);
+  EXPECT_LT(distanceOf(*wide), distanceOf(*first));
+  const auto moved = resolve.patch(*edited, {{"camera", {{"eye", {1, 2, 99}}, {"target", {20, 20, 20}}}}});
+  const Camera anew = resolve.replace(rangeFrom(150))->render.camera;
+  for (const json& reset :
+       {json{{"camera", nullptr}}, json{{"camera", {{"eye", nullptr}, {"target", nullptr}}}}}) {
+    EXPECT_EQ(resolve.patch(*moved, reset)->render.camera, anew) << reset;
+    EXPECT_EQ(resolve.patch(*edited, reset)->render.camera, anew) << reset;
+  }
+}
+
+TEST(SceneResolver, FramesAnotherDatasetByItself) {
+  const auto resolve = resolver();
+  const auto base = resolve.replace({{"channels", {{{"range", {10, 23}}}, {{"visible", false}}}}});
+  const auto other = resolve.patch(*base, {{"dataset", "other"}, {"channels", nullptr}});
+  EXPECT_NE(base->render.camera, other->render.camera);
+  EXPECT_EQ(other->render.camera, resolve.replace({{"dataset", "other"}})->render.camera);
 }
 
 TEST(SceneResolver, KnowsWhatLeavesThePictureAsItIs) {

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/film_state.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace scolopax::server {
+
+bool FilmState::stale(const RenderRequest& request) const {
+  // Back to full resolution when edits have stopped, in steps; a film that already has it goes on.
+  const bool finerDue = divisor != 1 && (small || restShown || !request.pollSamples.empty());
+  return !scene || request.revision != revision || (!request.interactive && finerDue) ||
+         (request.aovs && !recording);
+}
+
+bool FilmState::keepsPass(const RenderRequest& request, const RenderPolicy& policy, TimePoint now) const {
+  return unfinished && shown.revision != revision && ((request.interactive && small) || abandoned) &&
+         now - passBegan < policy.shield;
+}
+
+bool FilmState::firstOfEdit(const RenderRequest& request) const {
+  return request.interactive && shown.revision != request.revision;
+}
+
+bool FilmState::lateForEdit(const RenderRequest& request, const RenderPolicy& policy) const {
+  return unfinished && small && firstOfEdit(request) && divisor < kMostDivisor &&
+         passSeconds >= std::chrono::duration<double>(policy.tooLate).count();
+}
+
+bool FilmState::showDue(const RenderRequest& request, const FilmProgress& film, const RenderPolicy& policy,
+                        TimePoint now) const {
+  const std::uint32_t samples = film.samples;
+  if (samples == 0) return false;
+  if (shown.revision != revision || shown.interactive != request.interactive) return true;
+  if (request.failures != shownFailures) return true;
+  if (shown.mixed && !request.pollSamples.empty()) return true;
+  if (!request.interactive && divisor == 1 && film.finished) return !shown.final;
+  if (samples == shown.samples) return false;
+  if (std::any_of(request.pollSamples.begin(), request.pollSamples.end(),
+                  [&](std::uint32_t wanted) { return shown.samples < wanted && wanted <= samples; }))
+    return true;
+  return std::has_single_bit(samples) ||
+         now - shownAt >= (request.interactive ? policy.interactiveInterval : policy.stillInterval);
+}
+
+}  // namespace scolopax::server

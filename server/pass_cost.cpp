@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/pass_cost.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace scolopax::server {
+namespace {
+
+/// Of two passes that cost the same, the times may differ so much beyond what their sizes explain.
+constexpr double kDisturbed = 2;
+/// Sizes that are nearer to each other say nothing of the slope.
+constexpr double kApart = 1.2;
+/// Most of the cost of the largest recent picture that is taken to be fixed: with more, a few disturbed
+/// passes would make large pictures look free.
+constexpr double kMostFixed = 0.5;
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  if (values.size() % 2 == 1) return *middle;
+  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+}  // namespace
+
+/// Whether one line with no negative part passes near both.
+bool PassCost::agree(const Pass& a, const Pass& b) {
+  const Pass& small = a.pixels <= b.pixels ? a : b;
+  const Pass& large = a.pixels <= b.pixels ? b : a;
+  return large.seconds * kDisturbed >= small.seconds &&
+         large.seconds <= small.seconds * (large.pixels / small.pixels) * kDisturbed;
+}
+
+void PassCost::push(const Pass& pass) {
+  if (count_ == kRecent) std::shift_left(passes_.begin(), passes_.end(), 1), --count_;
+  passes_[count_++] = pass;
+}
+
+/// When the scene's cost changes, what was learnt before is worth nothing.
+void PassCost::forgetContradicted() {
+  if (count_ < 3) return;
+  const Pass last = passes_[count_ - 1], before = passes_[count_ - 2];
+  if (!agree(last, before)) return;
+  const auto end = passes_.begin() + std::ptrdiff_t(count_);
+  const auto kept = std::remove_if(
+      passes_.begin(), end - 2, [&](const Pass& pass) { return !agree(pass, last) && !agree(pass, before); });
+  if (kept == end - 2) return;
+  count_ = std::size_t(std::move(end - 2, end, kept) - passes_.begin());
+  if (count_ == 2) fixed_ = 0;
+}
+
+void PassCost::fit() {
+  std::vector<double> slopes, rests;
+  const Pass* largest = &passes_[0];
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Pass& a = passes_[i];
+    if (a.pixels >= largest->pixels) largest = &a;
+    for (std::size_t j = 0; j < i; ++j) {
+      const Pass& b = passes_[j];
+      if (std::max(a.pixels, b.pixels) >= kApart * std::min(a.pixels, b.pixels))
+        slopes.push_back((a.seconds - b.seconds) / (a.pixels - b.pixels));
+    }
+  }
+  // Passes of one size alone say nothing of the fixed part: it stays what it was.
+  if (!slopes.empty()) {
+    const double slope = std::max(median(slopes), 0.0);
+    for (std::size_t i = 0; i < count_; ++i) rests.push_back(passes_[i].seconds - slope * passes_[i].pixels);
+    fixed_ = median(rests);
+  }
+  std::vector<double> times;
+  for (std::size_t i = 0; i < count_; ++i)
+    if (passes_[i].pixels == largest->pixels) times.push_back(passes_[i].seconds);
+  fixed_ = std::clamp(fixed_, 0.0, kMostFixed * median(times));
+  std::vector<double> rates;
+  for (std::size_t i = 0; i < count_; ++i) rates.push_back((passes_[i].seconds - fixed_) / passes_[i].pixels);
+  perPixel_ = std::max(median(rates), 0.0);
+}
+
+void PassCost::add(std::uint64_t pixels, double seconds) {
+  const Pass pass{double(std::max<std::uint64_t>(pixels, 1)), std::max(seconds, 0.0)};
+  if (late_ && agree(*late_, pass)) push(*late_);
+  late_.reset();
+  push(pass);
+  forgetContradicted();
+  fit();
+}
+
+void PassCost::addUnfinished(std::uint64_t pixels, double seconds) {
+  if (seconds > this->seconds(pixels)) late_ = Pass{double(std::max<std::uint64_t>(pixels, 1)), 2 * seconds};
+}
+
+double PassCost::seconds(std::uint64_t pixels) const {
+  const double line = fixed_ + perPixel_ * double(pixels);
+  return late_ ? std::max(line, late_->seconds * (double(pixels) / late_->pixels)) : line;
+}
+
+}  // namespace scolopax::server

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/render_jobs.h"
+
+#include <utility>
+#include <vector>
+
+#include "renderer/data/aov.h"
+#include "server/blend.h"
+#include "server/resolution.h"
+
+namespace scolopax::server {
+namespace {
+
+/// Of quadrature, in voxels, while edits arrive.
+constexpr double kInteractiveStep = 2;
+
+}  // namespace
+
+Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive) {
+  Scene scene = atDivisor(resolved.render, divisor);
+  if (interactive && scene.method == Method::automatic) {
+    scene.method = Method::hybrid;
+    scene.step = kInteractiveStep;
+  }
+  return scene;
+}
+
+void PictureMaking::make(const Renderer& renderer, std::uint64_t pixels,
+                         const std::shared_ptr<MemoryBudget>& memory, const std::stop_token& stop) {
+  FrameInfo& info = frame.info;
+  info.error = float(renderer.estimatedError(stop));
+  const auto take = [&](std::size_t pixelBytes) {
+    return MemoryBudget::take(memory, MemoryUse::pictures, pixels * pixelBytes);
+  };
+  // Mixing makes another one of the reduced picture.
+  auto imageMemory = take(sizeof(glm::vec4) * (reduced ? 2 : 1));
+  auto aovMemory = take(aovs ? std::size(kAovs) * sizeof(float) : 0);
+  Image picture = renderer.image();
+  if (reduced) {
+    const double error = info.samples > 1 ? double(info.error) : sampleError;
+    share = mixIn(enlarged(*reduced, picture.width, picture.height), error, &picture);
+    info.mixed = true;
+  }
+  imageMemory.resize(pixels * sizeof(glm::vec4));
+  frame.image = withShare(std::move(imageMemory), std::move(picture));
+  if (!aovs) return;
+  std::vector<AovValues> values;
+  for (std::size_t i = 0; i < std::size(kAovs); ++i) values.push_back(renderer.aov(Aov(i)));
+  frame.aovs = withShare(std::move(aovMemory), std::move(values));
+}
+
+}  // namespace scolopax::server

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/film_state.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/server/fakes.h"
+
+namespace scolopax::server {
+namespace {
+
+using namespace std::chrono_literals;
+
+const RenderPolicy kPolicy;
+
+/// A film of revision 1 that was begun while edits arrived, and the request that made it.
+struct Edited {
+  FilmState film;
+  RenderRequest request;
+  Edited() {
+    request.scene = film.scene = std::make_shared<const ResolvedScene>();
+    request.revision = film.revision = 1;
+    request.wanted = request.interactive = film.small = true;
+  }
+};
+
+TEST(FilmState, IsStaleForAnotherRevisionAndWhenAFinerPictureIsDue) {
+  Edited e;
+  EXPECT_FALSE(e.film.stale(e.request));
+  e.request.revision = 2;
+  EXPECT_TRUE(e.film.stale(e.request));
+  e.request.revision = 1;
+  e.request.interactive = false;
+  EXPECT_FALSE(e.film.stale(e.request));  // it is whole
+  e.film.divisor = 2;
+  EXPECT_TRUE(e.film.stale(e.request));
+  e.film.small = false;
+  EXPECT_FALSE(e.film.stale(e.request));  // a step on the way, which is shown first
+  e.film.restShown = true;
+  EXPECT_TRUE(e.film.stale(e.request));
+  e.film = {};
+  EXPECT_TRUE(e.film.stale(e.request));  // there is none
+}
+
+TEST(FilmState, KeepsThePassOfASmallPictureForAsLongAsItsShield) {
+  Edited e;
+  const TimePoint begin{1000s};
+  e.film.unfinished = true;
+  e.film.passBegan = begin;
+  e.request.revision = 2;
+  EXPECT_TRUE(e.film.keepsPass(e.request, kPolicy, begin + kPolicy.shield - 1us));
+  EXPECT_FALSE(e.film.keepsPass(e.request, kPolicy, begin + kPolicy.shield));
+  e.film.shown.revision = 1;  // it would only refine what is on screen
+  EXPECT_FALSE(e.film.keepsPass(e.request, kPolicy, begin));
+}
+
+TEST(FilmState, IsLateOnceThePassOfAnEditHasTakenTooLong) {
+  Edited e;
+  e.film.unfinished = true;
+  e.film.passSeconds = 0.074;
+  EXPECT_FALSE(e.film.lateForEdit(e.request, kPolicy));
+  e.film.passSeconds = 0.076;
+  EXPECT_TRUE(e.film.lateForEdit(e.request, kPolicy));
+  e.film.divisor = kMostDivisor;
+  EXPECT_FALSE(e.film.lateForEdit(e.request, kPolicy));
+  e.film.divisor = 1;
+  e.film.shown.revision = 1;
+  EXPECT_FALSE(e.film.lateForEdit(e.request, kPolicy));
+}
+
+TEST(FilmState, IsShownAtPowersOfTwoAndAfterTheInterval) {
+  Edited e;
+  const TimePoint then{1000s};
+  e.film.shown.revision = 1;
+  e.film.shown.interactive = true;
+  e.film.shown.samples = 4;
+  e.film.shownAt = then;
+  const auto due = [&](std::uint32_t samples, std::chrono::milliseconds after) {
+    return e.film.showDue(e.request, {samples, false}, kPolicy, then + after);
+  };
+  EXPECT_FALSE(due(0, 1s));
+  EXPECT_FALSE(due(4, 1s));
+  EXPECT_FALSE(due(5, 32ms));
+  EXPECT_TRUE(due(5, 33ms));
+  EXPECT_TRUE(due(8, 0ms));
+  e.request.interactive = e.film.shown.interactive = false;
+  EXPECT_FALSE(due(5, 499ms));
+  EXPECT_TRUE(due(5, 500ms));
+  e.request.pollSamples = {5};
+  EXPECT_TRUE(due(5, 0ms));
+}
+
+}  // namespace
+}  // namespace scolopax::server
