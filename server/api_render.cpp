@@ -150,8 +150,7 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
     const auto budget = std::chrono::duration<double>(std::clamp(until - seconds(), 0.0, kSlice));
     const auto slice = std::chrono::duration_cast<std::chrono::nanoseconds>(budget);
     if (renderer->renderSample(ending.flag(), slice)) {
-      // Before stopMet, which does not wait for it.
-      if (scene->stop.error > 0 && renderer->errorTakesLong()) errorOf(*renderer, ending.token());
+      unlessStopped([&] { return measureFor(scene->stop, *renderer, ending.token()), true; });
       continue;
     }
     checkWanted(context, request);

@@ -147,20 +147,20 @@ void resolveClipping(protocol::Scene& scene, Scene& render, const Volume& volume
   protocol::Crop& wire = scene.crop;
   Crop crop{{}, {}, 0};
   for (std::size_t i = 0; i < wire.regions.size(); ++i) crop.regions |= std::uint32_t(wire.regions[i]) << i;
-  bool everything = wire.regions[13];  // in the middle
+  bool keepsAll = (crop.regions & Crop::kInnermost) != 0;
   const auto resolveAxis = [&](std::optional<std::array<double, 2>>& ends, int axis, const char* name) {
     if (!ends) ends = {-0.5, grid.dims[axis] - 0.5};
     const auto [low, high] = *ends;
     if (low > high)
       throw ProtocolError(422, std::string("/crop/") + name, "expected two numbers that do not decrease");
-    everything = everything && low <= -0.5 && high >= grid.dims[axis] - 0.5;
+    keepsAll = keepsAll && low <= -0.5 && high >= grid.dims[axis] - 0.5;
     crop.low[axis] = low;
     crop.high[axis] = high;
   };
   resolveAxis(wire.x, 0, "x");
   resolveAxis(wire.y, 1, "y");
   resolveAxis(wire.z, 2, "z");
-  if (!everything) render.crop = crop;
+  if (!keepsAll) render.crop = crop;
 }
 
 void resolveLights(const protocol::Scene& scene, Scene& render) {

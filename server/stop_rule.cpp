@@ -9,6 +9,10 @@ constexpr std::uint32_t kMaxSamples = 1u << 24;
 
 }  // namespace
 
+void measureFor(const StopRule& stop, const Renderer& renderer, const std::stop_token& cancel) {
+  if (stop.error > 0 && renderer.errorTakesLong()) renderer.estimatedError(cancel);
+}
+
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
   const std::uint32_t samples = renderer.samples();
   // The estimate counts from 16 samples on: fewer can look alike by chance.

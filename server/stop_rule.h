@@ -14,8 +14,11 @@ struct StopRule {
   double error = 0;
 };
 
-/// Whether rendering ends at what `renderer` has and the seconds it took. An error that takes long to find is
-/// not known here: somebody else asks for it first.
+/// Has the renderer measure what stopMet() needs of it and does not wait for. Throws Error(cancelled) soon
+/// after `cancel` is requested.
+void measureFor(const StopRule& stop, const Renderer& renderer, const std::stop_token& cancel = {});
+/// Whether rendering ends at what `renderer` has and the seconds it took. An error that would take long to
+/// find counts as not reached.
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds);
 
 }  // namespace scolopax::server

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "renderer/core/error.h"
+#include "renderer/core/is_finite.h"
 #include "renderer/core/short_text.h"
-#include "renderer/data/visible_hull.h"
 
 namespace scolopax {
 namespace {
@@ -43,8 +43,6 @@ Basis basisOf(const Camera& camera) {
   right = glm::normalize(right);
   return {right, glm::cross(right, forward), forward};
 }
-
-bool isFinite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 void checkCamera(const Camera& camera) {
   if (!isFinite(camera.eye) || !isFinite(camera.target) || !isFinite(camera.up))
@@ -120,10 +118,6 @@ Camera framingCamera(const Grid& grid, double fovY, double aspect, std::span<con
   }
   camera.eye = camera.target + direction * (distance * 1.05);
   return camera;
-}
-
-Camera framingCamera(const Grid& grid, double fovY, double aspect) {
-  return framingCamera(grid, fovY, aspect, {});
 }
 
 }  // namespace scolopax

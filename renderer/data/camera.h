@@ -3,6 +3,7 @@
 #pragma once
 #include <glm/vec3.hpp>
 #include <optional>
+#include <span>
 
 #include "renderer/data/volume.h"
 #include "renderer/kernel/camera_rays.h"
@@ -24,7 +25,8 @@ struct Camera {
 /// or with a number that is not finite or out of range.
 kernel::CameraRays makeCameraRays(const Camera& camera, const Grid& grid, int width, int height);
 
-/// The default view: the whole box in the frame, seen from a little above and to the side.
-Camera framingCamera(const Grid& grid, double fovY, double aspect);
+/// The default view, from a little above and to the side: all points of `seen`, in voxel coordinates, in the
+/// frame, or the whole box where there are none.
+Camera framingCamera(const Grid& grid, double fovY, double aspect, std::span<const glm::vec3> seen = {});
 
 }  // namespace scolopax

@@ -10,13 +10,12 @@
 #include <string>
 
 #include "renderer/core/error.h"
+#include "renderer/core/is_finite.h"
 
 namespace scolopax {
 namespace {
 
 [[noreturn]] void fail(const std::string& what) { throw Error(ErrorCode::badInput, what); }
-
-bool isFinite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 bool keepsRegion(std::uint32_t regions, int x, int y, int z) { return regions >> (x + 3 * y + 9 * z) & 1; }
 

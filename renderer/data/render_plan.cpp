@@ -10,7 +10,6 @@
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
 #include "renderer/data/clip_view.h"
-
 #include "renderer/data/shared_macrocells.h"
 
 namespace scolopax {

@@ -21,8 +21,4 @@ MacrocellGrid buildCoarseMacrocells(const Volume& volume);
 std::vector<glm::vec3> visibleHull(const Volume& volume, const MacrocellGrid& cells,
                                    std::span<const ChannelAppearance> channels);
 
-/// The default view of camera.h with all points of `seen`, in voxel coordinates, in the frame; of the whole
-/// box where there are none.
-Camera framingCamera(const Grid& grid, double fovY, double aspect, std::span<const glm::vec3> seen);
-
 }  // namespace scolopax

@@ -19,6 +19,7 @@ SCOLOPAX_HD std::optional<Collision> firstInSpans(const SceneView& scene, const 
   } while (!hit && !spans.done(true));
   return hit;
 }
+/// The first collision with any channel.
 template <class Tracker, class Blend>
 SCOLOPAX_HD std::optional<Collision> trackAll(const SceneView& scene, const Ray& ray, Interval inside,
                                               Sampler& sampler, SampleCost* cost) {
@@ -26,6 +27,7 @@ SCOLOPAX_HD std::optional<Collision> trackAll(const SceneView& scene, const Ray&
     return Tracker::template track<Blend>(scene, ray, span, sampler, cost);
   });
 }
+/// The first collision with channel n, as if it were alone.
 template <class Blend>
 SCOLOPAX_HD std::optional<Collision> trackAlone(const SceneView& scene, int n, const Ray& ray,
                                                 Interval inside, Sampler& sampler, SampleCost* cost) {
@@ -92,7 +94,6 @@ struct Analog {
       glm::vec4 sum(0.0f);
       for (int n = 0; n < scene.channelCount; ++n) {
         const auto hit = trackAlone<Blend>(scene, n, ray, inside, sampler, cost);
-
         if (!hit) continue;
         if (first) keepNearer(first, {hit->place.t(), n});
         sum = glm::vec4(glm::vec3(sum) + radiance<Tracker, Blend, Features>(scene, ray, *hit, sampler, cost),

@@ -35,9 +35,9 @@ SCOLOPAX_HD inline void keepNearer(FirstCollision* first, const FirstCollision& 
 /// what any thickness that can be told from opaque needs.
 inline constexpr std::uint32_t kMaxTentativeCollisions = 1u << 20;
 
-/// Tentative collision in a macrocell of the process of several channels together; `bound` is
-/// their total.
-/// Accepts with probability extinction / bound (Eq. 4), strictly below, so that zero extinction is never hit.
+/// Tests a tentative collision of the process of several channels together in a macrocell; `bound` is their
+/// total. Accepts with probability extinction / bound (Eq. 4), strictly below, so that zero extinction is
+/// never hit.
 struct PickOneChannel {
   /// Draws the channel first, with probability bound_n / bound, and fetches only that one. What the bounds
   /// leave of the total belongs to none.
@@ -88,8 +88,8 @@ struct TestLargest {
   }
 };
 
-/// Tentative collision of the own process of one of several channels. In max and mix a channel has extinction
-/// only where it is the largest (Eq. 8).
+/// Tests a tentative collision of channel n's own process. In max and mix a channel has extinction only where
+/// it is the largest of `channels` (Eq. 8).
 template <class Blend, class Channels>
 SCOLOPAX_HD std::optional<Collision> testChannel(const SceneView& scene, Channels channels, int n,
                                                  float bound, Place place, glm::vec3 point,

@@ -11,6 +11,7 @@
 #include <unordered_map>
 
 #include "renderer/core/error.h"
+#include "renderer/core/is_finite.h"
 #include "renderer/reference/gauss_rule.h"
 
 namespace scolopax::reference {
@@ -52,8 +53,6 @@ Blended blended(BlendMode mode, const Stretch& stretch, const ChannelSample* sam
   }
   return result;
 }
-
-bool isFinite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 }  // namespace
 

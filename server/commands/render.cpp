@@ -144,8 +144,7 @@ void render(const Options& options) {
     seconds = std::chrono::duration<double>(Clock::now() - start).count();
     bar.show(renderer->samples(), seconds);
     if (cancel) break;
-    // Before stopMet, which does not wait for it.
-    if (stop.error > 0 && renderer->errorTakesLong()) renderer->estimatedError();
+    server::measureFor(stop, *renderer);
     if (server::stopMet(stop, *renderer, seconds)) break;
   }
   bar.clear();

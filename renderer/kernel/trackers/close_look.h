@@ -79,8 +79,7 @@ SCOLOPAX_HD inline float boundAhead(const SceneView& scene, int n, const Ray& ra
   ++cost->fetches;
   const CellValues values = valuesIn(channel, scene.dims, cell, point);
   if (!isFinite(values.value)) return 0.0f;  // and so is no sample of this cell
-  const float slope = (values.hi - values.lo) *
-                      (magnitude(ray.direction.x) + magnitude(ray.direction.y) + magnitude(ray.direction.z));
+  const float slope = (values.hi - values.lo) * sumOfMagnitudes(ray.direction);
   // As much as rounding may bring a sample beyond the corners; an end at 0 is exact.
   const float slack =
       values.lo < values.hi ? maximum(magnitude(values.lo), magnitude(values.hi)) * 0x1p-20f : 0.0f;

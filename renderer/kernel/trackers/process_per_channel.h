@@ -6,7 +6,7 @@
 
 namespace scolopax::kernel {
 
-/// Tracks channel n of `channels` through the walk's current cell, as far as `nearest`, which
+/// Tracks channel n, if it is one of `channels`, through the walk's current cell, as far as `nearest`, which
 /// a hit replaces.
 template <bool kClosely, class Blend, class Channels>
 SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, Channels channels, int n,

@@ -136,7 +136,8 @@ TEST(Clipping, OfDenseMatterCostsNoMoreThanItsAbsence) {
       for (const Method method : kTrackers) {
         const RenderStats stats = statsOf(volume, scene, method, 4);
         EXPECT_EQ(stats.truncatedRays, 0u) << nameOf(method) << ' ' << nameOf(blend);
-        EXPECT_LT(stats.randomBlocks, 40 * stats.rays) << nameOf(method) << ' ' << nameOf(blend);
+        // A draw or two for every channel and span: none in what is cut away.
+        EXPECT_LT(stats.randomBlocks, 8 * stats.rays) << nameOf(method) << ' ' << nameOf(blend);
       }
       expectTrackersMatchReference(volume, scene, 200, 1);
     }
@@ -164,7 +165,7 @@ TEST(Clipping, LeavesNoLightThroughWhatLiesAlongAFace) {
       double sum = 0;
       for (int row = 0; row < 8; ++row)  // but for the column that the light reaches
         for (int column = 1; column < 7; ++column) sum += picture.pixels[std::size_t(8 * row + column)].r;
-      EXPECT_LT(sum / 48, 2e-3) << nameOf(method) << " face " << kind;
+      EXPECT_EQ(sum, 0) << nameOf(method) << " face " << kind;
     }
 }
 
@@ -230,7 +231,7 @@ const Cut kCuts[] = {
 
 class ClippedScenes : public testing::TestWithParam<int> {};
 
-/// Every cut in every blend mode and light, but no all of them in every scene.
+/// Pairs of cut and blend mode, with scenes and lights in turn.
 TEST_P(ClippedScenes, AreUnbiased) {
   const Cut& cut = kCuts[GetParam()];
   for (int blend = 0; blend < int(std::size(kBlends)); ++blend) {
