@@ -52,8 +52,9 @@ export function attachPointerPick(element: HTMLElement, pick: PointerPick, size:
   const off = new AbortController();
   const follow = (event: PointerEvent) => {
     const picture = size();
-    const rests = event.buttons === 0 && event.pointerType !== 'touch' && picture;
-    pick.moved(rests ? pictureSpot({ x: event.clientX, y: event.clientY }, element.getBoundingClientRect(), picture) : undefined);
+    const atWork = event.buttons !== 0 || event.pointerType === 'touch';
+    if (atWork || !picture) return pick.moved(undefined);
+    pick.moved(pictureSpot({ x: event.clientX, y: event.clientY }, element.getBoundingClientRect(), picture));
   };
   for (const type of ['pointermove', 'pointerdown', 'pointerup'] as const)
     element.addEventListener(type, follow, { signal: off.signal });

@@ -7,8 +7,8 @@
 
 namespace scolopax {
 namespace {
-constexpr int kMostSamples = 64, kLeastSamples = 4;
-constexpr std::size_t kMaxRays = std::size_t(kMaxPickPixels) * kLeastSamples;
+constexpr int kLeastSide = 2;
+constexpr std::size_t kMaxRays = std::size_t(kMaxPickPixels) * kLeastSide * kLeastSide;
 /// A pixel of which a smaller share of samples ends shows nothing. Well below one half: what is faint, but
 /// seen, can be picked.
 constexpr std::size_t kLeastShare = 16;
@@ -31,10 +31,10 @@ std::vector<glm::ivec2> pixelsToPick(const PixelArea& area) {
   return pixels;
 }
 
-int pickSamples(std::size_t pixels) {
-  int samples = kMostSamples;
-  while (samples > kLeastSamples && std::size_t(samples) * pixels > kMaxRays) samples /= 2;
-  return samples;
+int pickSamplesSide(std::size_t pixels) {
+  int side = kMaxPickSamplesSide;
+  while (side > kLeastSide && std::size_t(side * side) * pixels > kMaxRays) side /= 2;
+  return side;
 }
 
 std::optional<std::size_t> visibleSample(std::span<const kernel::FirstCollision> samples) {

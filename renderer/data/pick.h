@@ -25,9 +25,10 @@ inline constexpr int kMaxPickPixels = 1024;
 /// Those of the area that are looked at, in reading order: all, or a regular lattice of them.
 std::vector<glm::ivec2> pixelsToPick(const PixelArea& area);
 
-/// Samples of each of so many pixels (at most kMaxPickPixels): from 64 down to 4, so that there are never
-/// more than 4096.
-int pickSamples(std::size_t pixels);
+/// Samples lie in a square in each pixel: side of it, 8 for up to 64 pixels, 4 for up to 256, and 2. So there
+/// are never more than 4096.
+int pickSamplesSide(std::size_t pixels);
+inline constexpr int kMaxPickSamplesSide = 8;
 
 /// The sample of a pixel that tells what is visible there: of those that end in the channel in which most
 /// end (of equal ones the first), the one of median depth (the nearer of two). None where fewer than one in
@@ -46,7 +47,8 @@ struct Picked {
 class Picking {
  public:
   virtual ~Picking() = default;
-  /// Goes on until all samples are taken; false when the budget was used up before. Looked at every ray.
+  /// Goes on until all samples are taken; false when the budget, which is looked at every few of them,
+  /// was used up before.
   virtual bool run(std::chrono::nanoseconds budget) = 0;
   /// What is visible at pixelsToPick(), in their order, without those that show nothing; once run() has
   /// returned true.

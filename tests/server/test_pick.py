@@ -55,7 +55,8 @@ class Picks(unittest.IsolatedAsyncioTestCase):
             scene = self.scene(self.BOX)
             session = self.begin({**scene, "integrator": {"method": method, "step": 0.1}})
             told = self.pick(session, "x=40.5&y=40")
-            self.assertEqual((told["hit"], told["revision"], told["channel"], told["name"]), (True, 1, 1, "box"), method)
+            self.assertEqual([told[member] for member in ("hit", "revision", "channel", "name")], [True, 1, 1, "box"],
+                             method)
             for found, expected in zip(told["point"], self.world((8, 8, 11.75))):
                 self.assertAlmostEqual(found, expected, delta=0.13)
             self.assertEqual(told["voxel"], [8, 8, 12])

@@ -190,7 +190,7 @@ TEST(Pick, IsOfTheChannelInWhichMostSamplesEnd) {
 
 TEST(Pick, TakesWhatIsFaintButNotWhatIsHardlyThere) {
   for (const Method method : kAllMethods) {
-    // Of 64 samples, which are spread evenly, 16 and 0.3 end.
+    // Of 64 samples, 16 and 0.3 are expected to end.
     Slab slab(0, -std::log(1 - 0.25) / 2);
     slab.scene.method = method;
     EXPECT_EQ(pickedIn(slab.volume, slab.scene, {2, 4, 1, 1}).size(), 1u) << nameOf(method);

@@ -65,10 +65,12 @@ TEST(PixelsToPick, AreARegularLatticeOfALargeArea) {
 }
 
 TEST(PickSamples, AreFewerForMorePixelsAndNeverMoreThan4096InAll) {
-  EXPECT_EQ(pickSamples(1), 64);
-  EXPECT_EQ(pickSamples(64), 64);
-  EXPECT_EQ(pickSamples(65), 32);
-  EXPECT_EQ(pickSamples(1024), 4);
+  EXPECT_EQ(pickSamplesSide(1), 8);
+  EXPECT_EQ(pickSamplesSide(64), 8);
+  EXPECT_EQ(pickSamplesSide(65), 4);
+  EXPECT_EQ(pickSamplesSide(256), 4);
+  EXPECT_EQ(pickSamplesSide(257), 2);
+  EXPECT_EQ(pickSamplesSide(1024), 2);
 }
 
 }  // namespace
