@@ -11,9 +11,6 @@ namespace {
 constexpr double kDisturbed = 2;
 /// Sizes that are nearer to each other say nothing of the slope.
 constexpr double kApart = 1.2;
-/// Most of the cost of the largest recent picture that is taken to be fixed: with more, a few disturbed
-/// passes would make large pictures look free.
-constexpr double kMostFixed = 0.5;
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
@@ -51,30 +48,27 @@ void PassCost::forgetContradicted() {
 }
 
 void PassCost::fit() {
-  std::vector<double> slopes, rests;
-  const Pass* largest = &passes_[0];
-  for (std::size_t i = 0; i < count_; ++i) {
-    const Pass& a = passes_[i];
-    if (a.pixels >= largest->pixels) largest = &a;
+  const auto medianOf = [&](auto&& value) {
+    std::vector<double> values;
+    for (std::size_t i = 0; i < count_; ++i) values.push_back(value(passes_[i]));
+    return median(std::move(values));
+  };
+  std::vector<double> slopes;
+  for (std::size_t i = 0; i < count_; ++i)
     for (std::size_t j = 0; j < i; ++j) {
-      const Pass& b = passes_[j];
+      const Pass &a = passes_[i], &b = passes_[j];
       if (std::max(a.pixels, b.pixels) >= kApart * std::min(a.pixels, b.pixels))
         slopes.push_back((a.seconds - b.seconds) / (a.pixels - b.pixels));
     }
+  // Passes of one size alone say nothing of the fixed part: it stays what it was, if they took so long.
+  if (slopes.empty()) {
+    fixed_ = std::min(fixed_, medianOf([](const Pass& pass) { return pass.seconds; }));
+  } else {
+    const double slope = std::max(median(std::move(slopes)), 0.0);
+    fixed_ = std::max(medianOf([&](const Pass& pass) { return pass.seconds - slope * pass.pixels; }), 0.0);
   }
-  // Passes of one size alone say nothing of the fixed part: it stays what it was.
-  if (!slopes.empty()) {
-    const double slope = std::max(median(slopes), 0.0);
-    for (std::size_t i = 0; i < count_; ++i) rests.push_back(passes_[i].seconds - slope * passes_[i].pixels);
-    fixed_ = median(rests);
-  }
-  std::vector<double> times;
-  for (std::size_t i = 0; i < count_; ++i)
-    if (passes_[i].pixels == largest->pixels) times.push_back(passes_[i].seconds);
-  fixed_ = std::clamp(fixed_, 0.0, kMostFixed * median(times));
-  std::vector<double> rates;
-  for (std::size_t i = 0; i < count_; ++i) rates.push_back((passes_[i].seconds - fixed_) / passes_[i].pixels);
-  perPixel_ = std::max(median(rates), 0.0);
+  perPixel_ =
+      std::max(medianOf([&](const Pass& pass) { return (pass.seconds - fixed_) / pass.pixels; }), 0.0);
 }
 
 void PassCost::add(std::uint64_t pixels, double seconds) {
@@ -84,6 +78,17 @@ void PassCost::add(std::uint64_t pixels, double seconds) {
   push(pass);
   forgetContradicted();
   fit();
+}
+
+double PassCost::largestPixels() const {
+  double largest = 0;
+  for (std::size_t i = 0; i < count_; ++i) largest = std::max(largest, passes_[i].pixels);
+  return largest;
+}
+
+bool PassCost::oneSize() const {
+  return count_ == kRecent && std::all_of(passes_.begin(), passes_.end(),
+                                          [&](const Pass& pass) { return pass.pixels == passes_[0].pixels; });
 }
 
 void PassCost::addUnfinished(std::uint64_t pixels, double seconds) {

@@ -21,6 +21,11 @@ class PassCost {
   bool known() const { return count_ > 0 || late_; }
   /// What is to be expected of a pass over `pixels`; 0 where nothing is known.
   double seconds(std::uint64_t pixels) const;
+  /// Of the largest recent picture; 0 where there is none. Beyond it the line is a guess.
+  double largestPixels() const;
+  /// Whether all passes that are remembered, as many as can be, were of one size: the fixed part is not
+  /// known.
+  bool oneSize() const;
   double fixedSeconds() const { return fixed_; }
   double secondsPerPixel() const { return perPixel_; }
 

@@ -11,14 +11,25 @@ namespace {
 constexpr double kDivisors[] = {1, 1.5, 2, 2.5, 3, 4, 6, 8, 12, kMostDivisor};
 /// Before anything is known, while edits arrive: a small pass tells.
 constexpr double kProbeDivisor = 4;
+/// Pixels of a picture over those of the next coarser one, at most; and a little.
+constexpr double kLargestStep = 2.3;
+/// A picture may take so much longer than the smallest could.
+constexpr double kOverFixed = 1.6;
 constexpr double kFiner = 0.8, kKept = 1.2;  ///< shares of the target at which the divisor changes
+
+double finerThan(double divisor) {
+  return *(std::lower_bound(std::begin(kDivisors), std::end(kDivisors), divisor) - 1);
+}
 
 double secondsOf(std::chrono::microseconds time) { return std::chrono::duration<double>(time).count(); }
 
 }  // namespace
 
 double divisorForTarget(std::uint64_t pixels, const PassCost& cost, double targetSeconds, double current) {
+  targetSeconds = std::max(targetSeconds, kOverFixed * cost.fixedSeconds());
+  const double most = kLargestStep * cost.largestPixels();
   for (const double divisor : kDivisors) {
+    if (current > 0 && most > 0 && double(pixels) / (divisor * divisor) > most) continue;
     const double share = current == 0 || divisor > current ? 1 : divisor < current ? kFiner : kKept;
     if (cost.seconds(std::uint64_t(std::ceil(double(pixels) / (divisor * divisor)))) <= targetSeconds * share)
       return divisor;
@@ -38,6 +49,15 @@ Scene atDivisor(Scene scene, double divisor) {
 void ResolutionPolicy::forget() {
   cost_[false] = cost_[true] = {};
   current_ = 0;
+  untilProbe_ = probeWait_ = kLeastWait;
+}
+
+/// Passes of one size do not tell what part of their cost is fixed. Then a finer one now and then does, ever
+/// more seldom while it turns out not to fit.
+bool ResolutionPolicy::probes(const PassCost& cost) {
+  if (current_ <= 1 || !cost.oneSize() || --untilProbe_ > 0) return false;
+  untilProbe_ = probeWait_ = std::min(2 * probeWait_, kMostWait);
+  return true;
 }
 
 double ResolutionPolicy::whileEdited(std::uint64_t pixels, int editedOthers) {
@@ -45,7 +65,10 @@ double ResolutionPolicy::whileEdited(std::uint64_t pixels, int editedOthers) {
   if (!cost.known()) return kProbeDivisor;
   // All that are edited together have two targets a round, so that the picture stays sharp when they are few.
   const auto target = std::max(2 * policy_.frameTarget / std::max(2, 1 + editedOthers), policy_.leastTarget);
-  return current_ = divisorForTarget(pixels, cost, secondsOf(target), current_);
+  const double divisor = divisorForTarget(pixels, cost, secondsOf(target), current_);
+  if (divisor < current_) untilProbe_ = probeWait_ = kLeastWait;
+  if (divisor == current_ && probes(cost)) return finerThan(current_);
+  return current_ = divisor;
 }
 
 double ResolutionPolicy::atRest(std::uint64_t pixels, std::optional<double> shown) const {

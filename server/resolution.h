@@ -29,7 +29,9 @@ inline constexpr double kMostDivisor = 16;
 
 /// The smallest of 1, 1.5, 2, 2.5, 3, 4, 6, 8, ... by which width and height must be divided so that a pass
 /// fits the target. `current`, that of the pass before (0: none), is kept until another fits clearly better:
-/// a picture that changes its resolution to and fro is worse than one that is a little late.
+/// a picture that changes its resolution to and fro is worse than one that is a little late. It is followed
+/// by none that is much larger than the largest whose cost is known. Where what all sizes cost alike is most
+/// of the target (the processors are others' too), small pictures bring nothing, and the target is more.
 double divisorForTarget(std::uint64_t pixels, const PassCost& cost, double targetSeconds, double current = 0);
 
 /// The scene for a smaller picture of the same view: its height divided and rounded up, its width the least
@@ -58,11 +60,16 @@ class ResolutionPolicy {
   double atRest(std::uint64_t pixels, std::optional<double> shown) const;
 
  private:
+  bool probes(const PassCost& cost);
   const PassCost& costOf(bool edited) const { return cost_[cost_[edited].known() ? edited : !edited]; }
 
   const RenderPolicy& policy_;
   PassCost cost_[2];
-  double current_ = 0;  ///< the last one while edits arrived; 0 before
+  static constexpr int kLeastWait = 8,
+                       kMostWait = 64;  ///< pictures from one that is finer on trial to the next
+
+  double current_ = 0;  ///< the last one while edits arrived, but on trial; 0 before
+  int untilProbe_ = kLeastWait, probeWait_ = kLeastWait;
 };
 
 }  // namespace scolopax::server

@@ -17,7 +17,6 @@ sys.path[:0] = [HERE, os.path.join(HERE, "../server")]
 import protocol_client  # noqa: E402
 import serving  # noqa: E402
 from common import DATA, SCENES, processor  # noqa: E402
-from sections import table  # noqa: E402
 
 SECONDS = float(os.environ.get("LATENCY_SECONDS", "6"))
 SIZE = 512
@@ -83,12 +82,13 @@ class Client:
             await self.wake.wait()
 
 
-async def measure(server, edit, rate, clients, shared, stalled):
+async def measure(server, edit, rate, clients, shared, stalled, size=(SIZE, SIZE)):
     """Rows of all clients. `shared`: all look at one session, which the first one edits."""
+    width, height = size
     sessions, viewers = [], []
     for _ in range(1 if shared else clients):
         status, session = protocol_client.call_json(
-            server, "POST", "/api/v1/sessions", {"scene": {"image": {"width": SIZE, "height": SIZE}}})
+            server, "POST", "/api/v1/sessions", {"scene": {"image": {"width": width, "height": height}}})
         if status != 201:
             raise AssertionError(session)
         sessions.append(session)
@@ -157,6 +157,8 @@ def main(out, counts):
 
 
 def report(path):
+    from sections import table  # which wants matplotlib, and measuring does not
+
     with open(path, encoding="utf-8") as file:
         measured = json.load(file)
     rows = [[str(r["clients"]) + (" of one session" if r["shared"] else ""), "one more" if r["stalled"] else "-",

@@ -65,11 +65,25 @@ TEST(PassCost, IsHardlyMovedByOneDisturbedPass) {
   EXPECT_NEAR(cost.seconds(120'000) / truth(120'000), 1, 0.1);
 }
 
-TEST(PassCost, DoesNotTakeLargePicturesToBeFreeBecauseASmallOneWasDisturbed) {
+TEST(PassCost, FindsThatAllSizesCostTheSame) {
   PassCost cost;
-  for (int i = 0; i < 6; ++i) cost.add(50'000, 0.02);
-  cost.add(20'000, 0.06);
-  EXPECT_GE(cost.seconds(200'000), 0.05);
+  for (int i = 0; i < 7; ++i) cost.add(3000, 0.02 + truth(3000));
+  cost.add(5000, 0.02 + truth(5000));  // one pass of another size is enough
+  EXPECT_NEAR(cost.fixedSeconds(), 0.0205, 1e-9);
+  EXPECT_NEAR(cost.seconds(50'000), 0.02 + truth(50'000), 1e-8);
+}
+
+TEST(PassCost, KnowsHowLargeRecentPicturesWereAndWhetherTheyTellTheFixedPart) {
+  PassCost cost;
+  EXPECT_EQ(cost.largestPixels(), 0);
+  cost.add(50'000, 0.01);
+  EXPECT_FALSE(cost.oneSize());
+  for (int i = 0; i < 7; ++i) cost.add(20'000, 0.01);
+  EXPECT_EQ(cost.largestPixels(), 50'000);
+  EXPECT_FALSE(cost.oneSize());
+  cost.add(20'000, 0.01);
+  EXPECT_EQ(cost.largestPixels(), 20'000);
+  EXPECT_TRUE(cost.oneSize());
 }
 
 TEST(PassCost, StaysWithinAThirdUnderNoiseAndSingleDisturbances) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <vector>
 
 namespace scolopax::server {
@@ -11,7 +12,7 @@ namespace {
 /// Of passes that cost so much by the pixel.
 PassCost costOf(double secondsPerPixel) {
   PassCost cost;
-  cost.add(1000, 1000 * secondsPerPixel);
+  cost.add(100'000, 100'000 * secondsPerPixel);
   return cost;
 }
 
@@ -68,11 +69,30 @@ constexpr std::uint64_t kPixels = 944 * 770;
 /// Of a ray 274 ns at 61 x 50 and 99 ns at 944 x 770.
 double measured(std::uint64_t pixels) { return 5.3e-4 + 0.98e-7 * double(pixels); }
 
-TEST(Resolution, ComesFromASmallPictureToTheOneThatFitsWithinThreePictures) {
+TEST(Resolution, ComesFromASmallPictureToTheOneThatFits) {
   ResolutionPolicy policy(kPolicy);
   policy.passDone(true, 61 * 50, measured(61 * 50));
   const auto divisors = drag(policy, kPixels, 20, [](std::uint64_t pixels, int) { return measured(pixels); });
-  EXPECT_EQ(std::vector<double>(divisors.begin() + 3, divisors.end()), std::vector<double>(17, 2.0));
+  for (std::size_t i = 6; i < divisors.size(); ++i) EXPECT_LE(divisors[i], 2) << i;
+}
+
+TEST(Resolution, IsNotSmallInVainWhereOthersUseTheProcessors) {
+  // Of a pass of any size, 18 or 30 ms are waiting for a processor.
+  for (const double waiting : {0.018, 0.030}) {
+    ResolutionPolicy policy(kPolicy);
+    drag(policy, kPixels, 40, [](std::uint64_t pixels, int) { return 0.1 + 1e-5 * double(pixels); });
+    const auto divisors =
+        drag(policy, kPixels, 100, [&](std::uint64_t pixels, int) { return waiting + measured(pixels); });
+    for (std::size_t i = 50; i < divisors.size(); ++i) EXPECT_LE(divisors[i], 4) << waiting << " " << i;
+  }
+}
+
+TEST(Resolution, TriesFinerPicturesSeldomWhereTheyDoNotFit) {
+  ResolutionPolicy policy(kPolicy);
+  const auto divisors =
+      drag(policy, kPixels, 600, [](std::uint64_t pixels, int) { return measured(pixels); });
+  EXPECT_LE(std::count_if(divisors.begin() + 12, divisors.end(), [](double d) { return d < 2; }), 14);
+  EXPECT_EQ(std::count_if(divisors.begin() + 12, divisors.end(), [](double d) { return d > 2; }), 0);
 }
 
 TEST(Resolution, IsBackWithinTwoPicturesOfADisturbance) {
@@ -90,7 +110,8 @@ TEST(Resolution, DoesNotAnswerSinglePassesThatWereDisturbed) {
   const auto divisors = drag(policy, kPixels, 60, [](std::uint64_t pixels, int i) {
     return measured(pixels) * (i % 5 == 4 ? 3 : 1);
   });
-  EXPECT_EQ(divisors, std::vector<double>(60, 2.0));
+  EXPECT_EQ(std::count_if(divisors.begin(), divisors.end(), [](double d) { return d > 2; }), 0);
+  EXPECT_GE(std::count(divisors.begin(), divisors.end(), 2.0), 55);
 }
 
 TEST(Resolution, FollowsTheSceneWhenItCostsTenTimesAsMuchAndBack) {
@@ -99,7 +120,7 @@ TEST(Resolution, FollowsTheSceneWhenItCostsTenTimesAsMuchAndBack) {
     return measured(pixels) * (i >= 10 && i < 20 ? 10 : 1);
   });
   for (int i = 12; i < 20; ++i) EXPECT_GE(divisors[std::size_t(i)], 6) << i;
-  for (int i = 25; i < 40; ++i) EXPECT_LE(divisors[std::size_t(i)], 2) << i;
+  for (int i = 27; i < 40; ++i) EXPECT_LE(divisors[std::size_t(i)], 2) << i;
 }
 
 TEST(Resolution, BeginsWithASmallPictureAndWithAWholeOneWhereNobodyEdits) {
