@@ -25,6 +25,16 @@ struct ColorKnot {
   bool operator==(const ColorKnot&) const = default;
 };
 
+/// Opacity by the magnitude of the gradient: |gradient| (data units per world unit) -> clamp((|gradient| -
+/// lo) / (hi - lo), 0, 1) -> a factor of the opacity, linear between knots and constant outside the first and
+/// last. Equal positions and ends are as in ChannelAppearance. The gradient is that of shading; where one of
+/// its differences is not finite the factor is 0.
+struct GradientOpacity {
+  double rangeLo = 0, rangeHi = 1;                  ///< data units per world unit
+  std::vector<OpacityKnot> factor{{0, 0}, {1, 1}};  ///< values in [0,1]
+  bool operator==(const GradientOpacity&) const = default;
+};
+
 /// How one channel looks. Scalar s (data units) -> clamp((s - lo) / (hi - lo), 0, 1)^gamma -> both curves,
 /// linear between knots and constant outside the first and last. Positions do not decrease; of two equal
 /// ones the later holds from there on. lo > hi reverses; lo == hi is a step: 0 below, 1 at lo and above.
@@ -37,6 +47,7 @@ struct ChannelAppearance {
   Material material{};
   std::vector<OpacityKnot> opacity{{0, 0}, {1, 1}};
   std::vector<ColorKnot> color{{0, {1, 1, 1}}};
+  std::optional<GradientOpacity> gradientOpacity;
   bool operator==(const ChannelAppearance&) const = default;
 };
 
