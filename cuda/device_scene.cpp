@@ -16,6 +16,11 @@ void DeviceScene::moveToDevice(kernel::CurveView<Value>* curve) {
   moveToDevice(&curve->buckets, std::size_t(kernel::kCurveBuckets + 1));
 }
 
+void DeviceScene::moveToDevice(kernel::OpticalCurveView* curve) {
+  moveToDevice(&curve->knots, std::size_t(curve->count));
+  moveToDevice(&curve->buckets, std::size_t(kernel::kCurveBuckets + 1));
+}
+
 DeviceScene::DeviceScene(const kernel::SceneView& host) : view_(host) {
   const glm::ivec3 dims = host.dims, cells = host.majorants.cells;
   const std::size_t voxels = std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z);
@@ -35,8 +40,10 @@ DeviceScene::DeviceScene(const kernel::SceneView& host) : view_(host) {
     channel.stride = 1;
     moveToDevice(&channel.opacity);
     moveToDevice(&channel.color);
-    moveToDevice(&channel.optical.knots, std::size_t(channel.optical.count));
-    moveToDevice(&channel.optical.buckets, std::size_t(kernel::kCurveBuckets + 1));
+    moveToDevice(&channel.optical);
+    if (channel.gradient.factor.count == 0) continue;
+    moveToDevice(&channel.gradient.factor);
+    moveToDevice(&channel.gradient.optical);
   }
   view_.channels = channels.data();
   moveToDevice(&view_.channels, channels.size());

@@ -20,6 +20,7 @@ class DeviceScene {
   void moveToDevice(const T** array, std::size_t count);
   template <class Value>
   void moveToDevice(kernel::CurveView<Value>* curve);
+  void moveToDevice(kernel::OpticalCurveView* curve);
 
   kernel::SceneView view_;
   std::vector<DeviceBuffer<std::byte>> buffers_;

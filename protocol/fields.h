@@ -88,6 +88,25 @@ struct Table<Light> {
 };
 
 template <>
+struct Table<GradientOpacity> {
+  static constexpr std::string_view title = "GradientOpacity";
+  static constexpr std::string_view doc =
+      "A factor of the opacity by the magnitude of the gradient: shows boundaries, hides what is "
+      "homogeneous.";
+  static constexpr auto fields = std::tuple{
+      field(
+          "range", &GradientOpacity::range,
+          "[lo, hi]: the magnitudes at positions 0 and 1 of the curve; those outside clamp to the ends. lo > "
+          "hi reverses, lo = hi is a step. null is chosen from the data that has opacity.",
+          {.unit = "data units per world unit"}),
+      field("points", &GradientOpacity::points,
+            "Control points [position, factor] over the range, as those of opacity; the factor multiplies "
+            "opacity.",
+            {.maxItems = kMaxControlPoints}),
+  };
+};
+
+template <>
 struct Table<Channel> {
   static constexpr std::string_view title = "Channel";
   static constexpr std::string_view doc = "How one channel of the data set looks.";
@@ -110,6 +129,8 @@ struct Table<Channel> {
             "Control points [position, value] over the range: linear between, constant outside; positions do "
             "not decrease, of two equal ones the later holds from there on.",
             {.maxItems = kMaxControlPoints}),
+      field("gradientOpacity", &Channel::gradientOpacity,
+            "Opacity by the magnitude of the gradient; null is opacity that does not depend on it."),
       field("gamma", &Channel::gamma, "The position is raised to this power before both curves are read.",
             {.above = 0, .atMost = 100}),
       field("density", &Channel::density, "Extinction where opacity is 1; null is chosen from the data.",

@@ -59,6 +59,10 @@ struct PatchValue<T> {
   }
 };
 
+/// An object that may be absent; null has been seen to before.
+template <Described T>
+struct PatchValue<std::optional<T>> : PatchValue<T> {};
+
 template <Described T>
 struct PatchValue<std::vector<T>> {
   static void apply(json& target, const json& patch, const Path& path, const Traits& traits,
@@ -132,6 +136,9 @@ template <Described T>
 struct Between<T> {
   static json of(const json& from, const json& to) { return between<T>(from, to); }
 };
+
+template <Described T>
+struct Between<std::optional<T>> : Between<T> {};
 
 template <Described T>
 struct Between<std::vector<T>> {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The scene as it is on the wire: all that a client can edit. Comes from JSON (scene_json.h, described by
-// fields.h); the server resolves it into what the renderer takes. An empty optional means automatic.
+// fields.h); the server resolves it into what the renderer takes. An empty optional means automatic, or that
+// there is none.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -34,6 +35,12 @@ struct Material {
   double shininess = 20;
 };
 
+/// Opacity by the magnitude of the gradient.
+struct GradientOpacity {
+  std::optional<std::array<double, 2>> range;
+  std::vector<ControlPoint> points{{0, 0}, {1, 1}};
+};
+
 struct Channel {
   std::optional<std::string> name;
   bool visible = true;
@@ -41,6 +48,7 @@ struct Channel {
   std::optional<std::string> color;  ///< "#rrggbb"; never together with colormap
   std::optional<Colormap> colormap;
   std::vector<ControlPoint> opacity{{0, 0}, {1, 1}};
+  std::optional<GradientOpacity> gradientOpacity;  ///< none: opacity does not depend on the gradient
   double gamma = 1;
   std::optional<double> density;
   double weight = 1;

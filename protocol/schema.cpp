@@ -111,6 +111,7 @@ Json valueSchema(Tag<std::vector<T>>, const Traits& traits, Writer& writer) {
 template <class T>
 Json valueSchema(Tag<std::optional<T>>, const Traits& traits, Writer& writer) {
   Json schema = valueSchema(Tag<T>{}, traits, writer);
+  if (schema.contains("$ref")) schema = Json{{"anyOf", Json::array({schema})}};
   if (schema.contains("anyOf"))
     schema["anyOf"].push_back({{"type", "null"}});
   else
@@ -196,6 +197,10 @@ template <Described T>
 void appendTableOf(Tag<T>, std::string& out, const Lists& lists);
 template <Described T>
 void appendTableOf(Tag<std::vector<T>>, std::string& out, const Lists& lists) {
+  appendTableOf(Tag<T>{}, out, lists);
+}
+template <Described T>
+void appendTableOf(Tag<std::optional<T>>, std::string& out, const Lists& lists) {
   appendTableOf(Tag<T>{}, out, lists);
 }
 

@@ -149,6 +149,15 @@ double queryNumber(const net::Request& request, std::string_view name) {
                           (text ? '"' + shortened(*text) + '"' : "none"));
 }
 
+bool queryFlag(const net::Request& request, std::string_view name) {
+  const std::string* text = request.queryValue(name);
+  if (!text || *text == "false") return false;
+  if (*text == "true") return true;
+  throw ProtocolError(
+      422, "",
+      "query parameter " + std::string(name) + ": expected true or false, found \"" + shortened(*text) + '"');
+}
+
 const ImageType* acceptedImageType(const std::string* accept) {
   if (!accept) return &kImageTypes[0];
   const ImageType* best = nullptr;

@@ -16,6 +16,7 @@
 #include "server/net/server.h"
 #include "server/session_store.h"
 #include "server/stream.h"
+#include "server/unmeasured.h"
 
 namespace scolopax::server {
 
@@ -38,7 +39,7 @@ struct ApiContext {
 struct Parameter {
   std::string name;
   std::string in;    ///< "path", "query" or "header"
-  std::string type;  ///< of JSON Schema: "string", "integer", "number"
+  std::string type;  ///< of JSON Schema: "string", "integer", "number", "boolean"
   std::string doc;
 };
 
@@ -78,6 +79,36 @@ nlohmann::json jsonBody(const net::Request& request, const Config& config, std::
 std::uint32_t queryUnsigned(const net::Request& request, std::string_view name, std::uint32_t fallback);
 /// Throws ProtocolError(422) also when absent.
 double queryNumber(const net::Request& request, std::string_view name);
+/// true or false; false when absent.
+bool queryFlag(const net::Request& request, std::string_view name);
+
+/// What work(stop) returns, which takes long: throws net::TakesLong where nothing may wait. `stop` is
+/// requested when the client has gone or the server ends; then Error(cancelled) becomes ProtocolError(503).
+template <class Work>
+auto inLongRequest(const ApiContext& context, const net::Request& request, Work&& work) {
+  if (!request.mayWait) throw net::TakesLong();
+  std::stop_source ended;
+  const auto end = [&ended] { ended.request_stop(); };
+  const std::stop_callback gone(request.gone, end);
+  const std::stop_callback ending(context.cutting, end);
+  try {
+    return work(ended.get_token());
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::cancelled) throw;
+    throw protocol::ProtocolError(
+        503, "", request.gone.stop_requested() ? "the client has gone" : "the server is stopping");
+  }
+}
+/// What work() returns; where it throws Unmeasured, in a long request, once that is measured.
+template <class Work>
+auto measuredIn(const ApiContext& context, const net::Request& request, Work&& work) {
+  try {
+    return work();
+  } catch (const Unmeasured&) {
+    return inLongRequest(context, request,
+                         [&](const std::stop_token& stop) { return whenMeasured(stop, work); });
+  }
+}
 
 struct ImageType {
   std::string_view format;     ///< "jpeg"

@@ -51,6 +51,26 @@ std::vector<Route> datasetRoutes(ApiContext& context) {
          return jsonResponse(200, histogramJson(*dataset(request), queryUnsigned(request, "channel", 0)));
        }},
       {"GET",
+       "/api/v1/datasets/{id}/gradient-histogram",
+       "Histogram of the magnitude of one channel's gradient",
+       {id,
+        {"channel", "query", "integer", "Index of the channel, from 0 (default)"},
+        {"joint", "query", "boolean", "Whether to tell it for every bin of values too; false when absent"}},
+       "",
+       kJson,
+       {},
+       [&context, dataset](const net::Request& request) {
+         const auto found = dataset(request);
+         const int channel = int(queryUnsigned(request, "channel", 0));
+         const bool joint = queryFlag(request, "joint");
+         auto gradients = context.datasets.gradients(*found, channel);
+         if (!gradients)
+           gradients = inLongRequest(context, request, [&](const std::stop_token& stop) {
+             return context.datasets.measuredGradients(*found, channel, stop);
+           });
+         return jsonResponse(200, gradientHistogramJson(*found, channel, *gradients, joint));
+       }},
+      {"GET",
        "/api/v1/datasets/{id}/probe",
        "The channels' values at a point",
        {id,

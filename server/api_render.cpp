@@ -110,6 +110,16 @@ ProtocolError tooLate(double limit, std::uint32_t samples) {
                            " samples done by then; ask for less, or set stop.seconds");
 }
 
+/// The scene of the body, once what it needs of the data is measured; that takes no longer than a render may.
+std::shared_ptr<const ResolvedScene> sceneOf(const ApiContext& context, const net::Request& request) {
+  const auto body = jsonBody(request, context.config);
+  const Ending ending(request.gone, context.cutting, context.config.maxRenderSeconds);
+  const auto scene = unlessStopped([&] { return context.renderResolver.replace(body, ending.token()); });
+  if (scene) return *scene;
+  checkWanted(context, request);
+  throw tooLate(context.config.maxRenderSeconds, 0);
+}
+
 /// FNV-1a, 64 bits, of the resolved scene's canonical text: equal pictures have equal hashes.
 std::string sceneHash(const ResolvedScene& scene) {
   std::uint64_t hash = 0xcbf29ce484222325u;
@@ -126,7 +136,7 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
                         "expected Accept to hold image/jpeg, image/png or image/x-exr, found " +
                             protocol::shortened(*request.header("accept")));
   const double limit = context.config.maxRenderSeconds;
-  const auto scene = context.renderResolver.replace(jsonBody(request, context.config));
+  const auto scene = sceneOf(context, request);
   if (scene->stop.seconds > limit)
     throw ProtocolError(422, "/stop/seconds",
                         "expected at most " + shortText(limit) + ", found " + shortText(scene->stop.seconds));

@@ -45,6 +45,14 @@ net::Response sceneResponse(const Session::SceneState& state) {
   return response;
 }
 
+/// Makes the edit, once what it needs of the data is measured.
+template <class Edit>
+net::Response edited(const ApiContext& context, const net::Request& request, Edit&& edit) {
+  const auto session = sessionOf(context, request);
+  const EditOrigin origin = originOf(request);
+  return sceneResponse(measuredIn(context, request, [&] { return edit(*session, origin); }));
+}
+
 net::Response create(ApiContext& context, const net::Request& request) {
   json scene = json::object();
   if (!request.body.empty()) {
@@ -54,7 +62,7 @@ net::Response create(ApiContext& context, const net::Request& request) {
       if (key != "scene") throw ProtocolError(422, "/" + shortened(key), "unknown field; expected scene");
     if (body.contains("scene")) scene = std::move(body["scene"]);
   }
-  const auto session = context.sessions.create(scene);
+  const auto session = measuredIn(context, request, [&] { return context.sessions.create(scene); });
   const auto state = session->scene();
   auto response = jsonResponse(201, {{"id", session->id()},
                                      {"token", session->token()},
@@ -214,7 +222,9 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
        {},
        [&context](const net::Request& request) {
          const json patch = jsonBody(request, context.config, kMergePatch);
-         return sceneResponse(sessionOf(context, request)->patch(patch, originOf(request)));
+         return edited(context, request, [&](Session& session, const EditOrigin& origin) {
+           return session.patch(patch, origin);
+         });
        }},
       {"PUT",
        scenePath,
@@ -225,7 +235,9 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
        {},
        [&context](const net::Request& request) {
          const json scene = jsonBody(request, context.config);
-         return sceneResponse(sessionOf(context, request)->replace(scene, originOf(request)));
+         return edited(context, request, [&](Session& session, const EditOrigin& origin) {
+           return session.replace(scene, origin);
+         });
        }},
       {"GET",
        "/api/v1/sessions/{id}/frame",

@@ -17,6 +17,7 @@
 #include "renderer/data/colormap.h"
 #include "server/api.h"
 #include "server/auth.h"
+#include "server/edit_queue.h"
 #include "server/loop_thread.h"
 #include "server/net/server.h"
 #include "server/render_loop.h"
@@ -82,6 +83,7 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
             {"renderSeconds", config.maxRenderSeconds},
             {"waitingPolls", Session::kMaxPolls},
             {"waitingPicks", Session::kMaxPicks},
+            {"waitingEdits", EditQueue::kMaxEdits},
             {"pickPixels", kMaxPickPixels}}}};
 }
 
@@ -117,7 +119,7 @@ struct Application::Impl {
         log(std::move(logLine)),
         makeRenderer(std::move(make)),
         memory(std::move(budget)),
-        datasets(std::make_shared<const DatasetStore>(std::move(loaded))),
+        datasets(std::make_shared<const DatasetStore>(std::move(loaded), memory)),
         sessionResolver(std::make_shared<const SceneResolver>(
             datasets, SceneResolver::Options{config.sessionSamples, config.maxPixels})),
         renderResolver(datasets, {config.renderSamples, config.maxPixels}),
@@ -130,7 +132,7 @@ struct Application::Impl {
         encodeLoop(
             sessions, now, log, background, [this] { encodeThread.wake(); }, memory),
         capabilities(capabilitiesJson(config, sessionResolver->lists())),
-        streams(sessions, metrics,
+        streams(sessions, background, metrics,
                 {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities}),
         context{config,  *datasets, renderResolver,      sessions,
                 streams, metrics,   makeRenderer,        memory,

@@ -17,6 +17,16 @@ namespace {
 
 using nlohmann::json;
 
+/// Throws ProtocolError(422) when there is none.
+const Channel& channelOf(const Dataset& dataset, int channel) {
+  const auto channels = dataset.volume->channels();
+  if (channel < 0 || std::size_t(channel) >= channels.size())
+    throw protocol::ProtocolError(422, "/channel",
+                                  "expected a channel from 0 to " + std::to_string(channels.size() - 1) +
+                                      ", found " + std::to_string(channel));
+  return channels[std::size_t(channel)];
+}
+
 json list(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
 
 double voxelValue(const Channel& channel, std::size_t index) {
@@ -46,7 +56,8 @@ double interpolate(const Channel& channel, const glm::ivec3& dims, const glm::dv
 
 }  // namespace
 
-DatasetStore::DatasetStore(std::vector<Dataset> datasets) {
+DatasetStore::DatasetStore(std::vector<Dataset> datasets, std::shared_ptr<MemoryBudget> memory)
+    : memory_(std::move(memory)) {
   for (Dataset& dataset : datasets) datasets_.push_back(std::make_shared<const Dataset>(std::move(dataset)));
   if (datasets_.empty()) throw Error(ErrorCode::badInput, "expected at least one data set, found none");
 }
@@ -55,6 +66,21 @@ std::shared_ptr<const Dataset> DatasetStore::find(std::string_view id) const {
   const auto found =
       std::find_if(datasets_.begin(), datasets_.end(), [&](const auto& d) { return d->id == id; });
   return found == datasets_.end() ? nullptr : *found;
+}
+
+DatasetStore::Gradients DatasetStore::gradients(const Dataset& dataset, int channel) const {
+  channelOf(dataset, channel);
+  const std::lock_guard lock(mutex_);
+  const auto known = gradients_.find({&dataset, channel});
+  return known == gradients_.end() ? nullptr : known->second;
+}
+
+DatasetStore::Gradients DatasetStore::measuredGradients(const Dataset& dataset, int channel,
+                                                        const std::stop_token& stop) const {
+  if (Gradients known = gradients(dataset, channel)) return known;
+  Gradients measured = sharedGradientHistogram(dataset.volume, channel, stop, memory_);
+  const std::lock_guard lock(mutex_);
+  return gradients_[{&dataset, channel}] = std::move(measured);
 }
 
 std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesystem::path>& paths,
@@ -97,12 +123,7 @@ json describeJson(const Dataset& dataset) {
 }
 
 json histogramJson(const Dataset& dataset, int channel) {
-  const auto channels = dataset.volume->channels();
-  if (channel < 0 || std::size_t(channel) >= channels.size())
-    throw protocol::ProtocolError(422, "/channel",
-                                  "expected a channel from 0 to " + std::to_string(channels.size() - 1) +
-                                      ", found " + std::to_string(channel));
-  const Channel& measured = channels[std::size_t(channel)];
+  const Channel& measured = channelOf(dataset, channel);
   const Histogram& histogram = measured.histogram;
   return {{"channel", channel},
           {"name", measured.name},
@@ -112,6 +133,25 @@ json histogramJson(const Dataset& dataset, int channel) {
           {"finiteCount", histogram.finiteCount},
           {"nonFiniteCount", histogram.nonFiniteCount},
           {"bins", histogram.bins}};
+}
+
+json gradientHistogramJson(const Dataset& dataset, int channel, const GradientHistogram& gradients,
+                           bool joint) {
+  const Channel& measured = channelOf(dataset, channel);
+  json told = {{"channel", channel},
+               {"name", measured.name},
+               {"unit", measured.unit},
+               {"maximum", gradients.maximum},
+               {"finiteCount", gradients.finiteCount},
+               {"nonFiniteCount", gradients.nonFiniteCount},
+               {"bins", gradients.bins()}};
+  if (joint) {
+    json& rows = told["joint"] = json::array();
+    constexpr auto kBins = std::ptrdiff_t(GradientHistogram::kBins);
+    for (auto row = gradients.counts.begin(); row != gradients.counts.end(); row += kBins)
+      rows.push_back(std::vector<std::uint64_t>(row, row + kBins));
+  }
+  return told;
 }
 
 json valuesJson(const Volume& volume, const glm::dvec3& voxel) {

@@ -2,30 +2,48 @@
 // The data sets named on the command line, loaded once, and what clients may ask about them.
 #pragma once
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json_fwd.hpp>
+#include <stop_token>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "renderer/core/memory_budget.h"
+#include "renderer/data/gradient_histogram.h"
 #include "renderer/io/format.h"
 
 namespace scolopax::server {
 
 using Dataset = io::LoadedDataset;
 
+/// Every function may be called from any thread.
 class DatasetStore {
  public:
-  /// At least one.
-  explicit DatasetStore(std::vector<Dataset> datasets);
+  /// At least one. What is measured later is of `memory`, if that is given.
+  explicit DatasetStore(std::vector<Dataset> datasets, std::shared_ptr<MemoryBudget> memory = nullptr);
 
   const std::shared_ptr<const Dataset>& first() const { return datasets_.front(); }
   /// nullptr when there is none of that id.
   std::shared_ptr<const Dataset> find(std::string_view id) const;
   const std::vector<std::shared_ptr<const Dataset>>& all() const { return datasets_; }
 
+  using Gradients = std::shared_ptr<const GradientHistogram>;
+  /// Of a channel of a data set of the store; nullptr where nobody has measured them yet. Throws
+  /// ProtocolError(422) when there is no such channel.
+  Gradients gradients(const Dataset& dataset, int channel) const;
+  /// The same, which waits until they are measured; they are kept. Throws also Error: cancelled once `stop`
+  /// is requested, busy and tooLarge where there is no memory for them.
+  Gradients measuredGradients(const Dataset& dataset, int channel, const std::stop_token& stop) const;
+
  private:
   std::vector<std::shared_ptr<const Dataset>> datasets_;
+  std::shared_ptr<MemoryBudget> memory_;
+  mutable std::mutex mutex_;  ///< never held while measuring
+  mutable std::map<std::pair<const Dataset*, int>, Gradients> gradients_;
 };
 
 /// The files to load: each path as it is, or, with a data root, below it. Throws Error when one leaves the
@@ -37,6 +55,9 @@ std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesys
 nlohmann::json describeJson(const Dataset& dataset);
 /// 256 bins over the finite values. Throws ProtocolError(422) when there is no such channel.
 nlohmann::json histogramJson(const Dataset& dataset, int channel);
+/// The same of |gradient|, from 0 on; with `joint` also for every bin of values.
+nlohmann::json gradientHistogramJson(const Dataset& dataset, int channel, const GradientHistogram& gradients,
+                                     bool joint);
 /// Data values of all channels at a voxel position in the box, trilinear between voxel centres as the
 /// renderer interpolates; null where a corner is not finite.
 nlohmann::json valuesJson(const Volume& volume, const glm::dvec3& voxel);

@@ -15,6 +15,7 @@
 #include "renderer/data/clip_view.h"
 #include "renderer/data/colormap.h"
 #include "renderer/data/defaults.h"
+#include "renderer/data/gradient_histogram.h"
 #include "renderer/data/image.h"
 #include "renderer/data/render_plan.h"
 #include "renderer/data/visible_hull.h"
@@ -106,6 +107,22 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
     look.material = {wire.material.ambient, wire.material.diffuse, wire.material.specular,
                      wire.material.shininess};
   }
+}
+
+/// Share of what has opacity whose gradients the automatic range holds.
+constexpr double kWithinRange = 0.995;
+
+/// Whether a patch, which has been applied, asks for a channel's automatic range of gradients anew.
+bool resetsGradientRange(const json& patch, std::size_t channel) {
+  const auto channels = patch.find("channels");
+  if (channels == patch.end()) return false;
+  if (!channels->is_object()) return true;  // other channels as a whole
+  const auto entry = channels->find(std::to_string(channel));
+  if (entry == channels->end()) return false;
+  if (!entry->is_object()) return true;
+  const auto curve = entry->find("gradientOpacity");
+  if (curve == entry->end()) return false;
+  return !curve->is_object() || (curve->contains("range") && (*curve)["range"].is_null());
 }
 
 /// Whether a patch asks for the view that is chosen automatically.
@@ -217,12 +234,47 @@ SceneResolver::SceneResolver(std::shared_ptr<const DatasetStore> datasets, Optio
     coarse_.emplace(dataset.get(), buildCoarseMacrocells(*dataset->volume));
 }
 
-SceneResolver::Framed SceneResolver::frame(const Dataset& dataset, const Scene& render) const {
+void SceneResolver::frame(const protocol::Scene& scene, ResolvedScene& result) const {
+  if (result.chosen.framed || (scene.camera.eye && scene.camera.target)) return;
+  std::vector<glm::vec3> hull;
   try {
-    return std::make_shared<const std::vector<glm::vec3>>(
-        visibleHull(*dataset.volume, coarse_.at(&dataset), render.channels));
+    hull = visibleHull(*result.dataset->volume, coarse_.at(result.dataset.get()), result.render.channels);
   } catch (const Error&) {  // what cannot be rendered is told when it is to be
-    return std::make_shared<const std::vector<glm::vec3>>();
+  }
+  result.chosen.framed = std::make_shared<const std::vector<glm::vec3>>(std::move(hull));
+}
+
+std::array<double, 2> SceneResolver::gradientRange(const ResolvedScene& scene, int channel) const {
+  const auto gradients = datasets_->gradients(*scene.dataset, channel);
+  if (!gradients)
+    throw Unmeasured([store = datasets_, dataset = scene.dataset, channel](const std::stop_token& stop) {
+      store->measuredGradients(*dataset, channel, stop);
+    });
+  double most = 0;
+  refuseAt("/channels/" + std::to_string(channel), [&] {
+    most = gradientQuantile(*gradients, scene.dataset->volume->channels()[std::size_t(channel)],
+                            scene.render.channels[std::size_t(channel)], kWithinRange);
+  });
+  return {0, most > 0 ? most : 1};  // flat: every range shows the same
+}
+
+void SceneResolver::resolveGradientOpacity(protocol::Scene& scene, ResolvedScene& result) const {
+  auto& ranges = result.chosen.gradientRanges;
+  ranges.resize(scene.channels.size());
+  for (std::size_t i = 0; i < scene.channels.size(); ++i) {
+    std::optional<protocol::GradientOpacity>& wire = scene.channels[i].gradientOpacity;
+    if (!wire || wire->range) {
+      ranges[i].reset();
+    } else {
+      if (!ranges[i]) ranges[i] = gradientRange(result, int(i));
+      wire->range = ranges[i];
+    }
+    if (!wire) continue;
+    GradientOpacity& look = result.render.channels[i].gradientOpacity.emplace();
+    look.rangeLo = (*wire->range)[0];
+    look.rangeHi = (*wire->range)[1];
+    look.factor.clear();
+    for (const auto& point : wire->points) look.factor.push_back({point.position, point.value});
   }
 }
 
@@ -240,22 +292,37 @@ std::shared_ptr<const Dataset> SceneResolver::datasetOf(const json& scene) const
   return dataset;
 }
 
-std::shared_ptr<const ResolvedScene> SceneResolver::replace(const json& scene) const {
+SceneResolver::Resolved SceneResolver::replaceNow(const json& scene) const {
   const auto count = datasetOf(scene)->volume->channels().size();
-  return resolve(protocol::applyPatch(json::object(), scene, count), nullptr);
+  return resolve(protocol::applyPatch(json::object(), scene, count), {});
 }
 
-std::shared_ptr<const ResolvedScene> SceneResolver::patch(const ResolvedScene& base,
-                                                          const json& patch) const {
+SceneResolver::Resolved SceneResolver::patchNow(const ResolvedScene& base, const json& patch) const {
   const bool namesDataset = patch.is_object() && patch.contains("dataset");
   const auto count = datasetOf(namesDataset ? patch : base.sparse)->volume->channels().size();
-  return resolve(protocol::applyPatch(base.sparse, patch, count), resetsView(patch) ? nullptr : &base);
+  json sparse = protocol::applyPatch(base.sparse, patch, count);
+  Chosen chosen = base.chosen;
+  if (resetsView(patch)) chosen.framed.reset();
+  for (std::size_t i = 0; i < chosen.gradientRanges.size(); ++i)
+    if (resetsGradientRange(patch, i)) chosen.gradientRanges[i].reset();
+  return resolve(std::move(sparse), chosen);
 }
 
-std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse, const ResolvedScene* base) const {
+SceneResolver::Resolved SceneResolver::replace(const json& scene, const std::stop_token& stop) const {
+  return whenMeasured(stop, [&] { return replaceNow(scene); });
+}
+
+SceneResolver::Resolved SceneResolver::patch(const ResolvedScene& base, const json& patch,
+                                             const std::stop_token& stop) const {
+  return whenMeasured(stop, [&] { return patchNow(base, patch); });
+}
+
+SceneResolver::Resolved SceneResolver::resolve(json sparse, const Chosen& chosen) const {
   protocol::Scene scene = protocol::parseScene(sparse, lists_);
   auto result = std::make_shared<ResolvedScene>();
   result->dataset = datasetOf(sparse);
+  if (chosen.dataset == result->dataset) result->chosen = chosen;
+  result->chosen.dataset = result->dataset;
   const Volume& volume = *result->dataset->volume;
   protocol::checkChannelCount(scene, volume.channels().size());
   if (std::uint64_t(scene.image.width) * scene.image.height > options_.maxPixels)
@@ -265,11 +332,9 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse, const R
   Scene& render = result->render;
   scene.dataset = result->dataset->id;
   resolveChannels(scene, render, volume);
-  if (base && base->dataset == result->dataset) result->framed = base->framed;
-  if (!result->framed && !(scene.camera.eye && scene.camera.target))
-    result->framed = frame(*result->dataset, render);
-  resolveCamera(scene, render, volume.grid(),
-                result->framed ? *result->framed : std::span<const glm::vec3>());
+  frame(scene, *result);
+  const auto& framed = result->chosen.framed;
+  resolveCamera(scene, render, volume.grid(), framed ? *framed : std::span<const glm::vec3>());
   resolveClipping(scene, render, volume);
   resolveLights(scene, render);
   render.blend = valueOf<BlendMode>(kBlendModes, scene.blend.mode);
@@ -285,6 +350,7 @@ std::shared_ptr<const ResolvedScene> SceneResolver::resolve(json sparse, const R
   render.height = int(scene.image.height);
   render.background = glm::vec3(linearOf(scene.image.background));
   render.filter = valueOf<PixelFilter>(kPixelFilters, scene.image.filter);
+  resolveGradientOpacity(scene, *result);  // late: what is refused anyway needs no measuring
   refuseAt("", [&] { checkScene(render, volume); });
   if (!scene.stop.samples && !scene.stop.seconds && !scene.stop.error)
     scene.stop.samples = options_.defaultSamples;

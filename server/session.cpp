@@ -33,13 +33,13 @@ Session::SceneState Session::scene() const {
 Session::SceneState Session::patch(const nlohmann::json& patch, const EditOrigin& origin) {
   const std::lock_guard lock(mutex_);
   checkRevision(origin);
-  return edit(resolver_->patch(*scene_, patch), origin);
+  return edit(resolver_->patchNow(*scene_, patch), origin);
 }
 
 Session::SceneState Session::replace(const nlohmann::json& scene, const EditOrigin& origin) {
   const std::lock_guard lock(mutex_);
   checkRevision(origin);
-  return edit(resolver_->replace(scene), origin);
+  return edit(resolver_->replaceNow(scene), origin);
 }
 
 void Session::checkRevision(const EditOrigin& origin) const {

@@ -17,7 +17,9 @@
 //     neither blocks nor calls back.
 //  7. An edit interrupts the running pass after it has changed the scene; RenderLoop takes the interruption
 //     back before it looks at any scene, so no edit is lost between the two.
-//  8. Waking a loop takes the loop's own, innermost mutex. The store's mutex is never held with a session's.
+//  8. Nobody measures data with the mutex held: an edit that needs that throws Unmeasured and changes
+//  nothing.
+//  9. Waking a loop takes the loop's own, innermost mutex. The store's mutex is never held with a session's.
 #pragma once
 #include <condition_variable>
 #include <deque>
@@ -117,8 +119,9 @@ class Session {
     std::uint32_t revision;
   };
   SceneState scene() const;
-  /// Applies a patch (a whole scene) at once and returns the new revision. Throws ProtocolError and
-  /// leaves the scene as it was when the result is not a scene.
+  /// Applies a patch (a whole scene) at once and returns the new revision. Throws and leaves the scene as it
+  /// was: ProtocolError when the result is not a scene, Unmeasured until what it needs of the data is
+  /// measured.
   SceneState patch(const nlohmann::json& patch, const EditOrigin& origin);
   SceneState replace(const nlohmann::json& scene, const EditOrigin& origin);
 

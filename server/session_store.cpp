@@ -13,8 +13,8 @@ SessionStore::SessionStore(std::shared_ptr<const SceneResolver> resolver, Option
     : resolver_(std::move(resolver)), options_(options), hooks_(std::move(hooks)) {}
 
 std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene) {
-  auto session =
-      std::make_shared<Session>(createToken(), createToken(), resolver_, resolver_->replace(scene), hooks_);
+  auto session = std::make_shared<Session>(createToken(), createToken(), resolver_,
+                                           resolver_->replaceNow(scene), hooks_);
   expire();
   const std::lock_guard lock(mutex_);
   if (sessions_.size() >= options_.maxSessions)

@@ -22,7 +22,8 @@ class SessionStore {
   };
   SessionStore(std::shared_ptr<const SceneResolver> resolver, Options options, SessionHooks hooks);
 
-  /// Throws ProtocolError: 503 when there are as many as there may be, 422 for a scene that is none.
+  /// Throws ProtocolError: 503 when there are as many as there may be, 422 for a scene that is none; and
+  /// Unmeasured until what the scene needs of the data is measured.
   std::shared_ptr<Session> create(const nlohmann::json& scene);
   /// nullptr when there is none.
   std::shared_ptr<Session> find(std::string_view id) const;

@@ -12,6 +12,7 @@
 #include "protocol/messages.h"
 #include "protocol/problem.h"
 #include "server/api.h"
+#include "server/edit_queue.h"
 
 namespace scolopax::server {
 
@@ -20,23 +21,31 @@ using protocol::ProtocolError;
 /// Text messages come one at a time, on any thread; frames from the encoder thread alone.
 class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
  public:
-  Stream(SessionStore& store, const protocol::Limits& limits, const nlohmann::json& capabilities,
-         const std::shared_ptr<net::WebSocket>& socket)
-      : store_(store), limits_(limits), capabilities_(capabilities), socket_(socket) {}
+  Stream(SessionStore& store, Background& background, const protocol::Limits& limits,
+         const nlohmann::json& capabilities, const std::shared_ptr<net::WebSocket>& socket)
+      : store_(store),
+        background_(background),
+        limits_(limits),
+        capabilities_(capabilities),
+        socket_(socket) {}
 
   void join(std::shared_ptr<Session> session) {
     sendText(protocol::helloText(capabilities_, session->id(), session->token()));
     session_ = std::move(session);
+    edits_ = std::make_shared<EditQueue>(background_);
     viewer_ = session_->addViewer(shared_from_this());
   }
 
   void leave() {
+    if (edits_) edits_->end();
+    edits_.reset();
     if (session_) session_->removeViewer(viewer_);
     if (const auto socket = socket_.lock()) socket->withdrawFrame();
     session_.reset();
   }
 
   void receive(const std::string& text) {
+    receivedBytes_ = text.size();
     try {
       std::visit([this](const auto& message) { handle(message); },
                  protocol::parseClientMessage(text, limits_));
@@ -91,8 +100,15 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
 
  private:
   void handle(const protocol::PatchMessage& message) {
+    const EditOrigin origin{viewer_, message.id, std::nullopt};
+    EditQueue::Edit edit;
+    edit.apply = [session = session_, patch = message.patch, origin] { session->patch(patch, origin); };
+    edit.failed = [stream = weak_from_this(), id = message.id](const std::exception_ptr& failure) {
+      if (const auto self = stream.lock()) self->refuse(id, failure);
+    };
+    edit.bytes = receivedBytes_;
     try {
-      session_->patch(message.patch, {viewer_, message.id, std::nullopt});
+      edits_->push(std::move(edit));
     } catch (const ProtocolError& error) {
       sendText(protocol::errorText(error, message.id));
     }
@@ -124,6 +140,19 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
     join(std::move(session));
   }
 
+  /// Tells why an edit was not made.
+  void refuse(std::uint32_t id, const std::exception_ptr& failure) {
+    try {
+      std::rethrow_exception(failure);
+    } catch (const ProtocolError& error) {
+      sendText(protocol::errorText(error, id));
+    } catch (const Error& error) {
+      sendText(protocol::errorText(ProtocolError(statusOf(error.code()), "", error.what()), id));
+    } catch (...) {
+      if (const auto socket = socket_.lock()) socket->close(1011, "the server failed");
+    }
+  }
+
   void sendPicked(std::uint32_t id, const PickAnswer& answer) {
     try {
       if (answer.failure) std::rethrow_exception(answer.failure);
@@ -140,11 +169,14 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   }
 
   SessionStore& store_;
+  Background& background_;
   const protocol::Limits& limits_;
   const nlohmann::json& capabilities_;
   const std::weak_ptr<net::WebSocket> socket_;
   std::shared_ptr<Session> session_;
   ViewerId viewer_ = 0;
+  std::shared_ptr<EditQueue> edits_;  ///< of this session
+  std::size_t receivedBytes_ = 0;     ///< of the message that is handled
   bool sizeNoticeSent_ = false;
   std::atomic<std::uint32_t> frameNumber_{0};
 
@@ -152,14 +184,14 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   std::uint64_t countedSent_ = 0, countedReplaced_ = 0;
 };
 
-StreamHub::StreamHub(SessionStore& store, Metrics& metrics, Options options)
-    : store_(store), metrics_(metrics), options_(std::move(options)) {}
+StreamHub::StreamHub(SessionStore& store, Background& background, Metrics& metrics, Options options)
+    : store_(store), background_(background), metrics_(metrics), options_(std::move(options)) {}
 
 StreamHub::~StreamHub() = default;
 
 net::WebSocketEvents StreamHub::join(const std::shared_ptr<Session>& session,
                                      const std::shared_ptr<net::WebSocket>& socket) {
-  auto stream = std::make_shared<Stream>(store_, options_.limits, options_.capabilities, socket);
+  auto stream = std::make_shared<Stream>(store_, background_, options_.limits, options_.capabilities, socket);
   {
     const std::lock_guard lock(mutex_);
     if (streams_.size() >= options_.maxClients)

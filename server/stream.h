@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "protocol/json_text.h"
+#include "server/background.h"
 #include "server/metrics.h"
 #include "server/net/web_socket.h"
 #include "server/session_store.h"
@@ -24,7 +25,8 @@ class StreamHub {
     protocol::Limits limits;
     nlohmann::json capabilities;  ///< for hello
   };
-  StreamHub(SessionStore& store, Metrics& metrics, Options options);
+  /// `background` measures what edits wait for.
+  StreamHub(SessionStore& store, Background& background, Metrics& metrics, Options options);
   ~StreamHub();
 
   /// Joins the socket to the session as a viewer and returns what its events do. Throws ProtocolError(503)
@@ -39,6 +41,7 @@ class StreamHub {
   void left(const Stream* stream);
 
   SessionStore& store_;
+  Background& background_;
   Metrics& metrics_;
   const Options options_;
   mutable std::mutex mutex_;

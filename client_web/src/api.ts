@@ -82,6 +82,11 @@ export const api = {
   datasets: async () => (await call<{ datasets: DatasetInfo[] }>('datasets')).datasets,
   histogram: (id: string, channel: number) =>
     call<Histogram>(`datasets/${seg(id)}/histogram?channel=${channel}`),
+  /** Of the gradient's magnitude. */
+  gradientHistogram: async (id: string, channel: number, signal: AbortSignal): Promise<Histogram> => {
+    const path = `datasets/${seg(id)}/gradient-histogram?channel=${channel}`;
+    return { minimum: 0, ...(await call<Omit<Histogram, 'minimum'>>(path, { signal })) };
+  },
   createSession: (scene?: JsonObject) =>
     call<SessionInfo>('sessions', {
       method: 'POST',

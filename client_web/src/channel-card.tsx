@@ -6,6 +6,7 @@ import type { Named } from './api';
 import { CurveEditor } from './curve-editor';
 import { Row, TextControl } from './controls';
 import { FieldControls } from './fields';
+import { GradientOpacity } from './gradient-opacity';
 import type { Channel } from './scene.generated';
 import type { Json } from './merge-patch';
 import { RangeEditor } from './range-editor';
@@ -13,7 +14,7 @@ import { fieldAt, leavesBelow, type Path } from './schema';
 import type { Store } from './store';
 
 /** Members that have an editor of their own here; all others get the schema's control. */
-const kSpecial = new Set(['name', 'visible', 'range', 'color', 'colormap', 'opacity']);
+const kSpecial = new Set(['name', 'visible', 'range', 'color', 'colormap', 'opacity', 'gradientOpacity']);
 const furtherFields = leavesBelow(['channels', 0])
   .map((path) => path.slice(2))
   .filter((path) => !kSpecial.has(String(path[0])));
@@ -105,12 +106,14 @@ export function ChannelCard({ store, index, open: openAtFirst }: { store: Store;
           />
           <h4>Opacity</h4>
           <CurveEditor
+            label={fieldAt(at('opacity')).label}
             curve={(channel.opacity ?? [[0, 0], [1, 1]]) as [number, number][]}
             range={range as [number, number]}
             histogram={histogram}
             paint={paint}
             onChange={(curve) => store.set(at('opacity'), curve as unknown as Json)}
           />
+          <GradientOpacity store={store} index={index} />
           <FieldControls store={store} paths={furtherFields.map((path) => ['channels', index, ...path])} />
         </div>
       )}

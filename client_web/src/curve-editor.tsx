@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// The opacity curve over the part of the histogram within the range. Points are dragged, added by a double
-// click or Enter, removed by a double click or Delete, and moved by the arrow keys.
+// A curve, such as the opacity's, over the part of the histogram within the range. Points are dragged, added by
+// a double click or Enter, removed by a double click or Delete, and moved by the arrow keys.
 import { useEffect, useRef } from 'preact/hooks';
-import { addPoint, evaluate, movePoint, pointAfter, removePoint, type Curve } from './curve';
+import { addPoint, evaluate, movePoint, pointAfter, removePoint, type Curve, type Point } from './curve';
 import { fractionIn, followPointer } from './drag';
 import { histogramPath, type Histogram } from './histogram';
 import { shortNumber } from './controls';
 
 interface Props {
+  /** What the curve tells: "Opacity". */
+  label: string;
   curve: Curve;
   range: readonly [number, number];
   histogram: Histogram | undefined;
@@ -23,7 +25,7 @@ const kSteps: Record<string, readonly [number, number]> = {
   ArrowDown: [0, -1],
 };
 
-export function CurveEditor({ curve, range, histogram, paint, onChange }: Props) {
+export function CurveEditor({ label, curve, range, histogram, paint, onChange }: Props) {
   const plot = useRef<HTMLDivElement>(null);
   const handles = useRef<(HTMLDivElement | null)[]>([]);
   const focusNext = useRef<number | undefined>(undefined);
@@ -73,6 +75,8 @@ export function CurveEditor({ curve, range, histogram, paint, onChange }: Props)
   );
   const line = corners.map((corner) => corner.join(',')).join(' ');
   const area = `polygon(0 100%, ${corners.map(([x, y]) => `${x}% ${y}%`).join(', ')}, 100% 100%)`;
+  const inWords = ([x, y]: Point) =>
+    `${label.toLowerCase()} ${shortNumber(y)} at ${shortNumber(range[0] + x * (range[1] - range[0]))}`;
 
   return (
     <div
@@ -93,13 +97,13 @@ export function CurveEditor({ curve, range, histogram, paint, onChange }: Props)
           class="handle"
           role="slider"
           tabIndex={0}
-          aria-label={`Opacity point ${index + 1} of ${curve.length}`}
+          aria-label={`${label} point ${index + 1} of ${curve.length}`}
           aria-orientation="vertical"
           aria-valuemin={0}
           aria-valuemax={1}
           aria-valuenow={y}
-          aria-valuetext={`opacity ${shortNumber(y)} at ${shortNumber(range[0] + x * (range[1] - range[0]))}`}
-          title={`opacity ${shortNumber(y)} at ${shortNumber(range[0] + x * (range[1] - range[0]))}`}
+          aria-valuetext={inWords([x, y])}
+          title={inWords([x, y])}
           style={{ left: `${x * 100}%`, bottom: `${y * 100}%` }}
           onPointerDown={(event) => {
             event.stopPropagation();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The range of data values that the curves span: two handles over the whole histogram, and two numbers.
+// The range of values that curves span: two handles over the whole histogram, and two numbers.
 import { useRef } from 'preact/hooks';
 import { NumberInput } from './controls';
 import { fractionIn, followPointer } from './drag';
@@ -24,6 +24,7 @@ export function RangeEditor({ field, range, histogram, onChange }: Props) {
   const plot = useRef<HTMLDivElement>(null);
   const latest = useRef(range);
   latest.current = range;
+  const name = field.label.toLowerCase();
   const [low, high] = plotDomain(range, histogram);
   const fraction = (value: number) => (value - low) / (high - low);
   const setEnd = (end: 0 | 1, value: number) => {
@@ -57,7 +58,7 @@ export function RangeEditor({ field, range, histogram, onChange }: Props) {
             class="range-handle"
             role="slider"
             tabIndex={0}
-            aria-label={end === 0 ? 'Lower end of the range' : 'Upper end of the range'}
+            aria-label={`${end === 0 ? 'Lower' : 'Upper'} end of the ${name}`}
             aria-valuemin={low}
             aria-valuemax={high}
             aria-valuenow={range[end]}
@@ -74,14 +75,14 @@ export function RangeEditor({ field, range, histogram, onChange }: Props) {
           <NumberInput
             key={end}
             field={{ ...field, kind: 'number', automatic: false }}
-            label={end === 0 ? 'Range from' : 'Range to'}
+            label={`${field.label} ${end === 0 ? 'from' : 'to'}`}
             value={range[end]}
             onChange={(value) => {
               if (value !== null) onChange(end === 0 ? [value, range[1]] : [range[0], value]);
             }}
           />
         ))}
-        <button class="quiet" type="button" title="Let the server choose the range" onClick={() => onChange(null)}>
+        <button class="quiet" type="button" title={`Let the server choose the ${name}`} onClick={() => onChange(null)}>
           auto
         </button>
       </div>

@@ -10,6 +10,7 @@ import { Edits } from './edits';
 import { EditWait } from './edit-wait';
 import type { FrameHeader } from './frame-header';
 import { FrameMeter } from './frame-meter';
+import { GradientHistograms } from './gradient-histograms';
 import { fitSize, type Size } from './image-size';
 import { isObject, patchAt, type Json, type JsonObject } from './merge-patch';
 import { cameraPatch, type Camera } from './orbit-camera';
@@ -29,6 +30,7 @@ export class Store {
   readonly datasets = new DatasetList();
   readonly frame = signal<FrameHeader | undefined>(undefined);
   readonly toasts = new ToastList();
+  readonly gradientHistograms = new GradientHistograms(api.gradientHistogram, (problem) => this.toasts.say(problem));
   readonly meter = new FrameMeter();
 
   /** Length of the volume's diagonal in world units: the scale of what is looked at. */

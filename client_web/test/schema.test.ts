@@ -40,6 +40,16 @@ describe('the schema', () => {
     expect(fieldAt(['crop', 'x'])).toMatchObject({ kind: 'vector', length: 2 });
   });
 
+  it('opens an object that may be null, and reads what its members are', () => {
+    const path = ['channels', 0, 'gradientOpacity'];
+    expect(fieldAt(path)).toMatchObject({ kind: 'object', automatic: true });
+    expect(fieldAt(path).doc.length).toBeGreaterThan(10);
+    expect(fieldAt([...path, 'range'])).toMatchObject({ kind: 'vector', length: 2, automatic: true, label: 'Range' });
+    expect(fieldAt([...path, 'range']).unit).not.toBe('');
+    expect(fieldAt([...path, 'points'])).toMatchObject({ kind: 'other', default: [[0, 0], [1, 1]] });
+    expect(sayPointer('/channels/0/gradientOpacity/range/1')).toBe('Channel 1, gradientOpacity, range, 1');
+  });
+
   it('takes choices from that list of the running server which has the names, else from itself', () => {
     const capabilities = {
       version: '1',

@@ -13,7 +13,6 @@
 namespace scolopax {
 namespace {
 
-constexpr std::size_t kBins = 256;
 constexpr std::size_t kQuantiles = 1025;
 constexpr std::size_t kSubset = std::size_t(1) << 20;
 
@@ -35,14 +34,6 @@ std::vector<std::uint64_t> countValues(std::span<const T> voxels) {
       });
 }
 
-std::size_t binOf(const Histogram& h, double value) {
-  // Halves first: the width of the range of two huge values would overflow.
-  const double width = 0.5 * h.maximum - 0.5 * h.minimum;
-  if (!(width > 0)) return 0;
-  const double at = (0.5 * value - 0.5 * h.minimum) / width * double(kBins);
-  return std::min(std::size_t(std::max(at, 0.0)), kBins - 1);
-}
-
 template <class T>
 void measureIntegers(std::span<const T> voxels, double slope, double intercept, Histogram& h) {
   const auto counts = countValues(voxels);
@@ -56,7 +47,7 @@ void measureIntegers(std::span<const T> voxels, double slope, double intercept, 
   h.finiteCount = voxels.size();
   h.minimum = valueAt(used.front());
   h.maximum = valueAt(used.back());
-  for (std::size_t i : used) h.bins[binOf(h, valueAt(i))] += counts[i];
+  for (std::size_t i : used) h.bins[h.binOf(valueAt(i))] += counts[i];
 
   h.quantiles.reserve(kQuantiles);
   std::size_t at = 0;
@@ -101,7 +92,7 @@ void measureFloats(std::span<const float> voxels, double slope, double intercept
   h.minimum = std::min(a, b);
   h.maximum = std::max(a, b);
   for (const float v : voxels)
-    if (std::isfinite(v)) ++h.bins[binOf(h, slope * double(v) + intercept)];
+    if (std::isfinite(v)) ++h.bins[h.binOf(slope * double(v) + intercept)];
 
   std::vector<double> subset;
   // An odd stride visits rows, columns and slices evenly.
@@ -120,7 +111,7 @@ void measureFloats(std::span<const float> voxels, double slope, double intercept
 
 Histogram measureHistogram(const VoxelBuffer& voxels, double slope, double intercept) {
   Histogram h;
-  h.bins.assign(kBins, 0);
+  h.bins.assign(Histogram::kBins, 0);
   visitScalarType(voxels.type(), [&](auto zero) {
     using T = decltype(zero);
     if constexpr (std::is_same_v<T, float>)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Distribution of a channel's data values: for the page's plot, and for default ranges and densities.
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -8,12 +9,22 @@
 namespace scolopax {
 
 struct Histogram {
+  static constexpr std::size_t kBins = 256;
+
   double minimum = 0, maximum = 0;  ///< of the finite values; both 0 when there is none
   std::uint64_t finiteCount = 0;
   std::uint64_t nonFiniteCount = 0;  ///< NaN and infinities
-  std::vector<std::uint64_t> bins;   ///< equal widths over [minimum, maximum]; 256 of them
+  std::vector<std::uint64_t> bins;   ///< kBins, of equal widths over [minimum, maximum]
   std::vector<double> quantiles;     ///< at i / (size - 1), from a fixed subset of at most 2^20 voxels
 
+  /// The bin of a finite value.
+  std::size_t binOf(double value) const {
+    // Halves first: the width of the range of two huge values would overflow.
+    const double width = 0.5 * maximum - 0.5 * minimum;
+    if (!(width > 0)) return 0;
+    const double at = (0.5 * value - 0.5 * minimum) / width * double(kBins);
+    return std::min(std::size_t(std::max(at, 0.0)), kBins - 1);
+  }
   /// Data value below which the fraction p in [0,1] of the voxels lies, by linear interpolation.
   double quantile(double p) const;
 };

@@ -28,11 +28,6 @@ ValueInterval widen(ValueInterval v) {
   return v;
 }
 
-/// Cells lie between voxel centres: their support is size + 1 voxels an edge.
-glm::ivec3 cellsOf(glm::ivec3 dims, int size) {
-  return glm::max(glm::ivec3(1), (dims - 1 + size - 1) / size);
-}
-
 void checkWanted(const std::stop_token& stop) {
   if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "the macrocells are not wanted any more");
 }
@@ -77,8 +72,12 @@ void measure(const StridedVoxels<T>& voxels, glm::ivec3 dims, const MacrocellGri
 
 }  // namespace
 
+glm::ivec3 macrocellsOf(glm::ivec3 dims, int size) {
+  return glm::max(glm::ivec3(1), (dims - 1 + size - 1) / size);
+}
+
 std::size_t intervalCount(const Volume& volume, int size) {
-  const glm::ivec3 cells = cellsOf(volume.grid().dims, size);
+  const glm::ivec3 cells = macrocellsOf(volume.grid().dims, size);
   return std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z) * volume.channels().size();
 }
 
@@ -86,7 +85,7 @@ MacrocellGrid buildMacrocells(const Volume& volume, int size, const std::stop_to
   const glm::ivec3 dims = volume.grid().dims;
   MacrocellGrid grid;
   grid.size = size;
-  grid.cells = cellsOf(dims, size);
+  grid.cells = macrocellsOf(dims, size);
   const std::size_t channels = volume.channels().size();
   grid.intervals.resize(grid.cellCount() * channels);
   for (std::size_t n = 0; n < channels; ++n) {

@@ -64,6 +64,10 @@ struct MacrocellGrid {
   }
 };
 
+/// How many macrocells of `size` voxels on an edge there are per axis. They lie between voxel centres: their
+/// support is size + 1 voxels an edge.
+glm::ivec3 macrocellsOf(glm::ivec3 dims, int size);
+
 /// Measures all channels. An interval covers the voxels whose interpolation reaches into the cell, from the
 /// last level at or below the least of them to the first at or above the largest. Every value is a level
 /// where a channel's intervals have no more than kMaxLevels ends; else one half of the levels divides the

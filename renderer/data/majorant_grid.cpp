@@ -68,6 +68,23 @@ void measureRadii(glm::ivec3 size, std::vector<std::uint8_t>& radii, std::vector
   }
 }
 
+/// `over` bounds a level, and two neighbouring levels and all between them.
+template <class Over>
+BoundTable tableOfLevels(const ValueLevels& levels, int column, Over&& over) {
+  BoundTable table{};
+  table.column = column;
+  const int count = int(levels.values.size());
+  for (int i = 0; i < count; ++i) {
+    const auto level = std::uint8_t(i), next = std::uint8_t(i + 1);
+    table.largest[0][i] = over(LevelInterval{level, level});
+    if (i + 1 < count) table.largest[1][i] = over(LevelInterval{level, next});
+  }
+  for (int row = 2; row < 9; ++row)
+    for (int i = 0, half = 1 << (row - 2); i + 2 * half < count; ++i)
+      table.largest[row][i] = std::max(table.largest[row - 1][i], table.largest[row - 1][i + half]);
+  return table;
+}
+
 const BoundTable* tableOf(const std::vector<BoundTable>& tables, int column) {
   const auto found =
       std::find_if(tables.begin(), tables.end(), [&](const BoundTable& t) { return t.column == column; });
@@ -77,18 +94,14 @@ const BoundTable* tableOf(const std::vector<BoundTable>& tables, int column) {
 }  // namespace
 
 BoundTable buildBounds(const ValueLevels& levels, const TransferFunction& transfer, int column) {
-  BoundTable table{};
-  table.column = column;
-  const int count = int(levels.values.size());
-  for (int i = 0; i < count; ++i) {
-    const auto level = std::uint8_t(i), next = std::uint8_t(i + 1);
-    table.largest[0][i] = transfer.majorant(levels.decode({level, level}));
-    if (i + 1 < count) table.largest[1][i] = transfer.majorant(levels.decode({level, next}));
-  }
-  for (int row = 2; row < 9; ++row)
-    for (int i = 0, half = 1 << (row - 2); i + 2 * half < count; ++i)
-      table.largest[row][i] = std::max(table.largest[row - 1][i], table.largest[row - 1][i + half]);
-  return table;
+  return tableOfLevels(levels, column, [&](kernel::LevelInterval interval) {
+    return transfer.majorant(levels.decode(interval));
+  });
+}
+
+BoundTable boundsOfExtinction(const ValueLevels& levels, int column) {
+  return tableOfLevels(levels, column,
+                       [&](kernel::LevelInterval interval) { return levels.values[interval.hi]; });
 }
 
 std::size_t MajorantGrid::sizeBytes(const MacrocellGrid& macrocells) {
@@ -100,7 +113,11 @@ std::size_t MajorantGrid::update(std::shared_ptr<const MacrocellGrid> macrocells
                                  std::vector<BoundTable> tables, bool sums, bool apart) {
   apart = apart || macrocells->levels.size() > kFewColumns;
   const bool newCells = macrocells != macrocells_;
-  const bool all = newCells || sums != sums_ || apart == active_.empty();
+  // Bits of channels count visible ones: where others are visible than before, all change.
+  const bool renumbered =
+      apart && !std::equal(tables.begin(), tables.end(), tables_.begin(), tables_.end(),
+                           [](const BoundTable& a, const BoundTable& b) { return a.column == b.column; });
+  const bool all = newCells || renumbered || sums != sums_ || apart == active_.empty();
   const CellBlocks blocks(macrocells->cells);
   std::vector<Change> changes;
   for (int column = 0; column < int(macrocells->levels.size()); ++column)
@@ -193,8 +210,8 @@ float MajorantGrid::totalOf(const LevelInterval* intervals) const {
 
 std::uint32_t MajorantGrid::activeOf(const LevelInterval* intervals) const {
   std::uint32_t active = 0;
-  for (const BoundTable& table : tables_)
-    if (table.over(intervals[table.column]) > 0.0f) active |= 1u << table.column;
+  for (std::size_t n = 0; n < tables_.size(); ++n)
+    if (tables_[n].over(intervals[tables_[n].column]) > 0.0f) active |= 1u << n;
   return active;
 }
 

@@ -14,6 +14,9 @@ namespace scolopax {
 /// <= over(the cell's interval), which is the least upper bound over the interval's stored values.
 kernel::BoundTable buildBounds(const ValueLevels& levels, const TransferFunction& transfer, int column);
 
+/// Bounds of a channel whose column of the macrocells has levels of the extinction itself.
+kernel::BoundTable boundsOfExtinction(const ValueLevels& levels, int column);
+
 class MajorantGrid {
  public:
   /// Takes over the visible channels' tables, in the order of the channels, and the macrocells they belong

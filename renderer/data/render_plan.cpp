@@ -20,7 +20,7 @@ static_assert(kMaxChannels <= kernel::kMaxVisibleChannels);
 /// Whether the same voxels have the same extinction: what bounds depend on.
 bool sameExtinction(const ChannelAppearance& a, const ChannelAppearance& b) {
   return a.rangeLo == b.rangeLo && a.rangeHi == b.rangeHi && a.gamma == b.gamma && a.density == b.density &&
-         a.opacity == b.opacity;
+         a.opacity == b.opacity && a.gradientOpacity == b.gradientOpacity;
 }
 
 /// Whether both scenes make the same film: everything but the background, which is added to the finished
@@ -86,11 +86,9 @@ glm::dvec3 withinReach(const glm::dvec3& voxel, const Grid& grid) {
 
 /// Lights to voxel space: those that shine, if there is anything that shows it.
 void placeLights(const Scene& scene, const Grid& grid, kernel::SceneView* view) {
-  const glm::dvec3 spacing = grid.spacing();
-  const double smallest = std::min({spacing.x, spacing.y, spacing.z});
-  const glm::dmat3 linear(grid.worldFromVoxel);
-  view->worldFromVoxel = glm::mat3(linear / smallest);
-  view->gradientFromVoxel = glm::mat3(glm::inverse(glm::transpose(linear / smallest)));
+  const double smallest = grid.smallestSpacing();
+  view->worldFromVoxel = glm::mat3(glm::dmat3(grid.worldFromVoxel) / smallest);
+  view->gradientFromVoxel = glm::mat3(grid.gradientFromVoxel());
   view->smallestSpacing = float(smallest);
   view->lightCount = 0;
   if (std::none_of(scene.channels.begin(), scene.channels.end(),
@@ -124,11 +122,77 @@ void checkImageSize(const Scene& scene) {
 bool RenderPlan::takesLong(const Scene& scene) const {
   // An edit may change the totals of all cells.
   constexpr std::size_t kManyIntervals = 4 << 20;
-  return !macrocells_ || macrocells_->size != scene.macrocell ||
-         macrocells_->intervals.size() > kManyIntervals;
+  if (!macrocells_ || macrocells_->size != scene.macrocell || macrocells_->intervals.size() > kManyIntervals)
+    return true;
+  for (std::size_t i = 0; i < scene.channels.size() && i < channels_.gradients.size(); ++i)
+    if (scene.channels[i].visible && scene.channels[i].gradientOpacity && !channels_.gradients[i])
+      return true;
+  return false;
 }
 
 bool RenderPlan::makesSamePicture(const Scene& scene) const { return scene_ && samePicture(*scene_, scene); }
+
+bool RenderPlan::ChannelPlan::visible(const ChannelAppearance& appearance) const {
+  return appearance.visible && !transfer.invisible() && !(factor && factor->isEverywhere(0));
+}
+
+/// None where it makes no difference.
+std::optional<GradientFactor> RenderPlan::factorOf(const Channel& channel,
+                                                   const ChannelAppearance& appearance) const {
+  if (!appearance.gradientOpacity) return std::nullopt;
+  GradientFactor factor(*appearance.gradientOpacity, channel, volume_->grid());
+  if (factor.isEverywhere(1) && channel.histogram.nonFiniteCount == 0) return std::nullopt;
+  return factor;
+}
+
+RenderPlan::Channels RenderPlan::planChannels(const Scene& scene, const MacrocellGrid& macrocells,
+                                              const std::stop_token& stop, RebuildStats* stats) const {
+  const bool newCells = &macrocells != macrocells_.get();
+  Channels next;
+  next.plans = channels_.plans;
+  next.plans.resize(scene.channels.size());
+  if (!newCells) next.gradients = channels_.gradients;
+  next.gradients.resize(scene.channels.size());
+  for (std::size_t i = 0; i < scene.channels.size(); ++i) {
+    const Channel& channel = volume_->channels()[i];
+    const ChannelAppearance& appearance = scene.channels[i];
+    std::optional<ChannelPlan>& plan = next.plans[i];
+    const bool stale = newCells || !scene_ || !sameExtinction(scene_->channels[i], appearance);
+    if (stale)
+      plan = {TransferFunction(channel, appearance), factorOf(channel, appearance), {}, {}};
+    else if (scene_->channels[i] != appearance)
+      plan->transfer = TransferFunction(channel, appearance);
+    if (!plan->visible(appearance)) continue;
+    if (!plan->bounds) {
+      plan->bounds = buildBounds(macrocells.levels[i], plan->transfer, int(i));
+      ++stats->majorantChannels;
+    }
+    next.visible.push_back(int(i));
+    if (!plan->factor) {
+      next.tables.push_back(*plan->bounds);
+      continue;
+    }
+    if (!next.gradients[i])
+      next.gradients[i] = sharedGradientCells(volume_, int(i), macrocells.size, stop, memory_);
+    if (!plan->column)
+      plan->column = std::make_shared<BoundColumn>(
+          buildBoundColumn(macrocells, int(i), *plan->bounds, *next.gradients[i], *plan->factor));
+    next.tables.push_back(
+        boundsOfExtinction(plan->column->levels, int(macrocells.levels.size() + next.columns.size())));
+    next.columns.push_back(plan->column);
+  }
+  return next;
+}
+
+/// Whether packets need to know every ray's channels: where channels hide each other, where clipping differs
+/// between channels or regions, where voxels are not finite, and where an extinction depends on more than a
+/// value, so that it may be 0 at both ends of a segment and not between them.
+bool RenderPlan::needsApart(const Scene& scene, const Channels& channels,
+                            const kernel::ClipView& clip) const {
+  const auto& all = volume_->channels();
+  return (!sumsExtinction(scene.blend) && all.size() > 1) || clip.parts || !channels.columns.empty() ||
+         std::any_of(all.begin(), all.end(), [](const Channel& c) { return c.histogram.nonFiniteCount > 0; });
+}
 
 RebuildStats RenderPlan::update(const Scene& scene, const std::stop_token& stop) {
   const auto start = std::chrono::steady_clock::now();
@@ -140,52 +204,43 @@ RebuildStats RenderPlan::update(const Scene& scene, const std::stop_token& stop)
   // Everything that can throw comes first and into new objects; the plan is replaced at the end.
   const bool newCells = !macrocells_ || macrocells_->size != scene.macrocell;
   const auto macrocells = newCells ? sharedMacrocells(volume_, scene.macrocell, stop, memory_) : macrocells_;
-  auto majorantMemory = MemoryBudget::take(memory_, MemoryUse::grids);
-  if (newCells) majorantMemory.resize(MajorantGrid::sizeBytes(*macrocells));
   if (newCells) stats.macrocellChannels = int(volume_->channels().size());
-  std::vector<std::optional<ChannelPlan>> plans = channels_;
-  plans.resize(scene.channels.size());
-  std::vector<kernel::ChannelView> views;
-  std::vector<int> visible;
-  std::vector<kernel::BoundTable> bounds;
-  for (std::size_t i = 0; i < scene.channels.size(); ++i) {
-    const ChannelAppearance& appearance = scene.channels[i];
-    std::optional<ChannelPlan>& plan = plans[i];
-    const bool stale = newCells || !scene_ || !sameExtinction(scene_->channels[i], appearance);
-    if (stale)
-      plan = {TransferFunction(volume_->channels()[i], appearance), {}};
-    else if (scene_->channels[i] != appearance)
-      plan->transfer = TransferFunction(volume_->channels()[i], appearance);
-    if (!appearance.visible || plan->transfer.invisible()) continue;
-    if (!plan->bounds) {
-      plan->bounds = buildBounds(macrocells->levels[i], plan->transfer, int(i));
-      ++stats.majorantChannels;
-    }
-    visible.push_back(int(i));
-    bounds.push_back(*plan->bounds);
-  }
-  const auto clip = clipView(scene.clip, scene.crop, volume_->grid(), visible);
+  Channels channels = planChannels(scene, *macrocells, stop, &stats);
+  const auto clip = clipView(scene.clip, scene.crop, volume_->grid(), channels.visible);
 
-  views.reserve(visible.size());
-  for (const int i : visible)
-    views.push_back(plans[std::size_t(i)]->transfer.view(volume_->channels()[std::size_t(i)]));
+  const std::size_t columnBytes = channels.columns.size() * macrocells->cellCount();
+  const std::size_t bytes = MajorantGrid::sizeBytes(*macrocells) +
+                            (columnBytes == 0 ? 0 : macrocells->sizeBytes() + 3 * columnBytes);
+  auto majorantMemory = MemoryBudget::take(memory_, MemoryUse::grids);
+  const bool otherMemory = bytes != majorantMemory_.bytes();
+  if (otherMemory) majorantMemory.resize(bytes);
+  const bool sameColumns = !newCells && channels.columns == channels_.columns;
+  auto bounded = sameColumns ? bounded_ : withColumns(macrocells, channels.columns);
+  std::vector<kernel::ChannelView> views;
+  views.reserve(channels.visible.size());
+  for (const int i : channels.visible) {
+    const ChannelPlan& plan = *channels.plans[std::size_t(i)];
+    views.push_back(plan.transfer.view(volume_->channels()[std::size_t(i)]));
+    if (plan.factor) views.back().gradient = plan.factor->view();
+  }
   std::optional<Scene> next = scene;
-  // Packets need to know every ray's channels where channels hide each other, where clipping differs between
-  // channels or regions, and where voxels are not finite.
-  const auto& all = volume_->channels();
-  const bool sums = sumsExtinction(scene.blend);
-  const bool apart =
-      (!sums && all.size() > 1) || (clip && clip->parts) ||
-      std::any_of(all.begin(), all.end(), [](const Channel& c) { return c.histogram.nonFiniteCount > 0; });
-  stats.majorantCells = majorants_.update(macrocells, std::move(bounds), sums, apart);
+  stats.majorantCells = majorants_.update(bounded, std::move(channels.tables), sumsExtinction(scene.blend),
+                                          needsApart(scene, channels, clip.value_or(kernel::ClipView{})));
 
   scene_ = std::move(next);
   macrocells_ = macrocells;
-  if (newCells) majorantMemory_ = std::move(majorantMemory);
-  channels_ = std::move(plans);
+  bounded_ = std::move(bounded);
+  if (otherMemory) majorantMemory_ = std::move(majorantMemory);
+  channels_ = std::move(channels);
   channelViews_ = std::move(views);
-  visibleChannels_ = std::move(visible);
+  fillView(scene, rays, clip);
+  stats.rebuildMs =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return stats;
+}
 
+void RenderPlan::fillView(const Scene& scene, const kernel::CameraRays& rays,
+                          const std::optional<kernel::ClipView>& clip) {
   placeLights(scene, volume_->grid(), &view_);
   view_.rays = rays;
   view_.width = scene.width;
@@ -199,9 +254,6 @@ RebuildStats RenderPlan::update(const Scene& scene, const std::stop_token& stop)
   view_.step = view_.smallestSpacing * float(scene.step);
   view_.stratum = stratumOf(scene.method);
   view_.majorants = majorants_.view();
-  stats.rebuildMs =
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-  return stats;
 }
 
 }  // namespace scolopax

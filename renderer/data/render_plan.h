@@ -8,6 +8,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "renderer/data/bound_columns.h"
 #include "renderer/data/majorant_grid.h"
 #include "renderer/renderer.h"
 
@@ -39,22 +40,41 @@ class RenderPlan {
   /// Valid until the next update.
   const kernel::SceneView& view() const { return view_; }
   /// Index in the volume of every channel of the view.
-  std::span<const int> visibleChannels() const { return visibleChannels_; }
+  std::span<const int> visibleChannels() const { return channels_.visible; }
 
  private:
   struct ChannelPlan {
     TransferFunction transfer;
-    std::optional<kernel::BoundTable> bounds;  // none as long as the channel has never been seen so
+    std::optional<GradientFactor> factor;
+    // None as long as the channel has not been visible with these curves.
+    std::optional<kernel::BoundTable> bounds;   // by value alone
+    std::shared_ptr<const BoundColumn> column;  // with the factor, if there is one
+    bool visible(const ChannelAppearance& appearance) const;
   };
+  /// Channels of a scene, and what bounds the visible ones.
+  struct Channels {
+    std::vector<std::optional<ChannelPlan>> plans;
+    std::vector<int> visible;
+    std::vector<kernel::BoundTable> tables;
+    std::vector<std::shared_ptr<const BoundColumn>> columns;
+    std::vector<std::shared_ptr<const GradientCells>> gradients;  // per channel, once they were needed
+  };
+  Channels planChannels(const Scene& scene, const MacrocellGrid& macrocells, const std::stop_token& stop,
+                        RebuildStats* stats) const;
+  std::optional<GradientFactor> factorOf(const Channel& channel, const ChannelAppearance& appearance) const;
+  bool needsApart(const Scene& scene, const Channels& channels, const kernel::ClipView& clip) const;
+  void fillView(const Scene& scene, const kernel::CameraRays& rays,
+                const std::optional<kernel::ClipView>& clip);
+
   std::shared_ptr<const Volume> volume_;
   const std::shared_ptr<MemoryBudget> memory_;
   std::optional<Scene> scene_;
   std::shared_ptr<const MacrocellGrid> macrocells_;
-  std::vector<std::optional<ChannelPlan>> channels_;
+  Channels channels_;
+  std::shared_ptr<const MacrocellGrid> bounded_;  // macrocells with the columns of channels
   MemoryBudget::Share majorantMemory_;
   MajorantGrid majorants_;
   std::vector<kernel::ChannelView> channelViews_;
-  std::vector<int> visibleChannels_;
   kernel::SceneView view_{};
 };
 

@@ -47,7 +47,7 @@ struct ChannelAppearance {
   Material material{};
   std::vector<OpacityKnot> opacity{{0, 0}, {1, 1}};
   std::vector<ColorKnot> color{{0, {1, 1, 1}}};
-  std::optional<GradientOpacity> gradientOpacity;
+  std::optional<GradientOpacity> gradientOpacity{};
   bool operator==(const ChannelAppearance&) const = default;
 };
 

@@ -11,14 +11,34 @@ namespace {
 
 struct Key {
   std::weak_ptr<const Volume> volume;  ///< tells a new volume at an old address from the old one
-  int size;
+  int size, channel;
 };
 struct KeyLess {
   bool operator()(const Key& a, const Key& b) const {
     if (a.size != b.size) return a.size < b.size;
+    if (a.channel != b.channel) return a.channel < b.channel;
     return a.volume.owner_before(b.volume);
   }
 };
+
+/// Runs build(stop) at low priority on as many threads as this one may use. `bytes` of the budget are its
+/// while it runs, then as many as the result has.
+template <class Result, class Build>
+auto measuring(const std::shared_ptr<MemoryBudget>& memory, std::size_t bytes, Build build) {
+  const int threads = tbb::this_task_arena::max_concurrency();  // as many as whoever asked first may have
+  return [=](const std::stop_token& abandoned) {
+    lowerThreadPriority();
+    auto share = MemoryBudget::take(memory, MemoryUse::grids, bytes);
+    Result result;
+    tbb::task_arena(threads, 1, tbb::task_arena::priority::low).execute([&] { result = build(abandoned); });
+    share.resize(result.sizeBytes());
+    return withShare(std::move(share), std::move(result));
+  };
+}
+
+std::size_t cellCount(const Volume& volume, int size) {
+  return intervalCount(volume, size) / volume.channels().size();
+}
 
 }  // namespace
 
@@ -26,25 +46,28 @@ std::shared_ptr<const MacrocellGrid> sharedMacrocells(const std::shared_ptr<cons
                                                       const std::stop_token& stop,
                                                       const std::shared_ptr<MemoryBudget>& memory) {
   static SharedBuilds<Key, MacrocellGrid, KeyLess> builds;
-  const int threads = tbb::this_task_arena::max_concurrency();  // as many as whoever asked first may have
-  return builds.get(
-      {volume, size},
-      [volume, size, threads, memory](const std::stop_token& abandoned) {
-        lowerThreadPriority();
-        const std::size_t intervals = intervalCount(*volume, size),
-                          cells = intervals / volume->channels().size();
-        // While one channel is measured, the ends of its intervals are floats.
-        auto share =
-            MemoryBudget::take(memory, MemoryUse::grids,
-                               intervals * sizeof(kernel::LevelInterval) + cells * sizeof(ValueInterval));
-        MacrocellGrid grid;
-        tbb::task_arena(threads, 1, tbb::task_arena::priority::low).execute([&] {
-          grid = buildMacrocells(*volume, size, abandoned);
-        });
-        share.resize(grid.sizeBytes());
-        return withShare(std::move(share), std::move(grid));
-      },
-      stop);
+  // While one channel is measured, the ends of its intervals are floats.
+  const std::size_t bytes = intervalCount(*volume, size) * sizeof(kernel::LevelInterval) +
+                            cellCount(*volume, size) * sizeof(ValueInterval);
+  return builds.get({volume, size, 0},
+                    measuring<MacrocellGrid>(memory, bytes,
+                                             [volume, size](const std::stop_token& abandoned) {
+                                               return buildMacrocells(*volume, size, abandoned);
+                                             }),
+                    stop);
+}
+
+std::shared_ptr<const GradientCells> sharedGradientCells(const std::shared_ptr<const Volume>& volume,
+                                                         int channel, int size, const std::stop_token& stop,
+                                                         const std::shared_ptr<MemoryBudget>& memory) {
+  static SharedBuilds<Key, GradientCells, KeyLess> builds;
+  const std::size_t bytes = cellCount(*volume, size) * (sizeof(std::uint8_t) + sizeof(ValueInterval));
+  return builds.get({volume, size, channel},
+                    measuring<GradientCells>(memory, bytes,
+                                             [volume, channel, size](const std::stop_token& abandoned) {
+                                               return buildGradientCells(*volume, channel, size, abandoned);
+                                             }),
+                    stop);
 }
 
 }  // namespace scolopax

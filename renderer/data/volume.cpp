@@ -99,6 +99,15 @@ glm::dvec3 Grid::spacing() const {
   return {glm::length(glm::dvec3(m[0])), glm::length(glm::dvec3(m[1])), glm::length(glm::dvec3(m[2]))};
 }
 
+double Grid::smallestSpacing() const {
+  const glm::dvec3 all = spacing();
+  return std::min({all.x, all.y, all.z});
+}
+
+glm::dmat3 Grid::gradientFromVoxel() const {
+  return glm::inverse(glm::transpose(glm::dmat3(worldFromVoxel) / smallestSpacing()));
+}
+
 double Grid::diagonal() const {
   const glm::dmat3 m(worldFromVoxel);
   const glm::dvec3 d(dims);

@@ -3,6 +3,7 @@
 // reference read it. Immutable once built: sessions share it as shared_ptr<const Volume>.
 #pragma once
 #include <cstddef>
+#include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
@@ -23,6 +24,9 @@ struct Grid {
   std::size_t voxelCount() const { return std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z); }
   /// Lengths of one voxel step along each axis, world units.
   glm::dvec3 spacing() const;
+  double smallestSpacing() const;
+  /// Takes changes per voxel step to gradients in world space, per smallest spacing.
+  glm::dmat3 gradientFromVoxel() const;
   /// Length of the box's longest diagonal, world units.
   double diagonal() const;
 };

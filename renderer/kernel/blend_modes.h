@@ -2,9 +2,8 @@
 // The blend modes: what N extinctions and colours at a point become. One struct each; data/method.h lists
 // them, trackers and shading ask only for what is declared here.
 #pragma once
-#include "renderer/kernel/classify.h"
 #include "renderer/kernel/clip.h"
-#include "renderer/kernel/sample_volume.h"
+#include "renderer/kernel/gradient.h"
 
 namespace scolopax::kernel {
 
@@ -13,13 +12,18 @@ namespace scolopax::kernel {
 struct Classified {
   float extinction, position;
 };
-SCOLOPAX_HD inline Classified classify(const SceneView& scene, int channel, glm::vec3 point,
-                                       SampleCost* cost) {
+SCOLOPAX_HD inline Classified classify(const SceneView& scene, int n, glm::vec3 point, SampleCost* cost) {
+  const ChannelView& channel = scene.channels[n];
   ++cost->fetches;
-  const float stored = sampleStored(scene.channels[channel], scene.dims, point);
+  const float stored = sampleStored(channel, scene.dims, point);
   if (!isFinite(stored)) return {0.0f, 0.0f};
-  const float position = curvePosition(scene.channels[channel], stored);
-  return {extinctionAt(scene.channels[channel], position), position};
+  const float position = curvePosition(channel, stored);
+  float extinction = extinctionAt(channel, position);
+  if (channel.gradient.factor.count != 0 && extinction > 0.0f) [[unlikely]] {
+    extinction *= gradientFactorAt(channel, scene.dims, point);
+    cost->fetches += gradientFetches(scene.dims);
+  }
+  return {extinction, position};
 }
 
 /// Which visible channels matter: all, and the loops over them need not ask; or some, by their bits.

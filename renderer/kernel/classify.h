@@ -38,29 +38,47 @@ SCOLOPAX_HD inline float curvePosition(const ChannelView& channel, float stored)
   return channel.gamma == 1.0f ? p : power(p, channel.gamma);
 }
 
+/// Positions beyond [0,1] are kept up to here where a stretch of a ray is taken to be linear.
+inline constexpr float kFarPosition = 1e6f;
+
 /// Extinction per world unit at a curve position.
 SCOLOPAX_HD inline float extinctionAt(const ChannelView& channel, float position) {
   return evaluate(channel.opacity, position) * channel.density;
 }
 
-/// Largest extinction over an interval of stored values, lo <= hi.
-SCOLOPAX_HD inline float largestExtinction(const ChannelView& channel, float lo, float hi) {
-  float a = curvePosition(channel, lo), b = curvePosition(channel, hi);
+/// Position on the factor's curve of |gradient| of stored values per smallest spacing.
+SCOLOPAX_HD inline float factorPosition(const GradientFactorView& gradient, float magnitude) {
+  return clamp((magnitude - gradient.origin) * gradient.scale + gradient.offset, 0.0f, 1.0f);
+}
+
+/// Largest value of the curve from position a to position b, in any order.
+SCOLOPAX_HD inline float largestBetween(const CurveView<float>& curve, float a, float b) {
   if (a > b) {
     const float other = a;
     a = b;
     b = other;
   }
-  if (channel.gamma != 1.0f) {  // the power function is within 2e-6 of monotone
-    a = clamp(a * (1.0f - 4e-6f), 0.0f, 1.0f);
-    b = clamp(b * (1.0f + 4e-6f), 0.0f, 1.0f);
-  }
-  const CurveView<float>& curve = channel.opacity;
   float largest = maximum(evaluate(curve, a), evaluate(curve, b));
   // Knots inside, and both sides of a jump at either end.
   for (int i = knotBefore(curve, a) + 1; i < curve.count && curve.positions[i] <= b; ++i)
     largest = maximum(largest, curve.values[i]);
-  return largest * channel.density;
+  return largest;
+}
+
+/// Largest extinction over an interval of stored values, lo <= hi, where the gradient's factor is 1.
+SCOLOPAX_HD inline float largestExtinction(const ChannelView& channel, float lo, float hi) {
+  float a = curvePosition(channel, lo), b = curvePosition(channel, hi);
+  if (channel.gamma != 1.0f) {  // the power function is within 2e-6 of monotone
+    const float least = minimum(a, b), most = maximum(a, b);
+    a = clamp(least * (1.0f - 4e-6f), 0.0f, 1.0f);
+    b = clamp(most * (1.0f + 4e-6f), 0.0f, 1.0f);
+  }
+  return largestBetween(channel.opacity, a, b) * channel.density;
+}
+
+/// Largest factor where |gradient| is from lo to hi, in stored values per smallest spacing.
+SCOLOPAX_HD inline float largestFactor(const GradientFactorView& gradient, float lo, float hi) {
+  return largestBetween(gradient.factor, factorPosition(gradient, lo), factorPosition(gradient, hi));
 }
 
 }  // namespace scolopax::kernel

@@ -15,6 +15,7 @@ namespace scolopax::kernel {
 inline constexpr int kMaxLevels = 256;
 
 /// What a sample of one channel can be in a macrocell: from level lo to level hi of the channel's, lo <= hi.
+/// Levels are of stored values or, where the extinction depends on more, of the extinction itself.
 struct LevelInterval {
   std::uint8_t lo, hi;
 };
@@ -59,8 +60,8 @@ struct MajorantView {
   const BoundTable* tables;  ///< per visible channel
   /// All cells outside these are empty: from filledLow up to below filledHigh. Whole blocks.
   glm::ivec3 filledLow, filledHigh;
-  /// Per cell: bit tables[n].column: visible channel n has a bound above 0. For processors that want to know
-  /// of several cells at once; null where the volume has few channels.
+  /// Per cell: bit n: visible channel n has a bound above 0. For processors that want to know of several
+  /// cells at once; null where the volume has few channels.
   const std::uint32_t* active;
 
   /// Bound of all visible channels together: of the sum of their extinctions, or, for blend modes that show

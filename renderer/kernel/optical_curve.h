@@ -3,8 +3,7 @@
 // taken to be linear, and a piecewise-linear curve of it is integrated exactly (pre-integration: Engel, Kraus
 // and Ertl 2001). What a stretch hides of itself is left out: colours count by their extinction alone.
 #pragma once
-#include "renderer/kernel/math.h"
-#include "renderer/kernel/views.h"
+#include "renderer/kernel/classify.h"
 
 namespace scolopax::kernel {
 
@@ -12,8 +11,8 @@ namespace scolopax::kernel {
 /// that leaves the range is cut where it does. With gamma it is clamped. NaN where the value is not finite.
 template <class Float>
 SCOLOPAX_LANES Float stretchPosition(const ChannelView& channel, Float stored) {
-  constexpr float kFar = 1e6f;
-  Float position = clamp((stored - channel.origin) * channel.scale + channel.offset, -kFar, kFar);
+  Float position =
+      clamp((stored - channel.origin) * channel.scale + channel.offset, -kFarPosition, kFarPosition);
   if (channel.gamma != 1.0f) position = power(clamp(position, 0.0f, 1.0f), channel.gamma);
   return select(isFinite(stored), position, Float(kNaN));
 }
@@ -171,26 +170,45 @@ SCOLOPAX_LANES void addLinear(const Optical<L>& a, const Optical<L>& b, typename
   if constexpr (kDetail >= Detail::moment)
     means->moment = means->moment + where(which, sixth * (left * s + right * e));
 }
+
+/// The same where the opacity is multiplied by what is linear from `first` to `second`; exact.
+template <Detail kDetail, class L>
+SCOLOPAX_LANES void addProduct(const Optical<L>& a, const Optical<L>& b, typename L::Float first,
+                               typename L::Float second, typename L::Float s, typename L::Float e,
+                               typename L::Mask which, PartOf<L>* means) {
+  using Float = typename L::Float;
+  // Simpson's rule, of up to a cubic.
+  const Float sixth = (e - s) * 0.166666667f;
+  const Float left = a.opacity * first, right = b.opacity * second;
+  const Float middle = (a.opacity + b.opacity) * (first + second);  // four times the product there
+  means->opacity = means->opacity + where(which, sixth * (left + middle + right));
+  if constexpr (kDetail >= Detail::emission)
+    for (int c = 0; c < 3; ++c)
+      means->emission[c] =
+          means->emission[c] +
+          where(which, sixth * (left * a.color[c] + middle * (0.5f * (a.color[c] + b.color[c])) +
+                                right * b.color[c]));
+  if constexpr (kDetail >= Detail::moment)
+    means->moment = means->moment + where(which, sixth * (left * s + middle * (0.5f * (s + e)) + right * e));
+}
 }  // namespace detail
 
-/// Means over positions from p to q, not NaN, of some lanes, the others having 0; positions may lie outside
-/// [0,1], where the curve is constant.
-template <Detail kDetail, class L>
-SCOLOPAX_LANES PartOf<L> meansBetween(const OpticalCurveView& curve, const CurvePoint<L>& p,
-                                      const CurvePoint<L>& q, typename L::Mask which) {
+/// Calls visit(a, b, piece, from, to, s, e, lanes) for every piece of the curve, piece `piece` between knots
+/// a and b, on the way from p to q, not NaN: positions `from` to `to` at places s to e of the way. Of some
+/// lanes; positions may lie outside [0,1], where the curve is constant.
+template <class L, class Visit>
+SCOLOPAX_LANES void forEachPiece(const OpticalCurveView& curve, const CurvePoint<L>& p,
+                                 const CurvePoint<L>& q, typename L::Mask which, Visit&& visit) {
   using Float = typename L::Float;
   using Int = typename L::Int;
   using Mask = typename L::Mask;
-  PartOf<L> means = noPart<L>();
   const Int same = firstIn(which, p.piece);
   if (!any(without(which, (p.piece == same) & (q.piece == same)))) {
     const int k = at(same, 0);
     const Knots<L> a = knotAt<L>(curve, k < 0 ? 0 : k);
     const Knots<L> b = knotAt<L>(curve, k < 0 ? 0 : k + 1 < curve.count ? k + 1 : k);
-    detail::addLinear<kDetail, L>(opticalIn<kDetail, L>(a, b, p.piece, p.position),
-                                  opticalIn<kDetail, L>(a, b, p.piece, q.position), Float(0.0f), Float(1.0f),
-                                  which, &means);
-    return means;
+    visit(a, b, p.piece, p.position, q.position, Float(0.0f), Float(1.0f), which);
+    return;
   }
   const Int last = curve.count - 1;
   const Float scale = 1.0f / (q.position - p.position);
@@ -204,14 +222,61 @@ SCOLOPAX_LANES PartOf<L> meansBetween(const OpticalCurveView& curve, const Curve
     const Knots<L> b = knotsAt<L>(curve, minimum(maximum(k + 1, Int(0)), last));
     const Float to = select(ends, q.position, select(up, b.position, a.position));
     const Float next = select(ends, Float(1.0f), clamp((to - p.position) * scale, place, 1.0f));
-    detail::addLinear<kDetail, L>(opticalIn<kDetail, L>(a, b, k, from), opticalIn<kDetail, L>(a, b, k, to),
-                                  place, next, on & (place < next), &means);
+    visit(a, b, k, from, to, place, next, on & (place < next));
     from = to;
     place = next;
     k = k + way;
     on = without(on, ends);
   }
+}
+
+/// Means from p to q, not NaN, of some lanes, the others having 0.
+template <Detail kDetail, class L>
+SCOLOPAX_LANES PartOf<L> meansBetween(const OpticalCurveView& curve, const CurvePoint<L>& p,
+                                      const CurvePoint<L>& q, typename L::Mask which) {
+  using Float = typename L::Float;
+  PartOf<L> means = noPart<L>();
+  forEachPiece<L>(curve, p, q, which,
+                  [&](const Knots<L>& a, const Knots<L>& b, typename L::Int piece, Float from, Float to,
+                      Float s, Float e, typename L::Mask on) SCOLOPAX_LANES_LAMBDA {
+                    detail::addLinear<kDetail, L>(opticalIn<kDetail, L>(a, b, piece, from),
+                                                  opticalIn<kDetail, L>(a, b, piece, to), s, e, on, &means);
+                  });
   return means;
+}
+
+/// The same where the opacity is multiplied by another curve, which goes from g to h meanwhile.
+template <Detail kDetail, class L>
+SCOLOPAX_LANES PartOf<L> meansOfProduct(const OpticalCurveView& curve, const CurvePoint<L>& p,
+                                        const CurvePoint<L>& q, const OpticalCurveView& factor,
+                                        const CurvePoint<L>& g, const CurvePoint<L>& h,
+                                        typename L::Mask which) {
+  using Float = typename L::Float;
+  using Int = typename L::Int;
+  using Mask = typename L::Mask;
+  PartOf<L> all = noPart<L>();
+  const auto addPiece = [&](const Knots<L>& first, const Knots<L>& second, Int piece, Float from, Float to,
+                            Float begin, Float end, Mask on) SCOLOPAX_LANES_LAMBDA {
+    const Float u = opticalIn<Detail::extinction, L>(first, second, piece, from).opacity;
+    const Float v = opticalIn<Detail::extinction, L>(first, second, piece, to).opacity;
+    on = on & ((u > 0.0f) | (v > 0.0f));
+    if (!any(on)) return;
+    const Float width = end - begin, way = q.position - p.position;
+    PartOf<L> means = noPart<L>();
+    forEachPiece<L>(
+        curve, pointOn<L>(curve, p.position + begin * way), pointOn<L>(curve, p.position + end * way), on,
+        [&](const Knots<L>& a, const Knots<L>& b, Int k, Float x, Float y, Float s, Float e,
+            Mask lanes) SCOLOPAX_LANES_LAMBDA {
+          detail::addProduct<kDetail, L>(opticalIn<kDetail, L>(a, b, k, x), opticalIn<kDetail, L>(a, b, k, y),
+                                         u + s * (v - u), u + e * (v - u), s, e, lanes, &means);
+        });
+    all.opacity = all.opacity + width * means.opacity;
+    if constexpr (kDetail >= Detail::emission) all.emission = all.emission + means.emission * width;
+    if constexpr (kDetail >= Detail::moment)
+      all.moment = all.moment + width * (begin * means.opacity + width * means.moment);
+  };
+  forEachPiece<L>(factor, g, h, which, addPiece);
+  return all;
 }
 
 }  // namespace scolopax::kernel

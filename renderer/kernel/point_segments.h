@@ -28,8 +28,7 @@ class PointSegments {
         offset_(offset),
         step_(step),
         cost_(cost),
-        walk_(rays, inside_, scene.majorants,
-              scene.clip.parts ? columnsOf(inside.channels) : Word(columnsOf(channels))) {
+        walk_(rays, inside_, scene.majorants, inside.channels & Word(channels)) {
     live_ = more_ = walk_.meets();
     counted_ = without(live_, live_);
     if (any(live_)) k_ = firstSegment(walk_.enter()) - 1;
@@ -50,10 +49,10 @@ class PointSegments {
       }
       const bool apart = scene_.majorants.active != nullptr;
       const Mask met = apart ? without(live_, met_ == Word(0u)) : live_;
-      const std::uint32_t wanted = apart ? channelsOf(unionOf(met_)) : channels_;
+      const std::uint32_t wanted = apart ? unionOf(met_) : channels_;
       if (last_ != k_ - 1) known_ = 0;
-      if ((wanted & ~known_) != 0) sample(start, wanted & ~known_, ends_.from);
-      sample(end, wanted, ends_.to);
+      if ((wanted & ~known_) != 0) sample(start, wanted & ~known_, ends_.from, ends_.gradientFrom);
+      sample(end, wanted, ends_.to, ends_.gradientTo);
       last_ = k_;
       known_ = wanted;
       segment = {start, end, wanted, met, apart, met_};
@@ -76,37 +75,13 @@ class PointSegments {
   SCOLOPAX_LANES void settle() {
     live_ = more_;
     for (std::uint32_t left = known_; left != 0; left &= left - 1)
-      ends_.from[std::countr_zero(left)] = ends_.to[std::countr_zero(left)];
+      ends_.passOn(scene_, std::countr_zero(left));
     taken_ = taken_ + onesOf(counted_);
     giveUp(live_ & (taken_ > kMaxSegments - 1));
   }
   SCOLOPAX_LANES void giveUp(Mask which) {
     cost_->truncated = maximum(cost_->truncated, Word(onesOf(which)));
     live_ = without(live_, which);
-  }
-
-  SCOLOPAX_LANES std::uint32_t columnsOf(std::uint32_t channels) const {
-    std::uint32_t columns = 0;
-    for (std::uint32_t left = channels; left != 0; left &= left - 1)
-      columns |= 1u << scene_.majorants.tables[std::countr_zero(left)].column;
-    return columns;
-  }
-  SCOLOPAX_LANES Word columnsOf(Word channels) const {
-    Word columns(0u);
-    for (std::uint32_t left = channels_; left != 0; left &= left - 1) {
-      const int n = std::countr_zero(left);
-      const Word bit(1u << n);
-      columns = columns | where((channels & bit) == bit, Word(1u << scene_.majorants.tables[n].column));
-    }
-    return columns;
-  }
-  SCOLOPAX_LANES std::uint32_t channelsOf(std::uint32_t columns) const {
-    std::uint32_t channels = 0;
-    for (std::uint32_t left = channels_; left != 0; left &= left - 1) {
-      const int n = std::countr_zero(left);
-      channels |= (columns >> scene_.majorants.tables[n].column & 1) << n;
-    }
-    return channels;
   }
 
   SCOLOPAX_LANES Float endOf(int segment) const {
@@ -150,15 +125,21 @@ class PointSegments {
     return k > 0 && any(live_ & (t < endOf(k - 1))) ? k - 1 : k;
   }
 
-  SCOLOPAX_LANES void sample(Float t, std::uint32_t channels, CurvePoint<L>* points) {
+  SCOLOPAX_LANES void sample(Float t, std::uint32_t channels, CurvePoint<L>* points, Float* gradients) {
     Float stored[kMaxVisibleChannels];
-    sampleChannels(scene_, channels, rays_.origin + t * rays_.direction, stored);
+    const typename L::Vec point = rays_.origin + t * rays_.direction;
+    sampleChannels(scene_, channels, point, stored);
+    unsigned fetches = unsigned(std::popcount(channels));
     for (std::uint32_t left = channels; left != 0; left &= left - 1) {
       const int n = std::countr_zero(left);
       const ChannelView& channel = scene_.channels[n];
       points[n] = pointOn<L>(channel.optical, stretchPosition(channel, stored[n]));
+      if (channel.gradient.factor.count != 0) [[unlikely]] {
+        findFactorPosition<L>(channel, scene_.dims, point, &gradients[n]);
+        fetches += gradientFetches(scene_.dims);
+      }
     }
-    cost_->fetches = cost_->fetches + Word(onesOf(live_)) * Word(unsigned(std::popcount(channels)));
+    cost_->fetches = cost_->fetches + Word(onesOf(live_)) * Word(fetches);
   }
 
   SegmentEnds<L>& ends_;

@@ -16,13 +16,13 @@ class PointWalk {
   using Word = typename L::Word;
   using Mask = typename L::Mask;
 
-  /// Only the part of the interval in which there are cells that are not empty. Where the grid has them, bits
-  /// of `columns` say which channels matter.
+  /// Only the part of the interval in which there are cells that are not empty. Where the grid has bits of
+  /// channels, those of `channels` matter.
   SCOLOPAX_LANES PointWalk(const RayOf<L>& rays, const IntervalOf<L>& inside, const MajorantView& grid,
-                           Word columns)
+                           Word channels)
       : rays_(rays), grid_(grid), inverseSize_(1.0f / grid.cellSize), end_(inside.exit) {
     enter_ = inside.enter;
-    columns_ = columns;
+    channels_ = channels;
     active_ = Word(0u);
     meets_ = inside.enter < inside.exit;
     for (int axis = 0; axis < 3; ++axis) {
@@ -49,7 +49,7 @@ class PointWalk {
   SCOLOPAX_LANES Float enter() const { return enter_; }
   /// Rays whose cell at enter() may have extinction.
   SCOLOPAX_LANES Mask full() const { return full_; }
-  /// Bits of the columns that may have extinction there; only where the grid has them.
+  /// Bits of the channels that may have extinction there; only where the grid has them.
   SCOLOPAX_LANES Word active() const { return active_; }
   /// Where the cells of enter(), or the cubes of empty blocks around them, end; infinite when nothing is
   /// left.
@@ -119,7 +119,7 @@ class PointWalk {
     code_ = Int(gather(grid_.totals, index));
     full_ = (code_ > Int(0)) & (Int(kEmptyCode) > code_);
     if (!grid_.active) return;
-    active_ = gather(grid_.active, index) & columns_;
+    active_ = gather(grid_.active, index) & channels_;
     full_ = without(full_, active_ == Word(0u));
   }
 
@@ -129,7 +129,7 @@ class PointWalk {
   Mask meets_, full_;
   Mask up_[3];
   Float inverse_[3], through_[3];
-  Word columns_, active_;
+  Word channels_, active_;
   Int code_;
   Int cell_[3], last_[3], next_[3];  // next: behind the plane through which a ray may leave
 };

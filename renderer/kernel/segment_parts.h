@@ -14,14 +14,35 @@ struct Blending {
   bool mixes;                                     ///< the largest extinction shows all colours, weighted
 };
 
-/// Part of a channel on a segment of some rays, as if it were alone; of the others nothing. Next to voxels
+/// Finds partAlone() where the opacity depends on the gradient, whose magnitude is linear on the segment too.
+template <Detail kDetail, class L>
+SCOLOPAX_LANES_RARE void findPartWithFactor(const ChannelView& channel, const SegmentEnds<L>& ends, int n,
+                                            const CurvePoint<L>& p, const CurvePoint<L>& q,
+                                            const typename L::Float& density, const typename L::Mask& which,
+                                            PartOf<L>* part) {
+  using Float = typename L::Float;
+  using Mask = typename L::Mask;
+  const OpticalCurveView& factor = channel.gradient.optical;
+  const Float from = ends.gradientFrom[n], to = ends.gradientTo[n];
+  const Mask known = from == from, other = to == to, some = which & (known | other);
+  *part = noPart<L>();
+  if (!any(some)) return;
+  const CurvePoint<L> g = pointOn<L>(factor, select(known, from, to)),
+                      h = pointOn<L>(factor, select(other, to, from));
+  *part = scaled(meansOfProduct<kDetail, L>(channel.optical, p, q, factor, g, h, some),
+                 select(known & other, density, 0.5f * density));
+}
+
+/// Part of channel n on a segment of some rays, as if it were alone; of the others nothing. Next to voxels
 /// that are not finite only the half of the segment that has a value counts.
 template <Detail kDetail, class L>
-SCOLOPAX_LANES PartOf<L> partAlone(const ChannelView& channel, CurvePoint<L> from, CurvePoint<L> to,
+SCOLOPAX_LANES PartOf<L> partAlone(const SceneView& scene, const SegmentEnds<L>& ends, int n,
                                    typename L::Mask which) {
   using Float = typename L::Float;
   using Mask = typename L::Mask;
+  const ChannelView& channel = scene.channels[n];
   const OpticalCurveView& curve = channel.optical;
+  CurvePoint<L> from = ends.from[n], to = ends.to[n];
   Float density(channel.density);
   if (!channel.finite) {
     const Mask known = from.position == from.position, other = to.position == to.position;
@@ -35,6 +56,11 @@ SCOLOPAX_LANES PartOf<L> partAlone(const ChannelView& channel, CurvePoint<L> fro
   const Mask outside = ((p <= curve.first) & (q <= curve.first)) | ((p >= curve.last) & (q >= curve.last));
   const Mask seen = without(which, outside);
   if (!any(seen)) return noPart<L>();
+  if (channel.gradient.factor.count != 0) [[unlikely]] {
+    PartOf<L> part;
+    findPartWithFactor<kDetail, L>(channel, ends, n, from, to, density, seen, &part);
+    return part;
+  }
   return scaled(meansBetween<kDetail, L>(curve, from, to, seen), density);
 }
 
@@ -51,18 +77,49 @@ struct Hidden {
 template <class L>
 struct Hidden<L, true> {};
 
-/// What a channel is at a place in [0,1] of a segment; of other rays anything.
-template <Detail kDetail, class L>
-SCOLOPAX_LANES Optical<L> opticalOn(const ChannelView& channel, const CurvePoint<L>& from,
-                                    const CurvePoint<L>& to, typename L::Float place,
-                                    typename L::Mask which) {
+/// Takes rays out of the mask on whose segment the factor of channel n may change.
+template <class L>
+SCOLOPAX_LANES_RARE void dropWhereFactorChanges(const ChannelView& channel, const SegmentEnds<L>& ends, int n,
+                                                typename L::Mask* straight) {
+  const OpticalCurveView& curve = channel.gradient.optical;
+  const CurvePoint<L> g = pointOn<L>(curve, ends.gradientFrom[n]), h = pointOn<L>(curve, ends.gradientTo[n]);
+  *straight = *straight & (g.piece == h.piece) &
+              (opticalAt<Detail::extinction, L>(curve, g, L::everywhere()).opacity ==
+               opticalAt<Detail::extinction, L>(curve, h, L::everywhere()).opacity);
+}
+
+/// Multiplies an opacity of channel n by its factor at a place in [0,1] of a segment.
+template <class L>
+SCOLOPAX_LANES_RARE void multiplyByFactor(const ChannelView& channel, const SegmentEnds<L>& ends, int n,
+                                          const typename L::Float& place, const typename L::Mask& which,
+                                          typename L::Float* opacity) {
+  using Float = typename L::Float;
   using Mask = typename L::Mask;
+  const Float from = ends.gradientFrom[n], to = ends.gradientTo[n];
+  const Mask known = from == from, other = to == to;
+  const Float g = select(known, from, to), h = select(other, to, from);
+  const OpticalCurveView& curve = channel.gradient.optical;
+  const CurvePoint<L> point = pointOn<L>(curve, g + place * (h - g));
+  const Float factor = opticalAt<Detail::extinction, L>(curve, point, which).opacity;
+  *opacity = where(known | other, *opacity * factor);
+}
+
+/// What channel n is at a place in [0,1] of a segment; of other rays anything.
+template <Detail kDetail, class L>
+SCOLOPAX_LANES Optical<L> opticalOn(const SceneView& scene, const SegmentEnds<L>& ends, int n,
+                                    typename L::Float place, typename L::Mask which) {
+  using Mask = typename L::Mask;
+  const ChannelView& channel = scene.channels[n];
+  const CurvePoint<L>& from = ends.from[n];
+  const CurvePoint<L>& to = ends.to[n];
   const Mask known = from.position == from.position, other = to.position == to.position;
   const CurvePoint<L> p = select(known, from, to), q = select(other, to, from);
   CurvePoint<L> point{p.position + place * (q.position - p.position), p.piece};
   if (any(without(which, p.piece == q.piece))) point = pointOn<L>(channel.optical, point.position);
   Optical<L> optical = opticalAt<kDetail, L>(channel.optical, point, which);
   optical.opacity = where(known | other, optical.opacity * channel.density);
+  if (channel.gradient.factor.count != 0) [[unlikely]]
+    multiplyByFactor<L>(channel, ends, n, place, which, &optical.opacity);
   return optical;
 }
 
@@ -87,7 +144,10 @@ SCOLOPAX_LANES typename L::Float compare(const SceneView& scene, bool mixes, con
   Mask bent = without(which, which);
   for (int n = 0; n < scene.channelCount; ++n) {
     if (!(segment.channels >> n & 1)) continue;
-    bent = bent | without(segment.of(scene, n), ends.from[n].piece == ends.to[n].piece);
+    Mask straight = ends.from[n].piece == ends.to[n].piece;
+    if (scene.channels[n].gradient.factor.count != 0) [[unlikely]]
+      dropWhereFactorChanges<L>(scene.channels[n], ends, n, &straight);
+    bent = bent | without(segment.of(n), straight);
     if constexpr (kDetail >= Detail::emission) hidden.of[n] = noPart<L>();
   }
   bent = bent & which;
@@ -102,17 +162,16 @@ SCOLOPAX_LANES typename L::Float compare(const SceneView& scene, bool mixes, con
     Optical<L> seen{};
     for (int n = 0; n < scene.channelCount; ++n) {
       if (!(segment.channels >> n & 1)) continue;
-      const Mask here = on & segment.of(scene, n);
+      const Mask here = on & segment.of(n);
       if (!any(here)) continue;
-      const ChannelView& channel = scene.channels[n];
-      const Optical<L> optical = opticalOn<kDetail, L>(channel, ends.from[n], ends.to[n], place, here);
+      const Optical<L> optical = opticalOn<kDetail, L>(scene, ends, n, place, here);
       const Mask larger = here & (optical.opacity > largest);
       largest = select(larger, optical.opacity, largest);
       if constexpr (kDetail >= Detail::emission) {
         winner = select(larger, Int(n), winner);
         seen.color = select(larger, optical.color, seen.color);
         if (mixes)
-          add<kDetail, L>(optical.opacity * share * channel.weight, optical.color, place, here,
+          add<kDetail, L>(optical.opacity * share * scene.channels[n].weight, optical.color, place, here,
                           &hidden.of[n]);
       }
     }
@@ -137,8 +196,7 @@ SCOLOPAX_LANES typename L::Float visitParts(const SceneView& scene, const Blend&
   if constexpr (Blend::kSums) {
     for (int n = 0; n < scene.channelCount; ++n) {
       if (!(segment.channels >> n & 1)) continue;
-      const PartOf<L> part =
-          partAlone<kDetail, L>(scene.channels[n], ends.from[n], ends.to[n], segment.of(scene, n));
+      const PartOf<L> part = partAlone<kDetail, L>(scene, ends, n, segment.of(n));
       extinction = extinction + part.opacity;
       visit(n, part);
     }
@@ -151,9 +209,9 @@ SCOLOPAX_LANES typename L::Float visitParts(const SceneView& scene, const Blend&
     for (int n = 0; n < scene.channelCount; ++n) {
       if (!(segment.channels >> n & 1)) continue;
       PartOf<L> part = noPart<L>();
-      const typename L::Mask alone = without(segment.of(scene, n), several);
+      const typename L::Mask alone = without(segment.of(n), several);
       if (any(alone)) {
-        part = partAlone<kDetail, L>(scene.channels[n], ends.from[n], ends.to[n], alone);
+        part = partAlone<kDetail, L>(scene, ends, n, alone);
         extinction = extinction + part.opacity;
         if (blend.mixes) part = scaled(part, Float(scene.channels[n].weight));
       }

@@ -3,19 +3,27 @@
 // their ends: what quadrature works on.
 #pragma once
 #include "renderer/kernel/cell_walk.h"
+#include "renderer/kernel/gradient.h"
 #include "renderer/kernel/optical_curve.h"
-#include "renderer/kernel/sample_volume.h"
 
 namespace scolopax::kernel {
 
 /// Segments after which a ray gives up and counts as truncated.
 inline constexpr int kMaxSegments = 1 << 20;
 
-/// Where a segment's ends lie on the curves of its channels. What variables index is in objects like this and
-/// nothing else is: a device keeps such objects in memory, all of them.
+/// Where a segment's ends lie on the curves of its channels, and |gradient| on those of its factor, of
+/// channels that have one; NaN where there is no finite value. What variables index is in objects like this
+/// and nothing else is: a device keeps such objects in memory, all of them.
 template <class L>
 struct SegmentEnds {
   CurvePoint<L> from[kMaxVisibleChannels], to[kMaxVisibleChannels];
+  typename L::Float gradientFrom[kMaxVisibleChannels], gradientTo[kMaxVisibleChannels];
+
+  /// The next segment of channel n begins where this one ends.
+  SCOLOPAX_LANES void passOn(const SceneView& scene, int n) {
+    from[n] = to[n];
+    if (scene.channels[n].gradient.factor.count != 0) gradientFrom[n] = gradientTo[n];
+  }
 };
 
 /// A segment of every ray.
@@ -27,13 +35,13 @@ struct Segment {
   std::uint32_t channels;        ///< bit n: channel n may have extinction for some ray; the others have none
   Mask live;                     ///< the other rays have ended
   bool apart;                    ///< rays differ in their channels: met says which
-  Word met;                      ///< bits of columns that may have extinction
+  Word met;                      ///< bit n: channel n may have extinction
 
   SCOLOPAX_LANES typename L::Float length() const { return end - start; }
   /// Rays for which channel n, one of `channels`, may have extinction.
-  SCOLOPAX_LANES Mask of(const SceneView& scene, int n) const {
+  SCOLOPAX_LANES Mask of(int n) const {
     if (L::kLanes == 1 || !apart) return live;
-    const Word bit(1u << scene.majorants.tables[n].column);
+    const Word bit(1u << n);
     return live & ((met & bit) == bit);
   }
   /// Rays for which more than one may have.
@@ -86,10 +94,10 @@ class CellSegments {
     for (int n = 0; n < scene_.channelCount; ++n) {
       if (!(has_ >> n & 1)) continue;
       if (known_ >> n & 1)
-        ends_.from[n] = ends_.to[n];
+        ends_.passOn(scene_, n);
       else
-        ends_.from[n] = sample(n, segment.start);
-      ends_.to[n] = sample(n, segment.end);
+        sample(n, segment.start, ends_.from, ends_.gradientFrom);
+      sample(n, segment.end, ends_.to, ends_.gradientTo);
     }
     known_ = has_;
     return true;
@@ -103,11 +111,16 @@ class CellSegments {
     return minimum(inside_.enter + (float(segment) + offset_) * step_, inside_.exit);
   }
 
-  SCOLOPAX_HD CurvePoint<One> sample(int n, float t) {
+  SCOLOPAX_HD void sample(int n, float t, CurvePoint<One>* points, float* gradients) {
     ++cost_->fetches;
     const ChannelView& channel = scene_.channels[n];
-    const float stored = sampleStored(channel, scene_.dims, ray_.origin + t * ray_.direction);
-    return pointOn<One>(channel.optical, stretchPosition(channel, stored));
+    const glm::vec3 point = ray_.origin + t * ray_.direction;
+    const float stored = sampleStored(channel, scene_.dims, point);
+    points[n] = pointOn<One>(channel.optical, stretchPosition(channel, stored));
+    if (channel.gradient.factor.count != 0) [[unlikely]] {
+      findFactorPosition<One>(channel, scene_.dims, point, &gradients[n]);
+      cost_->fetches += gradientFetches(scene_.dims);
+    }
   }
 
   SCOLOPAX_HD void enterCell() {

@@ -28,20 +28,10 @@ struct ToLight {
   typename L::Float distance;
 };
 
-template <class L>
-SCOLOPAX_LANES typename L::Vec product(const glm::mat3& m, const typename L::Vec& v) {
-  using Vec = typename L::Vec;
-  return Vec(m[0]) * v[0] + Vec(m[1]) * v[1] + Vec(m[2]) * v[2];
-}
 /// v times the matrix that takes voxel space to the world in units of the smallest spacing.
 template <class L>
 SCOLOPAX_LANES typename L::Vec toWorld(const SceneView& scene, const typename L::Vec& v) {
   return product<L>(scene.worldFromVoxel, v);
-}
-
-template <class Vec>
-SCOLOPAX_LANES auto largestComponent(const Vec& v) {
-  return maximum(maximum(maximum(v[0], -v[0]), maximum(v[1], -v[1])), maximum(v[2], -v[2]));
 }
 
 template <class L>
@@ -53,30 +43,6 @@ SCOLOPAX_LANES ToLight<L> toLight(const SceneView& scene, const LightView& light
   const Vec way = Vec(light.vector) - hit.point, world = toWorld<L>(scene, way);
   const Float distance = squareRoot(dot(world, world)) * scene.smallestSpacing;
   return {way * (1.0f / maximum(distance, kLeastNormal)), distance};
-}
-
-/// Gradient of one channel's stored values in world space, per smallest spacing: central differences of one
-/// voxel, one-sided at the border; zero where a value is not finite. Costs count for lanes in the mask.
-template <class L>
-SCOLOPAX_LANES typename L::Vec gradientAt(const SceneView& scene, const ChannelView& channel,
-                                          const typename L::Vec& point, typename L::Mask which,
-                                          CostOf<L>* cost) {
-  using Float = typename L::Float;
-  using Vec = typename L::Vec;
-  Vec perVoxel(0.0f);
-  for (int axis = 0; axis < 3; ++axis) {
-    if (scene.dims[axis] < 2) continue;
-    const float last = float(scene.dims[axis] - 1);
-    const Float at = clamp(point[axis], 0.0f, last);
-    Vec low = point, high = point;
-    low[axis] = maximum(at - 1.0f, 0.0f);
-    high[axis] = minimum(at + 1.0f, last);
-    cost->fetches = cost->fetches + typename L::Word(onesOf(which)) * 2u;
-    const Float difference = sampleStored(channel, scene.dims, high) - sampleStored(channel, scene.dims, low);
-    perVoxel[axis] = difference / (high[axis] - low[axis]);
-  }
-  const auto finite = isFinite(perVoxel[0]) & isFinite(perVoxel[1]) & isFinite(perVoxel[2]);
-  return select(finite, product<L>(scene.gradientFromVoxel, perVoxel), Vec(0.0f));
 }
 
 /// Which lights reach points, as the sums that every channel's material needs.
@@ -133,7 +99,9 @@ SCOLOPAX_LANES typename L::Vec lit(const SceneView& scene, const ChannelView& ch
 
   // In units of its largest component: stored values may be as large or small as floats can, and their
   // squares are not.
-  const Vec gradient = gradientAt<L>(scene, channel, hit.point, which, cost);
+  const Gradient<L> at = gradientAt<L>(channel, scene.dims, scene.gradientFromVoxel, hit.point);
+  cost->fetches = cost->fetches + typename L::Word(onesOf(which)) * gradientFetches(scene.dims);
+  const Vec gradient = select(at.finite, at.perSpacing, Vec(0.0f));
   const Float largest = largestComponent(gradient);
   Mask shaded = which & (largest > 0.0f);
   if (!any(shaded)) return unshaded;

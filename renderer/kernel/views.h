@@ -14,7 +14,7 @@ namespace scolopax::kernel {
 
 inline constexpr int kCurveBuckets = 256;
 
-/// Piecewise-linear curve over [0,1] with `count` >= 1 knots, constant outside the first and last.
+/// Piecewise-linear curve over [0,1], constant outside the first and last of its knots.
 template <class Value>
 struct CurveView {
   const float* positions;  ///< not decreasing
@@ -77,6 +77,14 @@ struct LightView {
 inline constexpr int kMaxLights = 8;
 inline constexpr int kMaxVisibleChannels = 32;
 
+/// Factor of the opacity by |gradient| of stored values per smallest spacing.
+struct GradientFactorView {
+  float origin, scale, offset;  ///< position = clamp((|gradient| - origin) * scale + offset, 0, 1)
+  CurveView<float> factor;      ///< no knots: opacity does not depend on the gradient
+  OpticalCurveView optical;     ///< the same, for quadrature
+  glm::mat3 fromVoxel;          ///< as SceneView::gradientFromVoxel
+};
+
 /// One channel: where its voxels are and how a stored value becomes extinction and colour.
 struct ChannelView {
   const void* voxels;  ///< of this channel and others of its type, interleaved
@@ -92,6 +100,7 @@ struct ChannelView {
   MaterialView material;
   float inverseRange;  ///< 1 / |hi - lo| of the range in stored values
   bool finite;         ///< all voxels are
+  GradientFactorView gradient;
 };
 
 struct SceneView {

@@ -8,8 +8,6 @@
 namespace scolopax::reference {
 namespace {
 
-constexpr double kNarrowest = 0x1p-44;  // of a bracket of a root
-
 using Row = std::array<double, Bernstein::kMaxDegree + 1>;
 
 /// Row n of Pascal's triangle.
@@ -61,13 +59,22 @@ Bernstein Bernstein::between(double begin, double end) const {
   return result;
 }
 
-void Bernstein::appendSignChanges(double noise, std::vector<double>& roots) const {
-  appendSignChanges(noise, 0, 1, roots);
+Bernstein Bernstein::derivative() const {
+  Bernstein result;
+  if (degree_ == 0) return result;
+  result.degree_ = degree_ - 1;
+  for (std::size_t k = 0; k < degree_; ++k) result.b_[k] = double(degree_) * (b_[k + 1] - b_[k]);
+  return result;
+}
+
+void Bernstein::appendSignChanges(double noise, std::vector<double>& roots, double narrowest) const {
+  appendSignChanges(noise, narrowest, 0, 1, roots);
 }
 
 /// Of a polynomial that is the part [begin, end] of another. No fewer changes of sign among coefficients than
 /// in the polynomial: where there is none, there is no root.
-void Bernstein::appendSignChanges(double noise, double begin, double end, std::vector<double>& roots) const {
+void Bernstein::appendSignChanges(double noise, double narrowest, double begin, double end,
+                                  std::vector<double>& roots) const {
   bool positive = false, negative = false;
   for (const double b : coefficients()) {
     positive = positive || b > noise;
@@ -75,15 +82,15 @@ void Bernstein::appendSignChanges(double noise, double begin, double end, std::v
   }
   if (!(positive && negative)) return;
   const double middle = 0.5 * (begin + end);
-  if (end - begin < kNarrowest) {
+  if (end - begin < narrowest) {
     roots.push_back(middle);
     return;
   }
   Bernstein left, right;
   splitAt(0.5, left, right);
-  left.appendSignChanges(noise, begin, middle, roots);
+  left.appendSignChanges(noise, narrowest, begin, middle, roots);
   if (std::abs(right.b_[0]) <= noise) roots.push_back(middle);  // on which neither half sees a change
-  right.appendSignChanges(noise, middle, end, roots);
+  right.appendSignChanges(noise, narrowest, middle, end, roots);
 }
 
 Bernstein Bernstein::operator*(const Bernstein& other) const {

@@ -93,6 +93,13 @@ double ChannelCurves::position(double scalar) const {
   return gamma_ == 1 ? p : std::pow(p, gamma_);
 }
 
+bool ChannelCurves::visibleBetween(double lo, double hi) const {
+  const auto [first, last] = std::minmax({pieceAt(position(lo)), pieceAt(position(hi))});
+  for (std::size_t i = first; i <= last; ++i)
+    if (pieces_[i].extinctionBegin > 0 || pieces_[i].extinctionEnd > 0) return true;
+  return false;
+}
+
 std::size_t ChannelCurves::pieceAt(double position) const {
   const auto next = std::upper_bound(pieces_.begin(), pieces_.end(), position,
                                      [](double p, const Piece& piece) { return p < piece.begin; });

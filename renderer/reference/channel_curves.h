@@ -33,6 +33,8 @@ class ChannelCurves {
   ChannelSample sample(std::size_t piece, double position) const;
   /// False when no scalar whatever has an extinction above 0.
   bool visible() const { return visible_; }
+  /// False when no scalar from `lo` to `hi` has.
+  bool visibleBetween(double lo, double hi) const;
   /// Largest component of any colour.
   double brightest() const { return brightest_; }
 

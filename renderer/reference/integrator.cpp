@@ -95,12 +95,17 @@ Integrator::Integrator(const Volume& volume, const Scene& scene, double toleranc
       throw Error(ErrorCode::badInput, "reference: a weight must be finite and not negative");
     ChannelCurves curves(appearance);
     if (!curves.visible()) continue;
+    std::optional<GradientFactor> factor;
+    if (appearance.gradientOpacity) {
+      factor.emplace(*appearance.gradientOpacity, glm::transpose(voxelFromWorld_));
+      if (!factor->visible()) continue;
+    }
     const double radiance = lighting_.brightest(appearance.material, curves.brightest());
     brightest_ =
         blend_ == BlendMode::mix ? brightest_ + appearance.weight * radiance : std::max(brightest_, radiance);
     channels_.push_back({int(n), ScalarField(volume.channels()[n], dims_), std::move(curves),
-                         appearance.weight, appearance.gamma != 1, appearance.material,
-                         std::abs(appearance.rangeHi - appearance.rangeLo)});
+                         appearance.weight, appearance.gamma != 1 || factor, appearance.material,
+                         std::abs(appearance.rangeHi - appearance.rangeLo), std::move(factor)});
   }
 }
 

@@ -31,9 +31,10 @@ struct RayResult {
 /// sigma_n L_n over it. Composite: every channel alone, colours added, transmittances multiplied.
 ///
 /// The ray is cut at every plane through voxel centres, inside each cell where a channel's scalar, there a
-/// cubic of t, takes a value at which its curves have a knot, and, in max and mix, where the largest
-/// extinction passes from one channel to another. Without light, no feature is narrower than the pieces that
-/// are left, and each is bisected until two Gauss rules agree.
+/// cubic of t, takes a value at which its curves have a knot, where opacity by the gradient has a kink or a
+/// jump (FactorAlong), and, in max and mix, where the largest extinction passes from one channel to another.
+/// Without light, no feature is narrower than the pieces that are left, and each is bisected until two Gauss
+/// rules agree.
 ///
 /// With shading it is cut as well where a normal flips, n.l or n.h passes zero or a fade saturates, and
 /// wherever a highlight would be narrower than a piece (LightCuts). Edges of shadows are left to bisection,

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
+#include <utility>
 
 namespace scolopax::reference {
 namespace {
@@ -21,7 +22,7 @@ struct Difference {
 using FourValues = std::array<double, 4>;
 
 /// Points between which the difference d has no extremum, ascending from 0 to 1: exactly so where it is a
-/// cubic; where gamma bends it, sixteen equal steps as well. None when a cubic has one sign throughout.
+/// cubic; where it is bent, sixteen equal steps as well. None when a cubic has one sign throughout.
 std::vector<double> bracketEnds(const FourValues& a, const FourValues& b, bool bent) {
   const double d0 = a[0] - b[0], d1 = a[1] - b[1], d2 = a[2] - b[2], d3 = a[3] - b[3];
   const double c1 = (-11 * d0 + 18 * d1 - 9 * d2 + 2 * d3) / 2,
@@ -114,17 +115,24 @@ void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, const Clippi
       if (!clipping.keeps(channel.number, middle)) continue;
       const auto corners = channel.field.corners(glm::ivec3(cell));
       if (!corners) continue;
-      stretch.channels.push_back({&channel, CellScalar(*corners, inCell(begin), inCell(end))});
-      for (const double value : channel.curves.breakpoints())
-        stretch.channels.back().scalar.appendCrossings(value, knots);
+      ChannelInCell here{&channel, CellScalar(*corners, inCell(begin), inCell(end))};
+      if (channel.factor) {
+        if (!channel.curves.visibleBetween(here.scalar.lower(), here.scalar.upper())) continue;
+        here.factor = channel.factor->along(channel.field, stretch.begin, stretch.end);
+        if (!here.factor) continue;
+        here.factor->appendCuts(knots);
+      }
+      for (const double value : channel.curves.breakpoints()) here.scalar.appendCrossings(value, knots);
+      stretch.channels.push_back(std::move(here));
     }
     std::sort(knots.begin(), knots.end());
     for (std::size_t j = 0; j + 1 < knots.size(); ++j) {
       if (!(knots[j] < knots[j + 1])) continue;
       for (ChannelInCell& channel : stretch.channels) {
         const ChannelCurves& curves = channel.channel->curves;
-        const double scalar = channel.scalar(0.5 * (knots[j] + knots[j + 1]));
-        channel.piece = curves.pieceAt(curves.position(scalar));
+        const double inside = 0.5 * (knots[j] + knots[j + 1]);
+        channel.piece = curves.pieceAt(curves.position(channel.scalar(inside)));
+        if (channel.factor) channel.factor->choosePieceAt(inside);
       }
       cuts = {knots[j], knots[j + 1]};
       if (handovers) appendHandovers(stretch, knots[j], knots[j + 1], cuts);

@@ -4,6 +4,7 @@
 #pragma once
 #include <functional>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "renderer/reference/cell_scalar.h"
 #include "renderer/reference/channel_curves.h"
 #include "renderer/reference/clipping.h"
+#include "renderer/reference/gradient_factor.h"
 #include "renderer/reference/ray_cells.h"
 #include "renderer/reference/scalar_field.h"
 
@@ -22,18 +24,22 @@ struct ActiveChannel {
   ScalarField field;
   ChannelCurves curves;
   double weight;  ///< in blend mode mix
-  bool bent;      ///< gamma is not 1: extinction is not a piecewise cubic along a ray
+  bool bent;      ///< by gamma or a factor: extinction is not a piecewise cubic along a ray
   Material material;
-  double range;  ///< |hi - lo|, data units
+  double range;                            ///< |hi - lo|, data units
+  std::optional<GradientFactor> factor{};  ///< of the opacity
 };
 
 /// A channel along one cell, and the piece of its curves that holds.
 struct ChannelInCell {
   const ActiveChannel* channel;
   CellScalar scalar;
+  std::optional<FactorAlong> factor{};
   std::size_t piece = 0;
   ChannelSample at(double u) const {
-    return channel->curves.sample(piece, channel->curves.position(scalar(u)));
+    ChannelSample sample = channel->curves.sample(piece, channel->curves.position(scalar(u)));
+    if (factor && sample.extinction > 0) sample.extinction *= (*factor)(u);
+    return sample;
   }
 };
 
@@ -41,7 +47,7 @@ struct ChannelInCell {
 struct Stretch {
   double length = 0;                    ///< world units
   glm::dvec3 begin{0}, end{0};          ///< voxel coordinates
-  std::vector<ChannelInCell> channels;  ///< those that are finite and not clipped here
+  std::vector<ChannelInCell> channels;  ///< those that are finite and not clipped or of factor 0 here
   glm::dvec3 point(double u) const { return begin + u * (end - begin); }
 };
 

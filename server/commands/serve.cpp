@@ -162,9 +162,9 @@ CLI::App* addServeCommand(CLI::App& root) {
   limit("max-sessions", config.maxSessions, "Sessions at once")->check(CLI::PositiveNumber);
   limit("max-clients", config.maxClients, "Streams at once")->check(CLI::PositiveNumber);
   limit("max-image", config.maxPixels, "Pixels of one picture")->check(CLI::PositiveNumber);
-  limit(
-      "max-memory", options->maxMemoryMebibytes,
-      "MiB of memory beside the volumes: films, pictures, encodings, macrocells; a quarter of the machine's")
+  limit("max-memory", options->maxMemoryMebibytes,
+        "MiB of memory beside the volumes: films, pictures, encodings, macrocells, histograms of gradients; "
+        "a quarter of the machine's")
       ->check(CLI::Range(std::uint64_t(64), std::uint64_t(1) << 32));
   limit("max-render-seconds", config.maxRenderSeconds, "Seconds of one POST /render")
       ->check(CLI::PositiveNumber);

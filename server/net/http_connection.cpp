@@ -290,12 +290,23 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
   awaitable<Response> handle(const Route& route, Request& request) {
     if (route.kind == RouteKind::quick) {
-      co_return co_await runOn<Response>(core_.workersFor(request.body.size()),
-                                         [&] { return core_.guarded(route.handler, request); });
+      bool takesLong = false;
+      const Handler quick = [&](const Request& asked) -> Response {
+        try {
+          return route.handler(asked);
+        } catch (const TakesLong&) {
+          takesLong = true;
+          return {};
+        }
+      };
+      Response response = co_await runOn<Response>(core_.workersFor(request.body.size()),
+                                                   [&] { return core_.guarded(quick, request); });
+      if (!takesLong) co_return response;
     }
     const SlowSlot slot(core_);
     if (!slot.taken()) co_return withRetry(core_.problem(503, "Too many long requests at once."));
     const ClientWatch watch(transport_.socket());
+    request.mayWait = true;
     request.gone = watch.gone();
     co_return co_await runOn<Response>(core_.slowWorkers,
                                        [&] { return core_.guarded(route.handler, request); });

@@ -28,7 +28,9 @@ struct Request {
   std::string body;                  ///< whole and within the limit; empty in authorize and upgrades
   std::vector<std::string> matches;  ///< regex groups of the route; [0] is the whole path
   std::string remoteAddress;         ///< numeric, without the port
-  /// For RouteKind::slow: requested when the client has closed without waiting for the answer.
+  /// Whether the handler runs where it may wait: RouteKind::slow, or after TakesLong.
+  bool mayWait = false;
+  /// Where it may wait: requested when the client has closed without waiting for the answer.
   std::stop_token gone;
 
   /// First header (query value) of that name, or nullptr.
@@ -44,6 +46,10 @@ struct Response {
       headers;                            ///< further ones; lengths are the server's business
   std::shared_ptr<const void> keep = {};  ///< what lives until the answer has been sent
 };
+
+/// What the handler of a quick route throws, before it has changed anything, for a request that takes long:
+/// it is called again where it may wait.
+struct TakesLong {};
 
 /// Runs on a worker thread. What it throws becomes a 500 that says nothing about the cause, and a log line.
 using Handler = std::function<Response(const Request&)>;

@@ -65,6 +65,7 @@ struct Options {
 void checkTlsFiles(const std::string& certificateFile, const std::string& keyFile);
 
 /// slow: may wait or compute for long (long poll, render); has threads of its own, so that it delays nobody.
+/// quick: may not, but for single requests (TakesLong).
 enum class RouteKind { quick, slow };
 
 class Server {

@@ -104,6 +104,28 @@ TEST(ApplyPatch, RefusesIndicesThatAreNone) {
   EXPECT_EQ(refusedAt("{}", R"({"channels": [{}, {}, {}, {}, {}]})"), "/channels/4");
 }
 
+TEST(ApplyPatch, MergesAnObjectThatMayBeAbsent) {
+  const auto edited = [](const char* channel, const char* patch) {
+    const json scene{{"channels", {json::parse(channel)}}};
+    return applyPatch(scene, {{"channels", {{"0", {{"gradientOpacity", json::parse(patch)}}}}}},
+                      kChannels)["channels"][0]["gradientOpacity"];
+  };
+  const char* set = R"({"gradientOpacity": {"range": [1, 2], "points": [[0, 1]]}})";
+  EXPECT_EQ(edited("{}", "{}"), json::object());
+  EXPECT_EQ(edited("{}", R"({"range": [1, 2]})"), json::parse(R"({"range": [1, 2]})"));
+  EXPECT_EQ(edited(set, R"({"range": [3, 4]})"), json::parse(R"({"range": [3, 4], "points": [[0, 1]]})"));
+  EXPECT_EQ(edited(set, R"({"range": null})"), json::parse(R"({"points": [[0, 1]]})"));
+  EXPECT_EQ(edited(set, R"({"points": {"0": [0.5, 0.25]}})"),
+            json::parse(R"({"range": [1, 2], "points": [[0.5, 0.25]]})"));
+  EXPECT_EQ(applied(R"({"channels": [{"gamma": 2, "gradientOpacity": {"range": [1, 2]}}]})",
+                    R"({"channels": {"0": {"gradientOpacity": null}}})"),
+            json::parse(R"({"channels": [{"gamma": 2}]})"));
+  const char* path = R"({"channels": {"0": {"gradientOpacity": )";
+  EXPECT_EQ(refusedAt("{}", (path + std::string("5}}}")).c_str()), "/channels/0/gradientOpacity");
+  EXPECT_EQ(refusedAt("{}", (path + std::string(R"({"lo": null}}}})")).c_str()),
+            "/channels/0/gradientOpacity/lo");
+}
+
 TEST(ApplyPatch, NamesUnknownFieldsEvenWhenTheyAreNull) {
   EXPECT_EQ(refusedAt("{}", R"({"fog": null})"), "/fog");
   EXPECT_EQ(refusedAt("{}", R"({"channels": {"0": {"colour": "#ffffff"}}})"), "/channels/0/colour");
@@ -150,6 +172,17 @@ TEST(MergePatchBetween, NamesTheEditedChannelAlone) {
             json::parse(R"({"channels": {"1": {"gamma": 4}}})"));
 }
 
+TEST(MergePatchBetween, NamesTheEditedMemberOfAnObjectThatMayBeAbsent) {
+  const auto between = [](const char* from, const char* to) {
+    return mergePatchBetween({{"channels", {json::parse(from)}}}, {{"channels", {json::parse(to)}}});
+  };
+  const char *off = "{}", *on = R"({"gradientOpacity": {"range": [1, 2], "points": [[0, 1]]}})";
+  EXPECT_EQ(between(off, on)["channels"]["0"], json::parse(on));
+  EXPECT_EQ(between(on, off)["channels"]["0"], json::parse(R"({"gradientOpacity": null})"));
+  EXPECT_EQ(between(on, R"({"gradientOpacity": {"range": [1, 3], "points": [[0, 1]]}})")["channels"]["0"],
+            json::parse(R"({"gradientOpacity": {"range": [1, 3]}})"));
+}
+
 /// Sparse scenes with every field in and out, small lists, few different values, so that equal parts are
 /// common.
 class RandomScenes {
@@ -184,6 +217,9 @@ class RandomScenes {
         if (!chance()) continue;
         json& entry = out["channels"][std::to_string(i)] = chance() ? channel() : json();
         if (entry.is_object() && chance()) entry["gamma"] = nullptr;
+        if (entry.is_object() && random_() % 4 == 0) entry["gradientOpacity"] = nullptr;
+        if (entry.contains("gradientOpacity") && entry["gradientOpacity"].is_object() && chance())
+          entry["gradientOpacity"]["range"] = nullptr;
       }
     }
     return out;
@@ -202,6 +238,11 @@ class RandomScenes {
     if (chance()) out["opacity"] = chance() ? json::parse("[[0, 0], [1, 1]]") : json::parse("[[0, 1]]");
     if (chance()) out[chance() ? "color" : "colormap"] = "#ffffff";
     if (out.contains("colormap")) out["colormap"] = pick({"gray", "fire"});
+    if (chance()) {
+      json& steep = out["gradientOpacity"] = json::object();
+      if (chance()) steep["range"] = {0, random_() % 2};
+      if (chance()) steep["points"] = json::parse("[[0, 1]]");
+    }
     return out;
   }
   json camera() {

@@ -68,6 +68,7 @@ TEST(ParseScene, ReadsEveryField) {
     "dataset": "mri",
     "channels": [{"name": "T1", "visible": false, "range": [10, -2.5], "color": "#Ff8000",
                   "opacity": [[0, 0], [0.5, 0], [0.5, 1]], "gamma": 2, "density": 0, "weight": 0.5,
+                  "gradientOpacity": {"range": [3, 0.5], "points": [[0.25, 1], [0.75, 0]]},
                   "material": {"ambient": 0, "diffuse": 1, "specular": 0.5, "shininess": 8}},
                  {"colormap": "fire"}, {"colormap": [[0, "#000000"], [1, "#ffffff"]]}],
     "clip": [{"point": [1, 2, 3], "normal": [0, 1, 0], "media": [2, 0]}],
@@ -89,6 +90,9 @@ TEST(ParseScene, ReadsEveryField) {
   EXPECT_EQ(scene.channels[0].range, (std::array<double, 2>{10, -2.5}));
   EXPECT_EQ(scene.channels[0].color, "#Ff8000");
   EXPECT_EQ(scene.channels[0].opacity.at(2).value, 1);
+  EXPECT_EQ(scene.channels[0].gradientOpacity.value().range, (std::array<double, 2>{3, 0.5}));
+  EXPECT_EQ(scene.channels[0].gradientOpacity->points.at(1).position, 0.75);
+  EXPECT_EQ(scene.channels[0].gradientOpacity->points.at(0).value, 1);
   EXPECT_EQ(scene.channels[0].gamma, 2);
   EXPECT_EQ(scene.channels[0].density, 0.0);
   EXPECT_EQ(std::get<std::string>(*scene.channels[1].colormap), "fire");
@@ -125,6 +129,35 @@ TEST(ParseScene, TakesNullForWhatIsAutomaticAndForNothingElse) {
   EXPECT_EQ(channelRefusedAt({{"gamma", nullptr}}), "/channels/0/gamma");
   EXPECT_EQ(refusedAt({{"camera", nullptr}}), "/camera");
   EXPECT_EQ(refusedAt({{"channels", json::array({nullptr})}}), "/channels/0");
+}
+
+TEST(ParseScene, TakesOpacityByTheGradientThatIsAbsentNullOrHasNoMembers) {
+  EXPECT_FALSE(parsed(channel(json::object())).channels[0].gradientOpacity);
+  EXPECT_FALSE(parsed(channel({{"gradientOpacity", nullptr}})).channels[0].gradientOpacity);
+  const Scene scene = parsed(channel({{"gradientOpacity", json::object()}}));
+  ASSERT_TRUE(scene.channels[0].gradientOpacity);
+  EXPECT_FALSE(scene.channels[0].gradientOpacity->range);
+  EXPECT_EQ(toJson(scene)["channels"][0]["gradientOpacity"], (json{{"points", {{0, 0}, {1, 1}}}}));
+  EXPECT_FALSE(
+      parsed(channel({{"gradientOpacity", {{"range", nullptr}}}})).channels[0].gradientOpacity->range);
+}
+
+TEST(ParseScene, NamesWhatIsWrongWithOpacityByTheGradient) {
+  const std::string at = "/channels/0/gradientOpacity";
+  const auto refused = [](const json& value) { return channelRefusedAt({{"gradientOpacity", value}}); };
+  EXPECT_EQ(refused(true), at);
+  EXPECT_EQ(refused(json::array({json::array({0, 1})})), at);
+  EXPECT_EQ(refused({{"curve", json::array()}}), at + "/curve");
+  EXPECT_EQ(refused({{"range", 1}}), at + "/range");
+  EXPECT_EQ(refused({{"range", {0}}}), at + "/range");
+  EXPECT_EQ(refused({{"range", {0, std::numeric_limits<double>::infinity()}}}), at + "/range/1");
+  EXPECT_EQ(refused({{"range", {5, 5}}}), "none");
+  EXPECT_EQ(refused({{"points", nullptr}}), at + "/points");
+  EXPECT_EQ(refused({{"points", json::array()}}), at + "/points");
+  EXPECT_EQ(refused({{"points", json::parse("[[0.5, 0], [0.4, 1]]")}}), at + "/points/1/0");
+  EXPECT_EQ(refused({{"points", json::parse("[[0, 1.5]]")}}), at + "/points/0/1");
+  EXPECT_EQ(refused({{"points", json::array_t(4096, {0, 0})}}), "none");
+  EXPECT_EQ(refused({{"points", json::array_t(4097, {0, 0})}}), at + "/points");
 }
 
 TEST(ParseScene, NamesWhatIsWrongWithClipping) {
@@ -259,7 +292,8 @@ TEST(ParseScene, SaysWhatWasExpectedAndFound) {
 }
 
 TEST(ToJson, GivesADocumentThatReadsAsTheSameScene) {
-  const json once = toJson(parsed(json::parse(R"({"channels": [{}, {"colormap": "gray"}]})")));
+  const json once =
+      toJson(parsed(json::parse(R"({"channels": [{"gradientOpacity": {}}, {"colormap": "gray"}]})")));
   EXPECT_EQ(toJson(parsed(once)), once);
 }
 

@@ -22,6 +22,13 @@ const json& schema() {
   return parsed;
 }
 
+/// The reference to an object, also of one that may be null; null where there is none.
+json referenceIn(const json& field) {
+  if (field.contains("$ref")) return field;
+  const json choices = field.value("anyOf", json::array());
+  return !choices.empty() && choices[0].contains("$ref") ? choices[0] : json();
+}
+
 /// Calls f(path of the field in a scene, its schema) for every field that is no object and no list of
 /// objects.
 template <class F>
@@ -31,8 +38,8 @@ void forEachSchemaField(const json& object, const json::json_pointer& at, const 
     const auto definition = [](const json& reference) {
       return schema().at(json::json_pointer(reference["$ref"].get<std::string>().substr(1)));
     };
-    if (field.contains("$ref"))
-      forEachSchemaField(definition(field), path, f);
+    if (const json reference = referenceIn(field); !reference.is_null())
+      forEachSchemaField(definition(reference), path, f);
     else if (name == "channels")
       forEachSchemaField(definition(field["items"]), path / 0, f);
     else
@@ -73,7 +80,18 @@ TEST(Schema, GivesEveryFieldADescriptionAndADefaultThatIsTaken) {
     EXPECT_TRUE(isTaken(path, field["default"]));
     ++fields;
   });
-  EXPECT_EQ(fields, 40);
+  EXPECT_EQ(fields, 42);
+}
+
+TEST(Schema, SaysOfAnObjectThatMayBeNullWhatItIsAndThatNullIsTheDefault) {
+  const json& field = schema()["$defs"]["Channel"]["properties"]["gradientOpacity"];
+  EXPECT_EQ(field["anyOf"], json::parse(R"([{"$ref": "#/$defs/GradientOpacity"}, {"type": "null"}])"));
+  EXPECT_FALSE(field.value("description", "").empty());
+  ASSERT_TRUE(field.contains("default"));
+  EXPECT_TRUE(field["default"].is_null());
+  const json::json_pointer path("/channels/0/gradientOpacity");
+  EXPECT_TRUE(isTaken(path, nullptr));
+  EXPECT_TRUE(isTaken(path, json::object()));
 }
 
 TEST(Schema, SaysTheSameOfBoundsAsReadingDoes) {

@@ -5,11 +5,10 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <regex>
 #include <thread>
 
 #include "protocol/problem.h"
-#include "tests/server/fakes.h"
+#include "tests/server/fake_api.h"
 
 namespace scolopax::server {
 namespace {
@@ -17,77 +16,8 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 using protocol::ProtocolError;
-using testing::FakeRenderer;
+using testing::Api;
 using testing::FakeViewer;
-
-/// The handlers without a network: what a server would call.
-struct Api {
-  Config config;
-  testing::Workshop workshop;
-  Metrics metrics;
-  std::shared_ptr<const DatasetStore> datasets = testing::smallStore();
-  SceneResolver resolver{datasets, {64, 1000}};
-  StreamHub streams{workshop.store, metrics, {}};
-  std::atomic<bool> stopping{false};
-  std::stop_source gone, cutting;
-  ApiContext context{config,
-                     *datasets,
-                     resolver,
-                     workshop.store,
-                     streams,
-                     metrics,
-                     [this](const std::shared_ptr<const Volume>&) {
-                       return std::make_unique<FakeRenderer>(workshop.control);
-                     },
-                     nullptr,
-                     [](const std::string&) {},
-                     stopping,
-                     cutting.get_token(),
-                     [] {
-                       return json{{"backend", "fake"}};
-                     }};
-  std::vector<Route> routes;
-
-  Api() {
-    config.pollTimeout = 0ms;
-    config.maxRenders = 1;
-    for (auto family : {datasetRoutes, renderRoutes, sessionRoutes, operationRoutes})
-      for (Route& route : family(context)) routes.push_back(std::move(route));
-  }
-
-  /// Throws what the handler throws. `target` may have a query.
-  net::Response call(const std::string& method, const std::string& target, const std::string& body = "",
-                     net::Headers headers = {{"Content-Type", "application/json"}}) {
-    net::Request request;
-    request.method = method;
-    request.path = target.substr(0, target.find('?'));
-    request.body = body;
-    request.headers = std::move(headers);
-    request.gone = gone.get_token();
-    static const std::regex pair("[?&]([^=]+)=([^&]*)");
-    for (std::sregex_iterator at(target.begin(), target.end(), pair), end; at != end; ++at)
-      request.query.emplace((*at)[1], (*at)[2]);
-    for (const Route& route : routes) {
-      const std::regex pattern(std::regex_replace(route.path, std::regex("\\{[^}]*\\}"), "([^/]+)"));
-      std::smatch match;
-      if (route.method != method || !std::regex_match(request.path, match, pattern)) continue;
-      request.matches.assign(match.begin(), match.end());
-      return route.handler(request);
-    }
-    ADD_FAILURE() << "no route for " << method << " " << target;
-    return {};
-  }
-
-  std::pair<int, std::string> errorOf(const std::string& method, const std::string& target,
-                                      const std::string& body = "",
-                                      const net::Headers& headers = {{"Content-Type", "application/json"}}) {
-    try {
-      return {call(method, target, body, headers).status, "no error"};
-    } catch (const ProtocolError& error) {
-      return {error.status, error.pointer};
-    }
-  }
-};
 
 using Expected = std::pair<int, std::string>;
 

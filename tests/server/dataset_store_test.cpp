@@ -50,6 +50,26 @@ TEST(DatasetStore, RefusesAChannelThatIsNotThere) {
   EXPECT_THROW(histogramJson(*testing::smallStore()->first(), -1), protocol::ProtocolError);
 }
 
+TEST(DatasetStore, KeepsTheGradientsThatItHasMeasured) {
+  const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(1) << 30);
+  const auto store = testing::smallStore(memory);
+  const Dataset& dataset = *store->first();
+  EXPECT_EQ(store->gradients(dataset, 1), nullptr);
+  std::stop_source stopped;
+  stopped.request_stop();
+  EXPECT_THROW(store->measuredGradients(dataset, 1, stopped.get_token()), Error);
+  EXPECT_EQ(store->gradients(dataset, 1), nullptr);
+  const GradientHistogram* measured = store->measuredGradients(dataset, 1, {}).get();
+  EXPECT_EQ(store->gradients(dataset, 1).get(), measured);
+  EXPECT_EQ(store->measuredGradients(dataset, 1, stopped.get_token()).get(), measured)
+      << "nothing is waited for";
+  EXPECT_EQ(store->gradients(dataset, 0), nullptr);
+  EXPECT_EQ(store->gradients(*store->find("other"), 1), nullptr);
+  EXPECT_EQ(memory->used(MemoryUse::grids), measured->sizeBytes());
+  EXPECT_THROW(store->gradients(dataset, 2), protocol::ProtocolError);
+  EXPECT_THROW(store->measuredGradients(dataset, -1, {}), protocol::ProtocolError);
+}
+
 TEST(DatasetStore, ProbesBetweenVoxelCentres) {
   const auto dataset = testing::smallStore()->first();
   // Values are the voxel's index, x + 4 y + 12 z: linear, so interpolation is exact.

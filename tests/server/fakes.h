@@ -175,11 +175,11 @@ inline std::shared_ptr<const Volume> smallVolume() {
   return std::make_shared<const Volume>(grid, std::move(channels));
 }
 
-inline std::shared_ptr<const DatasetStore> smallStore() {
+inline std::shared_ptr<const DatasetStore> smallStore(const std::shared_ptr<MemoryBudget>& memory = nullptr) {
   std::vector<Dataset> datasets;
   datasets.push_back({"small", "small.nrrd", {"small.nrrd"}, smallVolume()});
   datasets.push_back({"other", "other.nrrd", {"other.nrrd"}, smallVolume()});
-  return std::make_shared<const DatasetStore>(std::move(datasets));
+  return std::make_shared<const DatasetStore>(std::move(datasets), memory);
 }
 
 struct FakeViewer : ViewerSink {
@@ -248,5 +248,9 @@ struct Workshop {
 };
 
 inline nlohmann::json seedPatch(std::uint32_t seed) { return {{"integrator", {{"seed", seed}}}}; }
+/// Of the first channel; its range is to be measured.
+inline nlohmann::json gradientPatch() {
+  return {{"channels", {{"0", {{"gradientOpacity", nlohmann::json::object()}}}}}};
+}
 
 }  // namespace scolopax::server::testing

@@ -250,6 +250,126 @@ TEST(SceneResolver, FramesAnotherDatasetByItself) {
   EXPECT_EQ(other->render.camera, resolve.replace({{"dataset", "other"}})->render.camera);
 }
 
+/// Values 0, 1, 4, 9 and 16 in a row, two world units apart, so that they are 1, 2, 4, 6 and 7 a voxel steep
+/// and the steepest 3.5 a world unit; and a data set that is flat.
+SceneResolver resolverOfSquares() {
+  Grid grid;
+  grid.dims = {5, 1, 1};
+  grid.worldFromVoxel[0][0] = 2;
+  std::vector<Dataset> datasets;
+  for (const char* id : {"squares", "flat"}) {
+    std::vector<ChannelSource> channels(2);
+    for (ChannelSource& channel : channels) {
+      channel.voxels = VoxelBuffer(ScalarType::u8, 5);
+      for (std::size_t i = 0; i < 5; ++i)
+        channel.voxels.as<std::uint8_t>()[i] = std::uint8_t(datasets.empty() ? i * i : 7);
+    }
+    datasets.push_back({id, id, {}, std::make_shared<const Volume>(grid, std::move(channels))});
+  }
+  return {std::make_shared<const DatasetStore>(std::move(datasets)), {64, 1'000'000}};
+}
+
+/// Where the automatic range of the squares ends when the last of `count` voxels that count is in this bin.
+double rangeEnd(int bin, int count) { return (bin + 1 - 0.005 * count) / 256 * 3.5; }
+
+/// The first channel, with opacity that rises from lo to hi, and by the gradient.
+json steepFrom(double lo, double hi) {
+  return {{"channels", {{{"range", {lo, hi}}, {"gradientOpacity", json::object()}}}}};
+}
+
+GradientOpacity steepnessOf(const SceneResolver::Resolved& scene, std::size_t channel = 0) {
+  return scene->render.channels[channel].gradientOpacity.value();
+}
+
+TEST(SceneResolver, LeavesOpacityByTheGradientOutWhereItIsNotAskedFor) {
+  const auto scene = resolverOfSquares().replaceNow(json::object());
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_FALSE(scene->render.channels[i].gradientOpacity);
+    EXPECT_FALSE(scene->resolved["channels"][i].contains("gradientOpacity"));
+  }
+}
+
+TEST(SceneResolver, ChoosesTheRangeOfGradientsByWhatHasOpacity) {
+  const auto resolve = resolverOfSquares();
+  // 0, 1 and 4; 9 has no opacity. Of 7 a voxel, 4 is in bin 146.
+  const auto gentle = resolve.replace(steepFrom(9, 0));
+  EXPECT_EQ(steepnessOf(gentle).rangeLo, 0);
+  EXPECT_DOUBLE_EQ(steepnessOf(gentle).rangeHi, rangeEnd(146, 3));
+  EXPECT_EQ(steepnessOf(gentle).factor, (std::vector<OpacityKnot>{{0, 0}, {1, 1}}));
+  EXPECT_EQ(gentle->resolved["channels"][0]["gradientOpacity"],
+            (json{{"range", {0, steepnessOf(gentle).rangeHi}}, {"points", {{0, 0}, {1, 1}}}}));
+  EXPECT_FALSE(gentle->render.channels[1].gradientOpacity);
+  EXPECT_DOUBLE_EQ(steepnessOf(resolve.replace(steepFrom(4, 16))).rangeHi, rangeEnd(255, 2));
+  // Nothing has opacity: all voxels. Nothing is steep: any range.
+  EXPECT_DOUBLE_EQ(steepnessOf(resolve.replace(steepFrom(100, 200))).rangeHi, rangeEnd(255, 5));
+  json flat = steepFrom(0, 10);
+  flat["dataset"] = "flat";
+  EXPECT_EQ(resolve.replace(flat)->resolved["channels"][0]["gradientOpacity"]["range"], json({0, 1}));
+  // Sent back, it is the same scene.
+  EXPECT_EQ(resolve.replace(gentle->resolved)->render, gentle->render);
+  EXPECT_EQ(resolve.replace(gentle->resolved)->resolved, gentle->resolved);
+}
+
+TEST(SceneResolver, TakesTheRangeAndTheFactorThatAreGiven) {
+  const json curve = {{"range", {3, 0.5}}, {"points", {{0.25, 1}, {0.75, 0}}}};
+  const auto scene =
+      resolverOfSquares().replaceNow({{"channels", {json::object(), {{"gradientOpacity", curve}}}}});
+  EXPECT_EQ(steepnessOf(scene, 1), (GradientOpacity{3, 0.5, {{0.25, 1}, {0.75, 0}}}));
+  EXPECT_EQ(scene->resolved["channels"][1]["gradientOpacity"], curve);
+  EXPECT_NE(scene->picture, resolverOfSquares().replaceNow(json::object())->picture);
+  EXPECT_EQ(errorOf({{"channels", {{{"gradientOpacity", {{"range", {1}}}}}}}}),
+            std::pair(422, std::string("/channels/0/gradientOpacity/range")));
+}
+
+TEST(SceneResolver, KeepsTheRangeOfGradientsWhileCurvesAreEditedUntilItIsAskedForAnew) {
+  const auto resolve = resolverOfSquares();
+  const auto first = resolve.replace(steepFrom(9, 0));
+  const double before = rangeEnd(146, 3), anew = rangeEnd(255, 2);
+  const auto channel = [](const json& patch) { return json{{"channels", {{"0", patch}}}}; };
+  const auto steep = [&](const json& patch) { return channel({{"gradientOpacity", patch}}); };
+  const auto edited = resolve.patch(*first, channel({{"range", {4, 16}}}));
+  EXPECT_DOUBLE_EQ(steepnessOf(edited).rangeHi, before);
+  const auto bent = resolve.patch(*edited, steep({{"points", {{0, 1}}}}));
+  EXPECT_DOUBLE_EQ(steepnessOf(bent).rangeHi, before);
+  EXPECT_EQ(steepnessOf(bent).factor.size(), 1u);
+  EXPECT_DOUBLE_EQ(steepnessOf(resolve.patch(*bent, {{"camera", nullptr}})).rangeHi, before);
+  EXPECT_DOUBLE_EQ(steepnessOf(resolve.patch(*bent, {{"channels", {{"1", nullptr}}}})).rangeHi, before);
+
+  const auto reset = resolve.patch(*bent, steep({{"range", nullptr}}));
+  EXPECT_DOUBLE_EQ(steepnessOf(reset).rangeHi, anew);
+  EXPECT_EQ(steepnessOf(reset).factor.size(), 1u) << "the points stay";
+  const auto off = resolve.patch(*edited, steep(nullptr));
+  EXPECT_FALSE(off->render.channels[0].gradientOpacity);
+  EXPECT_DOUBLE_EQ(steepnessOf(resolve.patch(*off, steep(json::object()))).rangeHi, anew);
+  EXPECT_DOUBLE_EQ(steepnessOf(resolve.patch(*edited, steepFrom(4, 16))).rangeHi, anew) << "other channels";
+  const auto given = resolve.patch(*edited, steep({{"range", {1, 2}}}));
+  EXPECT_EQ(steepnessOf(given).rangeHi, 2);
+  EXPECT_DOUBLE_EQ(steepnessOf(resolve.patch(*given, steep({{"range", nullptr}}))).rangeHi, anew);
+  EXPECT_EQ(steepnessOf(resolve.patch(*edited, {{"dataset", "flat"}})).rangeHi, 1);
+}
+
+TEST(SceneResolver, ThrowsUnmeasuredInsteadOfWaitingOnlyWhereItHasToMeasure) {
+  const auto resolve = resolverOfSquares();
+  const json steep = steepFrom(9, 0);
+  json refused = steep;
+  refused["lights"] = {{{"direction", {0, 0, 0}}}};
+  EXPECT_THROW(resolve.replaceNow(refused), ProtocolError) << "what is refused anyway is not measured";
+  std::stop_source stopped;
+  stopped.request_stop();
+  EXPECT_THROW(resolve.replace(steep, stopped.get_token()), Error);
+  try {
+    resolve.replaceNow(steep);
+    FAIL() << "it is not measured yet";
+  } catch (const Unmeasured& missing) {
+    missing.measure({});
+  }
+  const auto scene = resolve.replaceNow(steep);
+  EXPECT_DOUBLE_EQ(steepnessOf(scene).rangeHi, rangeEnd(146, 3));
+  EXPECT_THROW(resolve.patchNow(*scene, {{"channels", {{"1", {{"gradientOpacity", json::object()}}}}}}),
+               Unmeasured)
+      << "of another channel nothing is known";
+}
+
 TEST(SceneResolver, KnowsWhatLeavesThePictureAsItIs) {
   const auto resolve = resolver();
   const auto base = resolve.replace(json::object());

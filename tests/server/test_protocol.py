@@ -108,7 +108,7 @@ class Description(unittest.TestCase):
         self.assertEqual((told["limits"]["sessions"], told["limits"]["messageBytes"]), (4, 65536))
         self.assertEqual(set(told["limits"]), set(
             "bodyBytes messageBytes imageWidth imageHeight imagePixels memoryBytes renders waitingPolls waitingPicks "
-            "pickPixels sessions clients renderSeconds sceneDepth".split()))
+            "waitingEdits pickPixels sessions clients renderSeconds sceneDepth".split()))
 
     def test_the_schema_is_the_file_beside_the_document(self):
         status, headers, body = call(server, "GET", "/api/v1/schema.json")
@@ -393,6 +393,9 @@ class Stream(unittest.IsolatedAsyncioTestCase):
             for patch in ({"channels": {"1": {"color": "#ff0000", "range": [0, 50]}}}, {"camera": {"orthoHeight": 20}},
                           {"channels": {"1": {"colormap": "fire"}, "0": {"opacity": [[0, 0], [1, 1]]}}},
                           {"channels": {"0": {"opacity": {"1": [0.5, 0.25]}}}},
+                          {"channels": {"1": {"gradientOpacity": {"points": [[0, 1], [1, 0]]}}}},
+                          {"channels": {"1": {"gradientOpacity": {"range": [1, 2]}}}},
+                          {"channels": {"1": {"gradientOpacity": None}}},
                           {"camera": {"fovY": 50, "eye": [1, 2, 30]}}, {"channels": {"1": None}},
                           {"channels": [{"visible": False}]}, {"camera": None, "channels": None}):
                 await editor.patch(patch)

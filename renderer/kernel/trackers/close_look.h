@@ -71,6 +71,62 @@ SCOLOPAX_HD inline CellValues valuesIn(const ChannelView& channel, glm::ivec3 di
   });
 }
 
+/// |gradient| of stored values per smallest spacing in a voxel cell: at a point of it, and by how much it may
+/// change per voxel of way along the axes together.
+struct CellGradient {
+  float magnitude, change, slack;  ///< slack: what rounding may add
+  bool finite;                     ///< the cell has gradients
+};
+/// In the cell every difference is a mean of slopes between neighbours along its axis, and linear in each
+/// coordinate or, at the border, changes less: by no more than the slopes differ.
+SCOLOPAX_RARE inline CellGradient gradientIn(const ChannelView& channel, glm::ivec3 dims, glm::ivec3 cell,
+                                             glm::vec3 point) {
+  const glm::mat3& fromVoxel = channel.gradient.fromVoxel;
+  const std::size_t strides[] = {std::size_t(channel.stride),
+                                 std::size_t(channel.stride) * std::size_t(dims.x),
+                                 std::size_t(channel.stride) * std::size_t(dims.x) * std::size_t(dims.y)};
+  glm::vec3 change(0.0f);
+  float most = 0.0f;
+  bool finite = true;
+  visitScalarType(channel.type, [&](auto zero) {
+    const auto* voxels = static_cast<const decltype(zero)*>(channel.voxels) + channel.lane;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int u = (axis + 1) % 3, v = (axis + 2) % 3, low = cell[axis];
+      float least = kInfinity, largest = -kInfinity;
+      for (int edge = low > 0 ? low - 1 : 0; edge <= low + 1 && edge + 1 < dims[axis]; ++edge)
+        for (int corner = 0; corner < 4; ++corner) {
+          const int j = cell[u] + (corner & 1), k = cell[v] + (corner >> 1);
+          if (j >= dims[u] || k >= dims[v]) continue;
+          const auto* from = voxels + std::size_t(edge) * strides[axis] + std::size_t(j) * strides[u] +
+                             std::size_t(k) * strides[v];
+          const float a = float(from[0]), b = float(from[strides[axis]]);
+          if (!isFinite(a) || !isFinite(b)) {
+            // Beyond the last voxels differences are one-sided, and do not see the edge before.
+            finite = finite && edge < low && low + 2 == dims[axis];
+            continue;
+          }
+          least = minimum(least, b - a);
+          largest = maximum(largest, b - a);
+          most = maximum(most, maximum(magnitude(a), magnitude(b)));
+        }
+      if (least < largest) change[axis] = largest - least;
+    }
+  });
+  glm::vec3 turned(0.0f);
+  float scale = 0.0f;
+  for (int axis = 0; axis < 3; ++axis) {
+    const glm::vec3& column = fromVoxel[axis];
+    turned += glm::vec3(magnitude(column.x), magnitude(column.y), magnitude(column.z)) * change[axis];
+    scale = maximum(scale, sumOfMagnitudes(column));
+  }
+  const Gradient<One> here = gradientAt<One>(channel, dims, fromVoxel, point);
+  CellGradient gradient{lengthOf<One>(here.perSpacing), lengthOf<One>(turned), 3.0f * scale * most * 0x1p-19f,
+                        finite};
+  // Only on a face does a point see voxels that are not the cell's.
+  if (!here.finite) gradient.magnitude = 0.0f, gradient.change = kLargestFinite;
+  return gradient;
+}
+
 /// Bound of channel n's extinction from `point` on, for at most `*way`, which becomes shorter where the bound
 /// would be loose, down to `least`. The scalar's slope along the ray is bounded by the corners' range.
 SCOLOPAX_HD inline float boundAhead(const SceneView& scene, int n, const Ray& ray, const VoxelCell& cell,
@@ -85,11 +141,24 @@ SCOLOPAX_HD inline float boundAhead(const SceneView& scene, int n, const Ray& ra
       values.lo < values.hi ? maximum(magnitude(values.lo), magnitude(values.hi)) * 0x1p-20f : 0.0f;
   const float lo = values.lo == 0.0f ? 0.0f : values.lo - slack;
   const float hi = values.hi == 0.0f ? 0.0f : values.hi + slack;
-  const float here = extinctionAt(channel, curvePosition(channel, values.value));
+  float here = extinctionAt(channel, curvePosition(channel, values.value));
+  const GradientFactorView& factor = channel.gradient;
+  CellGradient gradient{};
+  if (factor.factor.count != 0) {
+    gradient = gradientIn(channel, scene.dims, cell.low, point);
+    cost->fetches += gradientFetches(scene.dims);
+    if (!gradient.finite) return 0.0f;
+    gradient.change *= sumOfMagnitudes(ray.direction);
+    here *= largestFactor(factor, gradient.magnitude, gradient.magnitude);
+  }
   for (;; *way *= 0.5f) {
     const float reach = slope * *way + slack;
-    const float bound =
+    float bound =
         largestExtinction(channel, maximum(lo, values.value - reach), minimum(hi, values.value + reach));
+    if (factor.factor.count != 0) {
+      const float around = gradient.change * *way + gradient.slack;
+      bound *= largestFactor(factor, maximum(gradient.magnitude - around, 0.0f), gradient.magnitude + around);
+    }
     if (bound * *way <= kFewCollisions || bound <= 2.0f * here || !(*way > least)) return bound;
   }
 }

@@ -164,6 +164,18 @@ TEST(CpuRenderer, DrawsAfterAnySequenceOfEditsWhatAFreshRendererDraws) {
       },
       [](Scene& s) { s.width = 20, s.height = 61; },
       [](Scene& s) { s.channels[2].rangeHi *= 0.3; },
+      [](Scene& s) {
+        s.channels[0].gradientOpacity = GradientOpacity{0, 0.3 * s.channels[0].rangeHi, {{0, 0}, {1, 1}}};
+      },
+      [](Scene& s) {
+        s.channels[0].gradientOpacity->factor = {{0, 1}, {0.5, 0}};
+      },
+      [](Scene& s) { s.macrocell = 5; },
+      [](Scene& s) { s.channels[1].gradientOpacity = s.channels[0].gradientOpacity; },
+      [](Scene& s) { s.channels[0].visible = false; },
+      [](Scene& s) { s.channels[0].gradientOpacity->rangeHi *= 2; },  // while hidden
+      [](Scene& s) { s.channels[0].visible = true; },
+      [](Scene& s) { s.channels[1].gradientOpacity.reset(); },
   };
   edited->setScene(scene);
   edited->renderSample(kNever);
@@ -194,6 +206,15 @@ TEST(CpuRenderer, KeepsPlanAndFilmWhenASceneIsRefused) {
       [](Scene& s) { s.channels[0].opacity.clear(); },
       [](Scene& s) { s.channels[1].gamma = 0; },
       [](Scene& s) { s.channels[1].rangeHi = std::numeric_limits<double>::quiet_NaN(); },
+      [](Scene& s) {
+        s.channels[1].gradientOpacity = GradientOpacity{0, 1, {}};
+      },
+      [](Scene& s) {
+        s.channels[1].gradientOpacity = GradientOpacity{0, 1, {{0.5, 1}, {0.2, 1}}};
+      },
+      [](Scene& s) {
+        s.channels[1].gradientOpacity = GradientOpacity{0, std::numeric_limits<double>::infinity(), {{0, 1}}};
+      },
   };
   for (std::size_t i = 0; i < mistakes.size(); ++i) {
     Scene bad = good;

@@ -116,6 +116,20 @@ void clipAnyhow(Draw& draw, const Volume& volume, Scene& scene) {
   scene.crop = Crop{glm::min(a, b), glm::max(a, b), draw.of({Crop::kInnermost, 0x5a3c96bu, 0x3ffdfffu})};
 }
 
+/// Opacity by the gradients that blobs have, of some channels.
+void factorAnyhow(Draw& draw, Scene& scene) {
+  for (ChannelAppearance& a : scene.channels) {
+    if (draw.upTo(1)) continue;
+    const double lo = draw.of({0.0, 5.0, 30.0}), hi = draw.of({5.0, 20.0, 80.0});
+    a.gradientOpacity =
+        GradientOpacity{lo, hi,
+                        draw.of<std::vector<OpacityKnot>>({{{0, 0}, {1, 1}},
+                                                           {{0, 1}, {0.5, 1}, {0.5, 0.1}, {1, 0}},
+                                                           {{0.4, 0}, {0.4, 1}, {0.6, 1}, {0.6, 0}},
+                                                           {{0, 0.5}}})};
+  }
+}
+
 /// From outside or within, in any light.
 Scene anyScene(Draw& draw, const Volume& volume) {
   Scene scene = frontScene(volume, 1 + draw.upTo(40), 1 + draw.upTo(40));
@@ -135,6 +149,7 @@ Scene anyScene(Draw& draw, const Volume& volume) {
   scene.shadows = draw.upTo(2) == 0;
   for (int n = draw.upTo(3); n > 0; --n) scene.lights.push_back(anyLight(draw, volume.grid()));
   if (draw.upTo(2) == 0) clipAnyhow(draw, volume, scene);
+  if (draw.upTo(2) == 0) factorAnyhow(draw, scene);
   return scene;
 }
 

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "renderer/data/render_plan.h"
+#include "tests/support/gradients.h"
 #include "tests/support/volumes.h"
 
 namespace scolopax::kernel {
@@ -30,15 +31,17 @@ std::vector<OpacityKnot> randomCurve(std::mt19937& random) {
   }
 }
 
+/// With `factors`, opacity depends on the gradient too.
 template <class T>
-void expectBounds(double largest, unsigned seed) {
+void expectBounds(double largest, unsigned seed, bool factors = false) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> uniform(0, 1);
   int short_ = 0;
   for (int trial = 0; trial < 300; ++trial) {
     const glm::ivec3 dims(1 + int(random() % 6), 1 + int(random() % 6), 1 + int(random() % 6));
     const bool holes = trial % 5 == 0 && !std::is_integral_v<T>;
-    const auto volume = volumeOf(gridOf(dims), channelOf<T>(dims, [&](int, int, int) {
+    const glm::dvec3 spacing = factors ? glm::dvec3(1, 0.4, 3) : glm::dvec3(1);
+    const auto volume = volumeOf(gridOf(dims, spacing), channelOf<T>(dims, [&](int, int, int) {
                                    if (holes && random() % 8 == 0)
                                      return std::numeric_limits<double>::quiet_NaN();
                                    return random() % 3 == 0 ? 0.0 : largest * double(uniform(random));
@@ -50,6 +53,12 @@ void expectBounds(double largest, unsigned seed) {
     a.rangeLo = trial % 3 == 0 ? largest : 0;
     a.rangeHi = trial % 3 == 0 ? 0 : largest;
     a.gamma = trial % 7 == 0 ? 1.7 : 1;
+    if (factors) {
+      const double lo = gradientQuantile(*volume, 0, 0.5 * double(uniform(random))),
+                   hi = gradientQuantile(*volume, 0, double(uniform(random)));
+      a.gradientOpacity = GradientOpacity{lo, hi, randomCurve(random)};
+      if (trial % 2 == 0) a.opacity = {{0, 1}};
+    }
     RenderPlan plan(volume);
     plan.update(scene);
     if (plan.view().channelCount == 0) continue;
@@ -74,7 +83,7 @@ void expectBounds(double largest, unsigned seed) {
       }
     }
   }
-  EXPECT_GT(short_, 300);  // stretches that end before the cell does are among them
+  EXPECT_GT(short_, factors ? 100 : 300);  // stretches that end before the cell does are among them
 }
 
 TEST(CloseLook, BoundsTheExtinctionOfIntegers) {
@@ -85,6 +94,14 @@ TEST(CloseLook, BoundsTheExtinctionOfFloats) {
   expectBounds<float>(1, 3);
   expectBounds<float>(1e-20, 4);
   expectBounds<float>(1e20, 5);
+}
+
+TEST(CloseLook, BoundsTheExtinctionByTheGradient) {
+  expectBounds<std::uint8_t>(255, 6, true);
+  expectBounds<std::int16_t>(30000, 7, true);
+  expectBounds<float>(1, 8, true);
+  expectBounds<float>(1e-20, 9, true);
+  expectBounds<float>(1e20, 10, true);
 }
 
 TEST(CloseLook, NeedsNoShortStretchWhereNothingChanges) {

@@ -43,7 +43,7 @@ Truth referenceOf(const Volume& volume, const Scene& scene, int samplesPerAxis) 
 }
 
 /// What the rounding of floats can do to a picture: what the reference's becomes when the eye moves by three
-/// ten-millionths of the box, and values by as much of the largest.
+/// ten-millionths of the box, values by as much of the largest, and gradients by that over a voxel.
 void addRounding(const RandomScene& drawn, const Scene& scene, Truth* truth) {
   constexpr double kRounding = 3e-7;
   const auto compare = [&](const Scene& changed) {
@@ -64,6 +64,11 @@ void addRounding(const RandomScene& drawn, const Scene& scene, Truth* truth) {
       const double size = std::max(std::abs(values.minimum), std::abs(values.maximum));
       shifted.channels[n].rangeLo += sign * kRounding * size;
       shifted.channels[n].rangeHi += sign * kRounding * size;
+      if (auto& opacity = shifted.channels[n].gradientOpacity) {
+        const double shift = sign * kRounding * size / drawn.source.grid.smallestSpacing();
+        opacity->rangeLo += shift;
+        opacity->rangeHi += shift;
+      }
     }
     compare(shifted);
   }

@@ -9,90 +9,13 @@
 #include <vector>
 
 #include "tests/renderer/random_scenes/march_steps.h"
+#include "tests/renderer/random_scenes/matter.h"
 
 namespace scolopax::random_scenes {
 namespace {
 
 using glm::dvec3;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// Hash of the decisions that led to a sample.
-class Decisions {
- public:
-  void note(std::uint64_t which) { hash_ = (hash_ ^ (which + 1)) * 0x100000001b3u; }
-  std::uint64_t hash() const { return hash_; }
-
- private:
-  std::uint64_t hash_ = 0xcbf29ce484222325u;
-};
-
-/// One channel's values, and how it looks.
-struct Matter {
-  int number;                  // of the channel
-  std::vector<double> values;  // data values, x fastest
-  glm::ivec3 dims;
-  const ChannelAppearance* look;
-
-  double voxel(int i, int j, int k) const { return values[std::size_t(i + dims.x * (j + dims.y * k))]; }
-  static double mean(double a, double b, double w) { return w == 1 ? b : a + w * (b - a); }
-
-  /// Trilinear; NaN in a cell with a corner that is not finite.
-  double at(const dvec3& p) const {
-    int low[3], high[3];
-    double w[3];
-    for (int axis = 0; axis < 3; ++axis) {
-      const double x = std::fmin(std::fmax(p[axis], 0), dims[axis] - 1);
-      low[axis] = std::max(0, std::min(int(std::floor(x)), dims[axis] - 2));
-      high[axis] = std::min(low[axis] + 1, dims[axis] - 1);
-      w[axis] = x - low[axis];
-    }
-    double plane[2];
-    for (int z = 0; z < 2; ++z) {
-      const int k = z ? high[2] : low[2];
-      double row[2];
-      for (int y = 0; y < 2; ++y) {
-        const int j = y ? high[1] : low[1];
-        const double a = voxel(low[0], j, k), b = voxel(high[0], j, k);
-        if (!std::isfinite(a) || !std::isfinite(b)) return std::numeric_limits<double>::quiet_NaN();
-        row[y] = mean(a, b, w[0]);
-      }
-      plane[z] = mean(row[0], row[1], w[1]);
-    }
-    return mean(plane[0], plane[1], w[2]);
-  }
-
-  /// Per voxel along each axis, by differences of one voxel; 0 where one of them is not finite.
-  dvec3 gradient(const dvec3& p) const {
-    dvec3 g(0);
-    for (int axis = 0; axis < 3; ++axis) {
-      const double last = dims[axis] - 1, x = std::fmin(std::fmax(p[axis], 0), last);
-      dvec3 before = p, after = p;
-      before[axis] = std::fmax(x - 1, 0);
-      after[axis] = std::fmin(x + 1, last);
-      if (before[axis] < after[axis]) g[axis] = (at(after) - at(before)) / (after[axis] - before[axis]);
-      if (!std::isfinite(g[axis])) return dvec3(0);
-    }
-    return g;
-  }
-
-  double position(double value) const {
-    const double lo = look->rangeLo, hi = look->rangeHi;
-    if (lo == hi) return value < lo ? 0 : 1;
-    return std::pow(std::fmin(std::fmax((value - lo) / (hi - lo), 0), 1), look->gamma);
-  }
-
-  /// The last knot at or before `position` and the next one; `of(knot)` is what is interpolated.
-  template <class Knots, class Of>
-  static auto curve(const Knots& knots, double position, Decisions* decisions, Of of) {
-    std::size_t next = 0;
-    while (next < knots.size() && knots[next].position <= position) ++next;
-    decisions->note(next);
-    if (next == 0) return of(knots.front());
-    if (next == knots.size()) return of(knots.back());
-    const auto &a = knots[next - 1], &b = knots[next];
-    return of(a) + (of(b) - of(a)) * ((position - a.position) / (b.position - a.position));
-  }
-};
 
 double dot(const dvec3& a, const dvec3& b) { return glm::dot(a, b); }
 dvec3 unit(const dvec3& v) {
@@ -228,6 +151,7 @@ class Marcher {
         decisions->note(std::uint64_t((position > 0) + (position >= 1)));
         c.extinction = m.look->density * Matter::curve(m.look->opacity, position, decisions,
                                                        [](const OpacityKnot& k) { return k.value; });
+        if (c.extinction > 0) c.extinction *= m.factor(p, glm::transpose(voxelFromWorld_), decisions);
         c.color =
             Matter::curve(m.look->color, position, decisions, [](const ColorKnot& k) { return k.color; });
       }
@@ -300,7 +224,7 @@ class Marcher {
       for (int i = 0; i < 3; ++i)
         if (all[i] > 0) a[i] = k.ambient + (1 - k.ambient) * seen[i] / all[i];
     if (!scene_.shading) return c.color * a;
-    const dvec3 gradient = glm::transpose(voxelFromWorld_) * m.gradient(p);
+    const dvec3 gradient = glm::transpose(voxelFromWorld_) * m.gradient(p).value_or(dvec3(0));
     const double steepness = glm::length(gradient) * smallest_;
     decisions->note(steepness > 0);
     if (!(steepness > 0)) return c.color * a;

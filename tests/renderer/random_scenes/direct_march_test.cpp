@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "tests/support/volumes.h"
 
@@ -49,6 +50,35 @@ TEST(DirectMarch, FindsASpikeFarNarrowerThanItsSteps) {
   d.scene.channels[0].opacity = {{0, 0}, {0.3, 0}, {0.30005, 1}, {0.3001, 0}};
   const Marched found = directMarch(d.source, d.scene, 0, 0);
   EXPECT_NEAR(found.rgba.a, 1 - std::exp(-3000 * 0.00005 * 4), found.error + 1e-9);
+  EXPECT_LT(found.error, 1e-5);
+}
+
+// |gradient| of z^2 is 2z between the second voxel and the last but one: half a factor from 2 to 6.
+TEST(DirectMarch, TakesOpacityByTheGradient) {
+  const glm::ivec3 dims(1, 1, 8);
+  Drawing d = drawing(channelOf<float>(dims, [](int, int, int z) { return z * z; }), dims);
+  d.scene.channels[0] = solid(0.7);
+  d.scene.channels[0].gradientOpacity =
+      GradientOpacity{0, 16, {{0.25, 0}, {0.25, 0.5}, {0.75, 0.5}, {0.75, 0}}};
+  Marched found = directMarch(d.source, d.scene, 0, 0);
+  EXPECT_NEAR(found.rgba.a, 1 - std::exp(-0.7 * 4 / 2), found.error + 1e-9);
+  EXPECT_LT(found.error, 1e-5);
+  // Where a voxel is not finite, no point has a gradient whose differences reach into its cells: [1, 5].
+  d.source.channels[0] = channelOf<float>(
+      dims, [](int, int, int z) { return z == 3 ? std::numeric_limits<double>::quiet_NaN() : z; });
+  d.scene.channels[0].gradientOpacity = GradientOpacity{0, 1, {{0, 1}}};
+  found = directMarch(d.source, d.scene, 0, 0);
+  EXPECT_NEAR(found.rgba.a, 1 - std::exp(-0.7 * 4), found.error + 1e-9);
+}
+
+// |gradient| of |z - 4| dips to 0 at 4.
+TEST(DirectMarch, FindsADipOfTheGradientFarNarrowerThanItsSteps) {
+  const glm::ivec3 dims(1, 1, 9);
+  Drawing d = drawing(channelOf<float>(dims, [](int, int, int z) { return std::abs(z - 4); }), dims);
+  d.scene.channels[0] = solid(1e4);
+  d.scene.channels[0].gradientOpacity = GradientOpacity{0, 1, {{0, 1}, {1e-4, 1}, {1e-4, 0}}};
+  const Marched found = directMarch(d.source, d.scene, 0, 0);
+  EXPECT_NEAR(found.rgba.a, 1 - std::exp(-2), found.error + 1e-9);
   EXPECT_LT(found.error, 1e-5);
 }
 

@@ -8,6 +8,7 @@
 
 #include "server/scene_resolver.h"
 #include "tests/renderer/random_scenes/draw.h"
+#include "tests/support/gradients.h"
 
 namespace scolopax::random_scenes {
 namespace {
@@ -54,15 +55,40 @@ std::vector<double> drawPositions(Draw& draw) {
   return positions;
 }
 
-json drawOpacity(Draw& draw, const Surroundings&) {
-  if (draw.chance(0.1)) return json::object();
+json drawPoints(Draw& draw) {
   json points = json::array();
   double last = draw.uniform();
   for (const double position : drawPositions(draw)) {
     if (!draw.chance(0.25)) last = draw.chance(0.35) ? draw.integer(0, 1) : draw.uniform();  // else a plateau
     points.push_back({position, last});
   }
-  return {{"opacity", points}};
+  return points;
+}
+
+json drawOpacity(Draw& draw, const Surroundings&) {
+  if (draw.chance(0.1)) return json::object();
+  return {{"opacity", drawPoints(draw)}};
+}
+
+/// Over gradients that the channel has, but no jump at exactly one of them: where the gradient is the same in
+/// a whole region, rounding would decide which side of the jump is seen.
+json drawGradientOpacity(Draw& draw, const Surroundings& around) {
+  if (draw.chance(0.8)) return draw.chance(0.5) ? json::object() : json{{"gradientOpacity", nullptr}};
+  json opacity = json::object();
+  const std::vector<double> all = test::gradientMagnitudes(around.grid, *around.channel);
+  if (all.empty() || draw.chance(0.15)) return {{"gradientOpacity", opacity}};
+  json points = drawPoints(draw);
+  if (draw.chance(0.1)) points = json::array({points[0]});  // one factor for all gradients
+  const double most = all.back() > 0 ? all.back() : 1;
+  const auto near = [&] { return draw.oneOf(all) * draw.between(0.8, 1.2); };
+  const int kind = draw.integer(0, 19);
+  double a = kind > 8 ? near() : 0, b = kind > 8 ? near() : most * draw.between(0.2, 1.2);
+  if (kind <= 1) a = b;  // a step
+  if (kind == 19) b = a + most * draw.decades(1e-4, 1e-1);
+  if (kind % 4 == 3) std::swap(a, b);
+  opacity["range"] = {a, b};
+  opacity["points"] = points;
+  return {{"gradientOpacity", opacity}};
 }
 
 json drawColor(Draw& draw, const Surroundings&) {
@@ -135,6 +161,7 @@ const Field kChannelFields[] = {
                  {"specular", specular},
                  {"shininess", d.decades(0.5, 200)}}}};
      }},
+    {"gradientOpacity", drawGradientOpacity},
 };
 
 const Field kLightFields[] = {
@@ -346,6 +373,9 @@ std::string describe(const RandomScene& drawn) {
   }
   if (!s.clip.empty()) text << ", " << s.clip.size() << " clip planes";
   if (s.crop) text << ", crop";
+  const auto graded = std::count_if(s.channels.begin(), s.channels.end(),
+                                    [](const ChannelAppearance& c) { return c.gradientOpacity.has_value(); });
+  if (graded > 0) text << ", opacity by the gradient of " << graded;
   text << (s.camera.orthoHeight ? ", orthographic" : ", perspective") << ", " << s.width << "x" << s.height
        << " " << nameOf(s.filter) << ", macrocell " << s.macrocell << ", step " << s.step << ", "
        << nameOf(s.sampling) << ", thickness";

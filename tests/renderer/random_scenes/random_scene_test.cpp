@@ -19,7 +19,8 @@ namespace {
 
 using nlohmann::json;
 
-/// Calls visit("/channels/#/gamma") and so on for every field that is not an object or a list of objects.
+/// Calls visit("/channels/#/gamma") and so on for every field that is not an object, or null for none, or a
+/// list of objects.
 template <class Visit>
 void forEachField(const json& schema, const json& object, const std::string& path, const Visit& visit) {
   const auto target = [&](const json& reference) -> const json& {
@@ -29,6 +30,7 @@ void forEachField(const json& schema, const json& object, const std::string& pat
     const json* inner = nullptr;
     std::string innerPath = path + "/" + name;
     if (field.contains("$ref")) inner = &target(field);
+    if (field.contains("anyOf") && field["anyOf"][0].contains("$ref")) inner = &target(field["anyOf"][0]);
     if (field.contains("items") && field["items"].contains("$ref")) {
       inner = &target(field["items"]);
       innerPath += "/#";
@@ -51,7 +53,7 @@ void collect(const json& value, const std::string& path, std::set<std::string>* 
   const std::string rest = end == std::string::npos ? "" : path.substr(end);
   if (name == "#")
     for (const json& element : value) collect(element, rest, found);
-  else if (value.contains(name))
+  else if (value.contains(name))  // null contains nothing
     collect(value.at(name), rest, found);
 }
 

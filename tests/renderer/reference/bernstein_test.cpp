@@ -47,6 +47,30 @@ TEST(Bernstein, SumsProductsAndPartsTakeTheValuesThatTheyShould) {
   }
 }
 
+TEST(Bernstein, DerivativeIsTheSlope) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int trial = 0; trial < 50; ++trial) {
+    std::array<double, 6> a;
+    for (double& x : a) x = unit(random);
+    const Bernstein p(a), slope = p.derivative();
+    EXPECT_EQ(slope.degree(), 4u);
+    for (const double u : {0.1, 0.37, 0.5, 0.9})
+      EXPECT_NEAR(slope(u), (p(u + 1e-5) - p(u - 1e-5)) / 2e-5, 1e-7);  // third derivatives are below 1000
+  }
+  EXPECT_EQ(Bernstein(std::array{3.0}).derivative()(0.5), 0);
+}
+
+TEST(Bernstein, FindsRootsOnlyAsCloselyAsItIsAsked) {
+  for (const double narrowest : {0x1p-10, 0x1p-24, 0x1p-44}) {
+    std::vector<double> found;
+    withRoots({0.3, 0.7}).appendSignChanges(1e-15, found, narrowest);
+    ASSERT_EQ(found.size(), 2u);
+    EXPECT_NEAR(found[0], 0.3, narrowest + 1e-14);
+    EXPECT_NEAR(found[1], 0.7, narrowest + 1e-14);
+  }
+}
+
 TEST(Bernstein, FindsEverySimpleRootInsideAndNoOther) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> place(-0.5, 1.5);

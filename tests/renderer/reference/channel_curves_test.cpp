@@ -12,6 +12,13 @@
 namespace scolopax::reference {
 namespace {
 
+ChannelAppearance over(double lo, double hi) {
+  ChannelAppearance a;
+  a.rangeLo = lo;
+  a.rangeHi = hi;
+  return a;
+}
+
 ChannelSample at(const ChannelCurves& curves, double scalar) {
   const double position = curves.position(scalar);
   return curves.sample(curves.pieceAt(position), position);
@@ -53,7 +60,7 @@ TEST(ChannelCurves, AJumpAtZeroHoldsBelowTheRangeToo) {
 }
 
 TEST(ChannelCurves, AReversedRangeReverses) {
-  const ChannelAppearance a{.rangeLo = 10, .rangeHi = 0};
+  const ChannelAppearance a = over(10, 0);
   const ChannelCurves curves(a);
   EXPECT_EQ(at(curves, 10).extinction, 0);
   EXPECT_NEAR(at(curves, 2.5).extinction, 0.75, 1e-15);
@@ -61,7 +68,7 @@ TEST(ChannelCurves, AReversedRangeReverses) {
 }
 
 TEST(ChannelCurves, AnEmptyRangeIsAStepThatHoldsAtItsValue) {
-  const ChannelCurves curves(ChannelAppearance{.rangeLo = 5, .rangeHi = 5});
+  const ChannelCurves curves(over(5, 5));
   EXPECT_EQ(at(curves, std::nextafter(5.0, 0.0)).extinction, 0);
   EXPECT_EQ(at(curves, 5).extinction, 1);
   EXPECT_THAT(curves.breakpoints(), testing::ElementsAre(5));
@@ -80,7 +87,7 @@ TEST(ChannelCurves, GammaActsOnThePositionBeforeBothCurves) {
 }
 
 TEST(ChannelCurves, BreakpointsAreTheKnotsOfBothCurvesAndTheRange) {
-  ChannelAppearance a{.rangeLo = 2, .rangeHi = 4};
+  ChannelAppearance a = over(2, 4);
   a.opacity = {{0.25, 0}, {0.5, 1}};
   a.color = {{0.5, {0, 0, 0}}, {0.75, {1, 1, 1}}};
   EXPECT_THAT(ChannelCurves(a).breakpoints(), testing::ElementsAre(2, 2.5, 3, 3.5, 4));
@@ -98,13 +105,34 @@ TEST(ChannelCurves, KnowWhenThereIsNothingToSee) {
   EXPECT_FALSE(ChannelCurves(a).visible());
 }
 
+TEST(ChannelCurves, KnowBetweenWhichScalarsThereIsNothingToSee) {
+  ChannelAppearance a = over(10, 20);
+  a.opacity = {{0, 0}, {0.2, 0}, {0.4, 1}, {0.4, 0}, {0.8, 0}, {0.8, 1}};
+  const ChannelCurves curves(a);
+  EXPECT_FALSE(curves.visibleBetween(-5, 11.9));
+  EXPECT_TRUE(curves.visibleBetween(-5, 12.1));
+  EXPECT_FALSE(curves.visibleBetween(14, 17.9));
+  EXPECT_TRUE(curves.visibleBetween(13.9, 17.9));
+  EXPECT_TRUE(curves.visibleBetween(18, 18));
+  a.rangeLo = 20, a.rangeHi = 10;  // reversed
+  EXPECT_FALSE(ChannelCurves(a).visibleBetween(18.1, 30));
+  EXPECT_TRUE(ChannelCurves(a).visibleBetween(17.9, 30));
+}
+
 TEST(ChannelCurves, RefuseWhatHasNoMeaning) {
-  EXPECT_THROW(ChannelCurves(ChannelAppearance{.opacity = {}}), Error);
-  EXPECT_THROW(ChannelCurves(ChannelAppearance{.color = {}}), Error);
-  EXPECT_THROW(ChannelCurves(ChannelAppearance{.opacity = {{0.5, 0}, {0.25, 1}}}), Error);
-  EXPECT_THROW(ChannelCurves(ChannelAppearance{.gamma = 0}), Error);
-  EXPECT_THROW(ChannelCurves(ChannelAppearance{.density = -1}), Error);
-  EXPECT_THROW(ChannelCurves(ChannelAppearance{.rangeHi = std::numeric_limits<double>::quiet_NaN()}), Error);
+  const auto make = [](auto change) {
+    ChannelAppearance a;
+    change(a);
+    ChannelCurves{a};
+  };
+  EXPECT_NO_THROW(make([](ChannelAppearance&) {}));
+  EXPECT_THROW(make([](ChannelAppearance& a) { a.opacity.clear(); }), Error);
+  EXPECT_THROW(make([](ChannelAppearance& a) { a.color.clear(); }), Error);
+  EXPECT_THROW(make([](ChannelAppearance& a) { a.opacity = {{0.5, 0}, {0.25, 1}}; }), Error);
+  EXPECT_THROW(make([](ChannelAppearance& a) { a.gamma = 0; }), Error);
+  EXPECT_THROW(make([](ChannelAppearance& a) { a.density = -1; }), Error);
+  EXPECT_THROW(make([](ChannelAppearance& a) { a.rangeHi = std::numeric_limits<double>::quiet_NaN(); }),
+               Error);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <glm/matrix.hpp>
 #include <glm/vec4.hpp>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "renderer/data/scene.h"
@@ -91,7 +92,8 @@ class LitMarcher {
     return sum;
   }
 
-  glm::dvec3 gradient(std::size_t n, const glm::dvec3& point) const {
+  /// In world space; none where a difference is not finite.
+  std::optional<glm::dvec3> gradient(std::size_t n, const glm::dvec3& point) const {
     glm::dvec3 perVoxel(0);
     const glm::dvec3 last(dims_ - 1), p = glm::clamp(point, glm::dvec3(0), last);
     for (int axis = 0; axis < 3; ++axis) {
@@ -100,7 +102,7 @@ class LitMarcher {
       before[axis] = std::max(p[axis] - 1, 0.0);
       after[axis] = std::min(p[axis] + 1, last[axis]);
       perVoxel[axis] = (scalar(n, after) - scalar(n, before)) / (after[axis] - before[axis]);
-      if (!std::isfinite(perVoxel[axis])) return glm::dvec3(0);
+      if (!std::isfinite(perVoxel[axis])) return std::nullopt;
     }
     return glm::transpose(voxelFromWorld_) * perVoxel;
   }
@@ -121,6 +123,17 @@ class LitMarcher {
     return std::pow(std::clamp((s - a.rangeLo) / (a.rangeHi - a.rangeLo), 0.0, 1.0), a.gamma);
   }
 
+  /// What |gradient| makes of the opacity.
+  double factor(std::size_t n, const glm::dvec3& point) const {
+    const std::optional<GradientOpacity>& by = scene_.channels[n].gradientOpacity;
+    if (!by) return 1;
+    const std::optional<glm::dvec3> g = gradient(n, point);
+    if (!g) return 0;
+    const double lo = by->rangeLo, hi = by->rangeHi, magnitude = glm::length(*g);
+    const double at = lo == hi ? double(magnitude >= lo) : std::clamp((magnitude - lo) / (hi - lo), 0.0, 1.0);
+    return curve(by->factor, at, [](const OpacityKnot& k) { return k.value; });
+  }
+
   /// Extinction of every channel at a point; of one channel where `only` is not -1.
   Sigmas sigmas(const glm::dvec3& point, int only) const {
     Sigmas sigma{};
@@ -128,7 +141,8 @@ class LitMarcher {
       const ChannelAppearance& a = scene_.channels[n];
       const double s = scalar(n, point);
       if (!a.visible || (only >= 0 && int(n) != only) || !std::isfinite(s)) continue;
-      sigma[n] = a.density * curve(a.opacity, position(a, s), [](const OpacityKnot& k) { return k.value; });
+      sigma[n] = a.density * factor(n, point) *
+                 curve(a.opacity, position(a, s), [](const OpacityKnot& k) { return k.value; });
     }
     return sigma;
   }
@@ -183,7 +197,7 @@ class LitMarcher {
     const Material& m = a.material;
     const glm::dvec3 color = curve(a.color, position(a, s), [](const ColorKnot& k) { return k.color; });
     glm::dvec3 all(0), seen(0), diffuse(0), specular(0);
-    const glm::dvec3 grad = scene_.shading ? gradient(n, point) : glm::dvec3(0);
+    const glm::dvec3 grad = scene_.shading ? gradient(n, point).value_or(glm::dvec3(0)) : glm::dvec3(0);
     const double change = glm::length(grad) * smallestSpacing_, range = std::abs(a.rangeHi - a.rangeLo);
     const double g = change > 0 ? std::min(1.0, change / range) : 0, fade = 1 - (1 - g) * (1 - g);
     glm::dvec3 normal = change > 0 ? grad / glm::length(grad) : glm::dvec3(0);

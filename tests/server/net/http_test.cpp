@@ -453,6 +453,29 @@ TEST_F(HttpTest, LongRequestsNeitherDelayOthersNorGrowWithoutBound) {
   EXPECT_EQ(third.request("GET /poll HTTP/1.1").status, 200);
 }
 
+TEST_F(HttpTest, AQuickRequestThatTakesLongNeitherDelaysOthersNorGrowsWithoutBound) {
+  Options options = quickOptions();
+  options.workers = 1;
+  options.longRequests = 1;
+  Gate gate;
+  Server server(options);
+  server.route("POST", "/edit", [&](const Request& request) {
+    if (request.body == "short") return Response{200, "", "at once", {}};
+    if (!request.mayWait) throw TakesLong();
+    gate.pass();
+    return Response{200, "", request.body, {}};
+  });
+  server.start();
+  TestClient waiting(server.port()), other(server.port());
+  waiting.send("POST /edit HTTP/1.1\r\nHost: a\r\nContent-Length: 4\r\n\r\nlong");
+  gate.waitFor(1);
+  EXPECT_EQ(other.request("POST /edit HTTP/1.1", "short").body, "at once");
+  EXPECT_EQ(other.request("POST /edit HTTP/1.1", "long").status, 503);
+  gate.open();
+  EXPECT_EQ(waiting.answer().body, "long");
+  EXPECT_EQ(other.request("POST /edit HTTP/1.1", "long").body, "long");
+}
+
 TEST_F(HttpTest, TellsALongRequestThatItsClientHasGone) {
   Server server(quickOptions());
   std::atomic<int> running{0}, gone{0};

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Piecewise-linear curves in the form that kernels evaluate, and where values lie on them.
+#pragma once
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "renderer/data/scene.h"
+#include "renderer/kernel/views.h"
+
+namespace scolopax {
+
+/// Owner of one curve's knots; view() borrows.
+template <class Value>
+struct Curve {
+  std::vector<float> positions;
+  std::vector<Value> values;
+  std::vector<std::uint16_t> buckets;
+  kernel::CurveView<Value> view() const {
+    return {positions.data(), values.data(), buckets.data(), int(positions.size())};
+  }
+};
+
+/// Owner of both curves on the knots of both.
+struct OpticalCurve {
+  std::vector<kernel::OpticalKnot> knots;
+  std::vector<std::uint16_t> buckets;
+  float first = 0, last = 1;  ///< no opacity at positions up to `first` and from `last` on
+  kernel::OpticalCurveView view() const {
+    return {knots.data(), buckets.data(), int(knots.size()), first, last};
+  }
+};
+
+/// Throws Error(badInput), naming the curve, for no knots or too many, positions that decrease or lie outside
+/// [0,1], and values of opacity outside [0,1].
+Curve<float> makeCurve(const std::vector<OpacityKnot>& knots, const char* name);
+Curve<glm::vec3> makeCurve(const std::vector<ColorKnot>& knots, const char* name);
+OpticalCurve makeOpticalCurve(const Curve<float>& opacity, const Curve<glm::vec3>& color);
+
+/// Where a value lies on curves over the range from lo to hi: at clamp((value - origin) * scale + offset, 0,
+/// 1). lo == hi is a step: of `rising`, 0 below and 1 from lo on; else 1 up to lo and 0 above.
+struct Placement {
+  float origin, scale, offset;
+  Placement(double lo, double hi, bool rising);
+};
+
+}  // namespace scolopax

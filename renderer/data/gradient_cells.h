@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Per macrocell: how steep a channel is at most, at any sample inside. Made from a Volume once for channels
+// whose opacity depends on the gradient; bound_columns reads it.
+#pragma once
+#include <stop_token>
+#include <vector>
+
+#include "renderer/data/macrocell_grid.h"
+
+namespace scolopax {
+
+struct GradientCells {
+  ValueLevels levels;               ///< of |gradient|: stored values per smallest spacing
+  std::vector<std::uint8_t> cells;  ///< per macrocell: the level that no |gradient| exceeds
+  std::size_t sizeBytes() const { return cells.size(); }
+};
+
+/// Measures one channel in macrocells of `size` voxels on an edge. What the kernels compute in float
+/// (kernel/gradient.h) is bounded, rounding included.
+///
+/// Where no difference is one-sided, the gradient of the trilinear interpolant by central differences is the
+/// trilinear interpolation of the voxels' gradients, and no longer than the longest of them. At the border
+/// every difference is a mean of slopes between neighbours along its axis, which bounds each component.
+/// Throws Error(cancelled) once `stop` is requested.
+GradientCells buildGradientCells(const Volume& volume, int channel, int size,
+                                 const std::stop_token& stop = {});
+
+}  // namespace scolopax

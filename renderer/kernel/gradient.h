@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// The gradient of a channel at points, and the factor that its magnitude makes of the opacity. What only
+// scenes with such a factor need is not inlined, and takes no scene: its address would put it in memory.
+#pragma once
+#include "renderer/kernel/classify.h"
+#include "renderer/kernel/sample_volume.h"
+
+namespace scolopax::kernel {
+
+template <class L>
+SCOLOPAX_LANES typename L::Vec product(const glm::mat3& m, const typename L::Vec& v) {
+  using Vec = typename L::Vec;
+  return Vec(m[0]) * v[0] + Vec(m[1]) * v[1] + Vec(m[2]) * v[2];
+}
+
+template <class Vec>
+SCOLOPAX_LANES auto largestComponent(const Vec& v) {
+  return maximum(maximum(maximum(v[0], -v[0]), maximum(v[1], -v[1])), maximum(v[2], -v[2]));
+}
+
+template <class L>
+struct Gradient {
+  typename L::Vec perSpacing;  ///< of stored values in world space, per smallest spacing
+  typename L::Mask finite;     ///< where all differences are
+};
+
+/// Central differences of one voxel, one-sided at the border.
+template <class L>
+SCOLOPAX_LANES Gradient<L> gradientAt(const ChannelView& channel, glm::ivec3 dims, const glm::mat3& fromVoxel,
+                                      const typename L::Vec& point) {
+  using Float = typename L::Float;
+  using Vec = typename L::Vec;
+  Vec perVoxel(0.0f);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (dims[axis] < 2) continue;
+    const float last = float(dims[axis] - 1);
+    const Float at = clamp(point[axis], 0.0f, last);
+    Vec low = point, high = point;
+    low[axis] = maximum(at - 1.0f, 0.0f);
+    high[axis] = minimum(at + 1.0f, last);
+    const Float difference = sampleStored(channel, dims, high) - sampleStored(channel, dims, low);
+    perVoxel[axis] = difference / (high[axis] - low[axis]);
+  }
+  const typename L::Mask finite = isFinite(perVoxel[0]) & isFinite(perVoxel[1]) & isFinite(perVoxel[2]);
+  return {product<L>(fromVoxel, perVoxel), finite};
+}
+/// How many samples that takes.
+SCOLOPAX_HD inline unsigned gradientFetches(glm::ivec3 dims) {
+  return 2u * (unsigned(dims.x > 1) + unsigned(dims.y > 1) + unsigned(dims.z > 1));
+}
+
+/// Length of a vector whose squares may be beyond what floats hold.
+template <class L>
+SCOLOPAX_LANES typename L::Float lengthOf(const typename L::Vec& v) {
+  using Float = typename L::Float;
+  using Vec = typename L::Vec;
+  const Float largest = largestComponent(v), divisor = maximum(largest, Float(kLeastNormal));
+  const Vec scaled(v[0] / divisor, v[1] / divisor, v[2] / divisor);
+  return select(largest < kInfinity, divisor * squareRoot(dot(scaled, scaled)), largest);
+}
+
+/// Where |gradient| lies on the factor's curve, beyond [0,1] too, as stretchPosition() of optical_curve.h;
+/// NaN where it is not finite.
+template <class L>
+SCOLOPAX_LANES_RARE void findFactorPosition(const ChannelView& channel, glm::ivec3 dims,
+                                            const typename L::Vec& point, typename L::Float* position) {
+  using Float = typename L::Float;
+  const GradientFactorView& factor = channel.gradient;
+  const Gradient<L> gradient = gradientAt<L>(channel, dims, factor.fromVoxel, point);
+  const Float unbounded = (lengthOf<L>(gradient.perSpacing) - factor.origin) * factor.scale + factor.offset;
+  *position = select(gradient.finite, clamp(unbounded, -kFarPosition, kFarPosition), Float(kNaN));
+}
+
+/// Factor of the opacity at a point.
+SCOLOPAX_RARE inline float gradientFactorAt(const ChannelView& channel, glm::ivec3 dims, glm::vec3 point) {
+  const GradientFactorView& factor = channel.gradient;
+  const Gradient<One> gradient = gradientAt<One>(channel, dims, factor.fromVoxel, point);
+  if (!gradient.finite) return 0.0f;
+  return evaluate(factor.factor, factorPosition(factor, lengthOf<One>(gradient.perSpacing)));
+}
+
+}  // namespace scolopax::kernel

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/edit_queue.h"
+
+#include <string>
+#include <utility>
+
+#include "protocol/problem.h"
+
+namespace scolopax::server {
+
+void EditQueue::push(Edit edit) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!roomFor(edit))
+      throw protocol::ProtocolError(429, "",
+                                    "expected at most " + std::to_string(kMaxEdits) + " edits or " +
+                                        std::to_string(kMaxBytes) +
+                                        " bytes of them to wait in a stream, found more");
+    bytes_ += edit.bytes;
+    waiting_.push_back(std::move(edit));
+    if (std::exchange(atWork_, true)) return;
+  }
+  if (!applyAll())
+    background_.start([self = shared_from_this()](const std::stop_token& stop) { self->applyMeasured(stop); },
+                      [] {});
+}
+
+void EditQueue::end() {
+  ended_.request_stop();
+  const std::lock_guard applied(applying_);
+  const std::lock_guard lock(mutex_);
+  waiting_.clear();
+  bytes_ = 0;
+}
+
+bool EditQueue::roomFor(const Edit& edit) const {
+  return waiting_.empty() || (waiting_.size() < kMaxEdits && bytes_ + edit.bytes <= kMaxBytes);
+}
+
+std::optional<EditQueue::Edit> EditQueue::next() {
+  const std::lock_guard lock(mutex_);
+  if (waiting_.empty() || ended_.stop_requested()) {
+    atWork_ = false;
+    return std::nullopt;
+  }
+  Edit edit = std::move(waiting_.front());
+  waiting_.pop_front();
+  bytes_ -= edit.bytes;
+  return edit;
+}
+
+/// False when the first that is left has to wait.
+bool EditQueue::applyAll() {
+  while (auto edit = next()) {
+    const std::lock_guard applying(applying_);
+    if (ended_.stop_requested()) continue;
+    try {
+      edit->apply();
+    } catch (const Unmeasured& missing) {
+      missing_ = missing;
+      const std::lock_guard lock(mutex_);
+      bytes_ += edit->bytes;
+      waiting_.push_front(std::move(*edit));
+      return false;
+    } catch (...) {
+      edit->failed(std::current_exception());
+    }
+  }
+  return true;
+}
+
+void EditQueue::applyMeasured(const std::stop_token& stop) {
+  const std::stop_callback end(stop, [this] { ended_.request_stop(); });
+  do {
+    try {
+      missing_->measure(ended_.get_token());
+    } catch (...) {
+      if (const auto edit = next()) edit->failed(std::current_exception());
+    }
+  } while (!applyAll());
+}
+
+}  // namespace scolopax::server

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// Mistakes in opacity by the gradient, sown on purpose, each of which the comparison with the reference must
+// notice: what defects_statistics_test.cpp is for the rest.
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "renderer/kernel/raymarch.h"
+#include "renderer/kernel/trackers/one_process.h"
+#include "renderer/metrics/metrics.h"
+#include "tests/support/agreement.h"
+#include "tests/support/estimator_scenes.h"
+#include "tests/support/gradients.h"
+
+namespace scolopax {
+namespace {
+
+using namespace test;
+using kernel::SceneView;
+using Unlit = kernel::LightFeatures<false, false>;
+using Shadowed = kernel::LightFeatures<false, true>;
+
+/// Shadow rays, which begin inside the box, take opacity as if there were no factor.
+struct ShadowsWithoutFactors {
+  template <class Blend>
+  static std::optional<kernel::Collision> track(SceneView scene, const kernel::Ray& ray,
+                                                kernel::Interval inside, kernel::Sampler& sampler,
+                                                kernel::SampleCost* cost) {
+    std::vector<kernel::ChannelView> channels(scene.channels, scene.channels + scene.channelCount);
+    if (!(inside.enter > 0)) {
+      for (kernel::ChannelView& channel : channels) channel.gradient.factor.count = 0;
+      scene.channels = channels.data();
+    }
+    return kernel::Superposed::track<Blend>(scene, ray, inside, sampler, cost);
+  }
+};
+
+class GradientDefect : public testing::Test {
+ protected:
+  void use(TestScene which, bool shadows = false) {
+    made_ = *testScene(which);
+    made_.scene.shadows = shadows;
+    if (shadows) made_.scene.width = made_.scene.height = 6;
+    for (std::size_t n = 0; n < made_.scene.channels.size(); ++n)
+      made_.scene.channels[n].gradientOpacity = factorBetween(*made_.volume, n, 0.2, 0.9);
+    expected_ = reference::renderReference(*made_.volume, made_.scene, 1);
+  }
+  template <class Tracker = kernel::Superposed, class Features = Unlit, class Change>
+  ::testing::AssertionResult trackerPasses(Change&& change) {
+    return haveMean(replicateKernel<kernel::Analog<Tracker>, kernel::BlendDensity, Features>(
+                        made_.volume, made_.scene, change),
+                    made_.scene, expected_);
+  }
+  /// RMSE of quadrature at a short step.
+  template <class Change>
+  double marcherError(Change&& change) {
+    made_.scene.method = Method::raymarch;
+    made_.scene.step = 0.1;
+    const auto found =
+        replicateKernel<kernel::RayMarch, kernel::BlendDensity, Unlit>(made_.volume, made_.scene, change);
+    return compareImages(found.pictures[0], expected_.image).rmse;
+  }
+  /// Calls change(factor) for the view's channels, of which it makes copies.
+  auto inFactors(std::function<void(kernel::GradientFactorView&)> change) {
+    return [this, change](SceneView& view) {
+      channels_.assign(view.channels, view.channels + view.channelCount);
+      view.channels = channels_.data();
+      for (kernel::ChannelView& channel : channels_) change(channel.gradient);
+    };
+  }
+
+  VolumeAndScene made_;
+  reference::ReferenceImage expected_;
+  std::vector<kernel::ChannelView> channels_;
+};
+
+// GradientLooks.AreWhatQuadratureApproaches allows 1.5e-3.
+constexpr double kQuadratureError = 1.5e-3;
+
+TEST_F(GradientDefect, NoneIsFoundWhereThereIsNone) {
+  for (const TestScene which : {TestScene::lumps, TestScene::noise}) {
+    use(which);
+    EXPECT_TRUE(trackerPasses(inFactors([](kernel::GradientFactorView&) {})));
+  }
+  use(TestScene::lumps);
+  EXPECT_LT(marcherError([](SceneView&) {}), kQuadratureError);
+  use(TestScene::lumps, true);
+  EXPECT_TRUE((trackerPasses<kernel::Superposed, Shadowed>([](SceneView&) {})));
+}
+
+TEST_F(GradientDefect, OfAFactorThatIsIgnoredIsFound) {
+  use(TestScene::lumps);
+  const auto ignored = inFactors([](kernel::GradientFactorView& gradient) { gradient.factor.count = 0; });
+  EXPECT_FALSE(trackerPasses(ignored));
+  EXPECT_GT(marcherError(ignored), 10 * kQuadratureError);
+  // In the bounds as well, which otherwise cut off what is too much.
+  Scene without = made_.scene;
+  for (ChannelAppearance& channel : without.channels) channel.gradientOpacity.reset();
+  EXPECT_FALSE(haveMean(replicate(made_.volume, without, Method::superposed), made_.scene, expected_));
+}
+
+TEST_F(GradientDefect, OfShadowsThatIgnoreItIsFound) {
+  use(TestScene::lumps, true);
+  EXPECT_FALSE((trackerPasses<ShadowsWithoutFactors, Shadowed>([](SceneView&) {})));
+}
+
+TEST_F(GradientDefect, OfGradientsInUnitsOfVoxelsIsFound) {
+  use(TestScene::lumps);  // spacing 1 : 0.8 : 1.7
+  const auto perVoxel =
+      inFactors([](kernel::GradientFactorView& gradient) { gradient.fromVoxel = glm::mat3(1.0f); });
+  EXPECT_FALSE(trackerPasses(perVoxel));
+  EXPECT_GT(marcherError(perVoxel), 3 * kQuadratureError);
+}
+
+TEST_F(GradientDefect, OfARangePerSmallestSpacingIsFound) {
+  use(TestScene::lumps);
+  const double spacing = made_.volume->grid().smallestSpacing();
+  const auto perSpacing = inFactors([spacing](kernel::GradientFactorView& gradient) {
+    gradient.scale *= float(spacing);
+    gradient.origin /= float(spacing);
+  });
+  EXPECT_FALSE(trackerPasses(perSpacing));
+  EXPECT_GT(marcherError(perSpacing), 3 * kQuadratureError);
+}
+
+TEST_F(GradientDefect, OfARangeOfStoredValuesIsFound) {
+  use(TestScene::noise);
+  EXPECT_FALSE(trackerPasses(inFactors([this](kernel::GradientFactorView& gradient) {
+    if (&gradient != &channels_[1].gradient) return;  // of slope -2
+    gradient.scale /= 2;
+    gradient.origin *= 2;
+  })));
+}
+
+TEST_F(GradientDefect, OfARangeThatIsShiftedIsFound) {
+  use(TestScene::lumps);
+  EXPECT_FALSE(
+      trackerPasses(inFactors([](kernel::GradientFactorView& gradient) { gradient.offset += 0.1f; })));
+}
+
+}  // namespace
+}  // namespace scolopax

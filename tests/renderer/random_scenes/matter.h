@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the tester's own march meets: one channel's field and look, and the decisions that led to a sample.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "renderer/data/scene.h"
+
+namespace scolopax::random_scenes {
+
+/// Hash of the decisions that led to a sample.
+class Decisions {
+ public:
+  void note(std::uint64_t which) { hash_ = (hash_ ^ (which + 1)) * 0x100000001b3u; }
+  std::uint64_t hash() const { return hash_; }
+
+ private:
+  std::uint64_t hash_ = 0xcbf29ce484222325u;
+};
+
+/// One channel's values, and how it looks.
+struct Matter {
+  int number;                  // of the channel
+  std::vector<double> values;  // data values, x fastest
+  glm::ivec3 dims;
+  const ChannelAppearance* look;
+
+  double voxel(int i, int j, int k) const { return values[std::size_t(i + dims.x * (j + dims.y * k))]; }
+  static double mean(double a, double b, double w) { return w == 1 ? b : a + w * (b - a); }
+
+  /// Trilinear; NaN in a cell with a corner that is not finite.
+  double at(const glm::dvec3& p) const {
+    int low[3], high[3];
+    double w[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const double x = std::fmin(std::fmax(p[axis], 0), dims[axis] - 1);
+      low[axis] = std::max(0, std::min(int(std::floor(x)), dims[axis] - 2));
+      high[axis] = std::min(low[axis] + 1, dims[axis] - 1);
+      w[axis] = x - low[axis];
+    }
+    double plane[2];
+    for (int z = 0; z < 2; ++z) {
+      const int k = z ? high[2] : low[2];
+      double row[2];
+      for (int y = 0; y < 2; ++y) {
+        const int j = y ? high[1] : low[1];
+        const double a = voxel(low[0], j, k), b = voxel(high[0], j, k);
+        if (!std::isfinite(a) || !std::isfinite(b)) return std::numeric_limits<double>::quiet_NaN();
+        row[y] = mean(a, b, w[0]);
+      }
+      plane[z] = mean(row[0], row[1], w[1]);
+    }
+    return mean(plane[0], plane[1], w[2]);
+  }
+
+  /// Per voxel along each axis, by differences of one voxel; none where one of them is not finite.
+  std::optional<glm::dvec3> gradient(const glm::dvec3& p) const {
+    glm::dvec3 g(0);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double last = dims[axis] - 1, x = std::fmin(std::fmax(p[axis], 0), last);
+      glm::dvec3 before = p, after = p;
+      before[axis] = std::fmax(x - 1, 0);
+      after[axis] = std::fmin(x + 1, last);
+      if (before[axis] < after[axis]) g[axis] = (at(after) - at(before)) / (after[axis] - before[axis]);
+      if (!std::isfinite(g[axis])) return std::nullopt;
+    }
+    return g;
+  }
+
+  static double share(double value, double lo, double hi) {
+    if (lo == hi) return value < lo ? 0 : 1;
+    return std::fmin(std::fmax((value - lo) / (hi - lo), 0), 1);
+  }
+  double position(double value) const {
+    return std::pow(share(value, look->rangeLo, look->rangeHi), look->gamma);
+  }
+
+  /// The last knot at or before `position` and the next one; `of(knot)` is what is interpolated.
+  template <class Knots, class Of>
+  static auto curve(const Knots& knots, double position, Decisions* decisions, Of of) {
+    std::size_t next = 0;
+    while (next < knots.size() && knots[next].position <= position) ++next;
+    decisions->note(next);
+    if (next == 0) return of(knots.front());
+    if (next == knots.size()) return of(knots.back());
+    const auto &a = knots[next - 1], &b = knots[next];
+    return of(a) + (of(b) - of(a)) * ((position - a.position) / (b.position - a.position));
+  }
+
+  /// What the opacity is multiplied by at a point; `worldFromGradient` is the grid's.
+  double factor(const glm::dvec3& p, const glm::dmat3& worldFromGradient, Decisions* decisions) const {
+    if (!look->gradientOpacity) return 1;
+    const std::optional<glm::dvec3> perVoxel = gradient(p);
+    decisions->note(perVoxel.has_value());
+    if (!perVoxel) return 0;
+    const glm::dvec3 g = worldFromGradient * *perVoxel;
+    // Where the gradient passes zero its length turns sharply, and the sign of its largest component changes.
+    int largest = 0;
+    for (int axis = 1; axis < 3; ++axis)
+      if (std::abs(g[axis]) > std::abs(g[largest]) * (1 + 1e-9)) largest = axis;  // not by rounding
+    decisions->note(std::uint64_t(2 * largest + (g[largest] < 0)));
+    const GradientOpacity& by = *look->gradientOpacity;
+    const double position = share(glm::length(g), by.rangeLo, by.rangeHi);
+    decisions->note(std::uint64_t((position > 0) + (position >= 1)));
+    return curve(by.factor, position, decisions, [](const OpacityKnot& k) { return k.value; });
+  }
+};
+
+}  // namespace scolopax::random_scenes

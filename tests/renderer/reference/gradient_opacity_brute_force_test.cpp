@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Opacity by the gradient against tiny steps, on random small volumes on all kinds of grids: what the
+// reference claims of its own error must hold, in all blend modes and lights.
+#include <gtest/gtest.h>
+
+#include "renderer/reference/integrator.h"
+#include "tests/renderer/reference/lit_march.h"
+#include "tests/renderer/reference/random_light.h"
+#include "tests/support/gradients.h"
+
+namespace scolopax::reference {
+namespace {
+
+/// Ranges of what the channel has, and around it; steps, reversed ones and jumps.
+GradientOpacity randomFactor(RandomLight& draw, const Volume& volume, std::size_t channel) {
+  const auto quantile = [&] { return test::gradientQuantile(volume, channel, draw.unit()); };
+  GradientOpacity opacity{quantile(), quantile(), {}};
+  opacity.rangeLo *= draw.chance(0.5) ? 1 : 0.1;
+  opacity.rangeHi *= 1 + draw.unit();
+  if (draw.chance(0.15)) opacity.rangeHi = opacity.rangeLo = opacity.rangeLo * (0.9 + 0.2 * draw.unit());
+  if (draw.chance(0.2)) std::swap(opacity.rangeLo, opacity.rangeHi);
+  for (int i = draw.among(1, 5); i > 0; --i)
+    opacity.factor.push_back({draw.unit(), draw.chance(0.3) ? draw.among(0, 1) : draw.unit()});
+  std::sort(opacity.factor.begin(), opacity.factor.end(),
+            [](const OpacityKnot& a, const OpacityKnot& b) { return a.position < b.position; });
+  if (opacity.factor.size() > 2 && draw.chance(0.5)) opacity.factor[1].position = opacity.factor[2].position;
+  return opacity;
+}
+
+/// Claims of one ray through each of `count` random scenes against tiny steps.
+void expectClaimsHold(bool shading, bool shadows, unsigned count, int steps, double largestClaim) {
+  int seen = 0;
+  for (unsigned seed = 1; seed <= count; ++seed) {
+    RandomLight draw(seed);
+    const Volume volume = draw.volume();
+    Scene scene = draw.scene(volume);
+    scene.shading = shading;
+    scene.shadows = shadows;
+    for (std::size_t n = 0; n < scene.channels.size(); ++n)
+      if (n == 0 || draw.chance(0.5)) scene.channels[n].gradientOpacity = randomFactor(draw, volume, n);
+    const RandomRay ray(draw, volume, seed);
+    const RayResult found = traceReference(volume, scene, ray.origin, ray.direction);
+    const March expected = LitMarcher(volume, scene).march(ray.origin, ray.direction, steps, steps);
+    for (int c = 0; c < 4; ++c)
+      EXPECT_NEAR(found.rgba[c], expected.rgba[c], found.error + expected.bound)
+          << "seed " << seed << " component " << c;
+    EXPECT_LE(found.error, largestClaim) << "seed " << seed;
+    seen += found.rgba.a > 0.01;
+  }
+  EXPECT_GT(seen, int(count) / 2);
+}
+
+// The tolerances of kTolerance and kToleranceLit are those of a piece; blend mode composite adds three
+// channels.
+TEST(ReferenceGradientOpacity, KeepsWhatItClaimsOnRandomScenes) {
+  expectClaimsHold(false, false, 150, 20000, 4 * Integrator::kTolerance);
+}
+TEST(ReferenceGradientOpacity, KeepsWhatItClaimsInShadedRandomScenes) {
+  expectClaimsHold(true, false, 100, 20000, 4 * Integrator::kToleranceLit);
+}
+TEST(ReferenceGradientOpacity, KeepsWhatItClaimsInRandomScenesWithShadows) {
+  expectClaimsHold(false, true, 12, 500, 4 * Integrator::kToleranceLit);
+  expectClaimsHold(true, true, 12, 500, 4 * Integrator::kToleranceLit);
+}
+
+}  // namespace
+}  // namespace scolopax::reference
