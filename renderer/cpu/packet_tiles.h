@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <bit>
 
-#include "renderer/cpu/pass.h"
 #include "renderer/cpu/sample_lanes.h"
+#include "renderer/cpu/tile_function.h"
 #include "renderer/data/instances.h"
 #include "renderer/kernel/raymarch.h"
 
