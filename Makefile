@@ -2,9 +2,13 @@
 # make run     build everything, make the demo data if DATA names none, serve it on loopback
 # make test    build and run the tests; make check adds sanitizers, clang-tidy, fuzzing, hostile clients with large
 #              volumes, four times the samples in the statistical tests and ten times the random scenes
+# make fuzz    FUZZ_SECONDS more of every fuzzer, on the corpus that earlier runs have found
+# make soak    SCENES more random scenes, from where the last run ended; those that fail are kept in build/soak
 DATA ?=
 PORT ?= 8080
 JOBS ?= $(shell nproc)
+FUZZ_SECONDS ?= 600
+SCENES ?= 20000
 # A label that no test has is a mistake in this file.
 CTEST := ctest --no-tests=error
 DEMO := build/demo/orbitals.nrrd
@@ -13,7 +17,7 @@ SCOLOPAX := build/release/scolopax
 # Two recipes would run .ci/install at once; the tools called use all processors on their own.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: run build web test check check-asan-ubsan check-tsan check-tidy check-fuzz check-format check-cuda deps test-deps format clean
+.PHONY: fuzzers run build web test check check-asan-ubsan check-tsan check-tidy check-fuzz check-format check-cuda fuzz soak deps test-deps format clean
 
 run: build web $(if $(strip $(DATA)),,$(DEMO))
 	exec $(SCOLOPAX) serve $(if $(strip $(DATA)),$(DATA),$(DEMO)) --port $(PORT)
@@ -53,10 +57,30 @@ check-tsan: test-deps
 	TSAN_OPTIONS=suppressions=$(CURDIR)/tests/support/tsan.supp \
 	  $(CTEST) --test-dir build/tsan -j $(JOBS) -L unit-server --output-on-failure
 
-check-fuzz: test-deps
+check-fuzz: fuzzers
+	$(CTEST) --test-dir build/fuzz -L fuzz --output-on-failure
+
+fuzzers: test-deps
 	cmake --preset fuzz > /dev/null
 	cmake --build --preset fuzz -j $(JOBS)
-	$(CTEST) --test-dir build/fuzz -L fuzz --output-on-failure
+
+fuzz: fuzzers
+	for corpus in build/fuzz/corpus/*; do \
+	  build/fuzz/$$(basename $$corpus) -max_total_time=$(FUZZ_SECONDS) -rss_limit_mb=2048 -timeout=10 \
+	    -artifact_prefix=build/fuzz/ $$corpus $$(ls -d tests/fuzz/seeds/$$(basename $$corpus _fuzz) 2> /dev/null) || exit 1; \
+	done
+
+# In batches, so that stopping loses little. The first 3000 are those of make check.
+soak: test-deps
+	cmake --preset release -DBUILD_TESTING=ON > /dev/null
+	cmake --build --preset release --target tests_random_scenes -j $(JOBS)
+	mkdir -p build/soak
+	first=$$(cat build/soak/next 2> /dev/null || echo 3000); end=$$((first + $(SCENES))); failed=0; \
+	while [ $$first -lt $$end ]; do \
+	  SCOLOPAX_RANDOM_SCENES=500 SCOLOPAX_RANDOM_SCENES_FIRST=$$first SCOLOPAX_RANDOM_SCENES_FOLDER=build/soak \
+	    build/release/tests_random_scenes --gtest_brief=1 --gtest_filter='*RandomScenes*' || failed=1; \
+	  first=$$((first + 500)); echo $$first > build/soak/next; echo "scenes below $$first are done"; \
+	done; exit $$failed
 
 # With nvcc; without one, configuring says so and there is nothing to check.
 check-cuda: test-deps

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The backend interface: a volume and a scene in, an accumulating picture out. The server and the
-// commands use this; renderer/cpu implements it, cuda/ will.
+// A volume and a scene in, an accumulating picture out. The server and the commands use this; engine/
+// implements it over a launcher, which runs the kernels.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -17,6 +17,8 @@
 #include "renderer/data/volume.h"
 
 namespace scolopax {
+
+class Launcher;
 
 /// What setScene had to redo.
 struct RebuildStats {
@@ -94,8 +96,12 @@ class Renderer {
   virtual Image image() const = 0;
 };
 
-/// `threads` 0 means all. Same scene, seed and sample count give the same bits for any number of threads.
 /// Its memory is charged to `memory`, if given; setScene and recordAovs rethrow its errors.
+std::unique_ptr<Renderer> makeRenderer(std::unique_ptr<Launcher> launcher,
+                                       std::shared_ptr<const Volume> volume,
+                                       std::shared_ptr<MemoryBudget> memory = nullptr);
+/// On the processor; `threads` 0 means all. Same scene, seed and sample count give the same bits for any
+/// number of threads.
 std::unique_ptr<Renderer> makeCpuRenderer(std::shared_ptr<const Volume> volume, int threads,
                                           std::shared_ptr<MemoryBudget> memory = nullptr);
 

@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <bit>
 
-#include "renderer/cpu/pass.h"
 #include "renderer/cpu/sample_lanes.h"
+#include "renderer/cpu/tile_function.h"
 #include "renderer/data/instances.h"
 #include "renderer/kernel/raymarch.h"
+#include "renderer/kernel/render_pixel.h"
 
 namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
@@ -34,22 +35,16 @@ SCOLOPAX_LANES_APART void renderPacket(const Pass& pass, const Blend& blend, int
   const Int rows = Int(y) + right<std::countr_zero(unsigned(kPacketWidth))>(laneNumbers());
   const Mask wanted = maskOf(todo);
   kernel::SamplerOf<Lanes> sampler(rows * scene.width + columns, pass.number, scene.seed);
-  const auto jitter = sampler.next(wanted);
-  Float across = toFloat(columns) + 0.5f, down = toFloat(rows) + 0.5f;
-  if (scene.filterBox)
-    across = toFloat(columns) + kernel::uniformOf(jitter.x),
-    down = toFloat(rows) + kernel::uniformOf(jitter.y);
-  const kernel::RayOf<Lanes> ray = scene.rays.through<Lanes>(across, down);
-  kernel::IntervalOf<Lanes> inside = kernel::clipToScene(scene, ray);
-  inside.exit = where(wanted, inside.exit);
+  kernel::PixelRay<Lanes> from(scene, columns, rows, sampler, wanted);
+  from.inside.exit = where(wanted, from.inside.exit);
   kernel::CostOf<Lanes> cost{};
   kernel::FirstCollisionOf<Lanes> met{};
   kernel::Radiance<Lanes> radiance{Vec(0.0f), Float(0.0f)};
-  if (scene.channelCount > 0 && any(inside.enter < inside.exit))
-    radiance = kernel::RayMarch::march<Features>(scene, blend, ray, inside, sampler, &cost,
+  if (scene.channelCount > 0 && any(from.inside.enter < from.inside.exit))
+    radiance = kernel::RayMarch::march<Features>(scene, blend, from.ray, from.inside, sampler, &cost,
                                                  pass.first ? &met : nullptr);
 
-  if (pass.first) met.depth = scene.rays.depth(across, down, met.depth);
+  if (pass.first) met.depth = scene.rays.depth(from.x, from.y, met.depth);
   for (; todo != 0; todo &= todo - 1) {
     const int i = std::countr_zero(todo), pixel = pixels[i];
     pass.pixels[pixel] = {at(radiance.color[0], i), at(radiance.color[1], i), at(radiance.color[2], i),

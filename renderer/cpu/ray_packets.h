@@ -3,7 +3,7 @@
 // but where rounding decides whether a ray meets a cell.
 #pragma once
 #include "renderer/cpu/instruction_set.h"
-#include "renderer/cpu/pass.h"
+#include "renderer/cpu/tile_function.h"
 
 namespace scolopax {
 

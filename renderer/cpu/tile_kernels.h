@@ -4,7 +4,7 @@
 #pragma once
 #include <algorithm>
 
-#include "renderer/cpu/pass.h"
+#include "renderer/cpu/tile_function.h"
 #include "renderer/data/instances.h"
 #include "renderer/kernel/blend_modes.h"
 #include "renderer/kernel/render_pixel.h"

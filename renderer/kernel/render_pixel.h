@@ -9,6 +9,28 @@
 
 namespace scolopax::kernel {
 
+/// A ray of every lane through its pixel, and the part of it that may show anything.
+template <class L>
+struct PixelRay {
+  typename L::Float x, y;  ///< on the film, in pixels
+  RayOf<L> ray;
+  IntervalOf<L> inside;
+
+  /// Takes a block of random numbers, of lanes in the mask.
+  SCOLOPAX_LANES PixelRay(const SceneView& scene, typename L::Int column, typename L::Int row,
+                          SamplerOf<L>& sampler, typename L::Mask which) {
+    const auto jitter = sampler.next(which);
+    x = toFloat(column) + 0.5f;
+    y = toFloat(row) + 0.5f;
+    if (scene.filterBox) {
+      x = toFloat(column) + uniformOf(jitter.x);
+      y = toFloat(row) + uniformOf(jitter.y);
+    }
+    ray = scene.rays.through<L>(x, y);
+    inside = clipToScene(scene, ray);
+  }
+};
+
 /// Integrator: Analog<Tracker> or RayMarch.
 template <class Integrator, class Blend, class Features>
 struct RenderPixel {
@@ -20,24 +42,18 @@ struct RenderPixel {
 
   SCOLOPAX_HD void operator()(int pixel) const {
     Sampler sampler(std::uint32_t(pixel), number, scene.seed);
-    const RandomBlock jitter = sampler.next();
-    const int column = pixel % scene.width, row = pixel / scene.width;
-    const float x = float(column) + (scene.filterBox ? uniformOf(jitter.x) : 0.5f);
-    const float y = float(row) + (scene.filterBox ? uniformOf(jitter.y) : 0.5f);
-    const Ray ray = scene.rays(x, y);
-    const Interval inside = clipToScene(scene, ray);
-
+    const PixelRay<One> at(scene, pixel % scene.width, pixel / scene.width, sampler, true);
 #if defined(__CUDA_ARCH__)
     constexpr FirstCollision* const first = nullptr;  // devices are not asked, and need not compile it
 #endif
     SampleCost spent;
     glm::vec4 result(0.0f);
     FirstCollision met;
-    if (scene.channelCount > 0 && inside.enter < inside.exit)
-      result = Integrator::template sample<Blend, Features>(scene, ray, inside, sampler, &spent,
+    if (scene.channelCount > 0 && at.inside.enter < at.inside.exit)
+      result = Integrator::template sample<Blend, Features>(scene, at.ray, at.inside, sampler, &spent,
                                                             first ? &met : nullptr);
     pass[pixel] = result;
-    if (first) first[pixel] = {scene.rays.depth(x, y, met.depth), met.channel};
+    if (first) first[pixel] = {scene.rays.depth(at.x, at.y, met.depth), met.channel};
     if (cost) {
       spent.randomBlocks += sampler.blocks();
       cost[pixel].fetches += spent.fetches;

@@ -3,7 +3,7 @@
 // and a true word on how far it is from there.
 #include <gtest/gtest.h>
 
-#include "renderer/cpu/thumbnails.h"
+#include "renderer/engine/step_bias.h"
 #include "renderer/metrics/metrics.h"
 #include "tests/support/estimator_scenes.h"
 #include "tests/support/statistics.h"
@@ -72,9 +72,10 @@ TEST_P(Estimates, OfBiasIsThatOfTheReference) {
         squares += glm::dot(glm::dvec4(one.pixels[i]) - truth, glm::dvec4(other.pixels[i]) - truth);
       }
       const double truth = std::sqrt(std::max(0.0, squares) / (4.0 * double(expected.pixels.size())));
+      const auto launcher = makeCpuLauncher(0);
       RenderPlan plan(made->volume);
       plan.update(scene);
-      const double found = estimateBias(plan);
+      const double found = estimateBias(*launcher, plan);
       // Quadrature ends at a transmittance of 1e-4, which no step tells.
       EXPECT_GT(found, truth / 3 - 1e-4) << "lit " << lit << " step " << step;
       EXPECT_LT(found, truth * 3 + 1e-4) << "lit " << lit << " step " << step;
@@ -144,13 +145,14 @@ TEST(Estimate, OfTheBiasOfBlackMatterIsThatOfItsAlpha) {
   Scene scene = framed;
   scene.method = Method::raymarch;
   const Image expected = reference::renderReference(*volume, scene, 1).image;
+  const auto launcher = makeCpuLauncher(0);
   for (const double step : {4.0, 1.0}) {
     scene.step = step;
     RenderPlan plan(volume);
     plan.update(scene);
     const double truth = compareImages(renderSamples(volume, scene, 256), expected).rmse;
-    EXPECT_GT(estimateBias(plan), truth / 3);
-    EXPECT_LT(estimateBias(plan), truth * 3);
+    EXPECT_GT(estimateBias(*launcher, plan), truth / 3);
+    EXPECT_LT(estimateBias(*launcher, plan), truth * 3);
   }
 }
 

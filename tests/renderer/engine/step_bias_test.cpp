@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How long small pictures of a scene may take: until nobody waits for them, and no finer than a ray can be.
-#include "renderer/cpu/thumbnails.h"
+#include "renderer/engine/step_bias.h"
 
 #include <gtest/gtest.h>
 
@@ -56,27 +56,29 @@ void expectToEndWhenStopped(Work work) {
   EXPECT_LT(std::chrono::steady_clock::now() - requested, 30s);
 }
 
-TEST(Thumbnails, EndSoonAfterAStopIsRequested) {
+TEST(StepBias, EndsSoonAfterAStopIsRequested) {
   const auto volume = deepVolume();
+  const auto launcher = makeCpuLauncher(0);
   RenderPlan plan(volume);
   plan.update(slowScene(*volume));
-  expectToEndWhenStopped([&](const std::stop_token& stop) { estimateBias(plan, stop); });
+  expectToEndWhenStopped([&](const std::stop_token& stop) { estimateBias(*launcher, plan, stop); });
   expectToEndWhenStopped(
-      [&](const std::stop_token& stop) { largestStep(plan, Method::raymarch, 1e-9, stop); });
+      [&](const std::stop_token& stop) { largestStep(*launcher, plan, Method::raymarch, 1e-9, stop); });
 }
 
-TEST(Thumbnails, MarchNoFinerThanTheSmallestStepOfARay) {
+TEST(StepBias, MarchesNoFinerThanTheSmallestStepOfARay) {
   // 2^16 steps of 0.046 are as long as the diagonal.
   const glm::ivec3 dims(3000, 4, 4);
   const auto value = [](int x, int y, int z) { return (x * 89 + y * 57 + z * 131) % 256; };
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, value));
   Scene scene = frontScene(*volume, 24, 24);
   scene.method = Method::raymarch;
+  const auto launcher = makeCpuLauncher(0);
   const auto biasAt = [&](double step) {
     scene.step = step;
     RenderPlan plan(volume);
     plan.update(scene);
-    return estimateBias(plan);
+    return estimateBias(*launcher, plan);
   };
   EXPECT_GT(biasAt(0.01), 0);
   EXPECT_EQ(biasAt(0.01), biasAt(0.04));

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The CPU backend: owns plan and film, runs the kernels over tiles with TBB.
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
+// The engine: owns plan and film, has a launcher render passes, and knows everything else of a picture.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,35 +10,27 @@
 #include <utility>
 
 #include "renderer/core/error.h"
-#include "renderer/cpu/pass.h"
-#include "renderer/cpu/pick.h"
-#include "renderer/cpu/ray_packets.h"
-#include "renderer/cpu/thumbnails.h"
 #include "renderer/data/film.h"
-#include "renderer/data/instances.h"
 #include "renderer/data/render_plan.h"
 #include "renderer/data/sampling.h"
+#include "renderer/engine/picking.h"
+#include "renderer/engine/step_bias.h"
+#include "renderer/launcher.h"
 #include "renderer/renderer.h"
 
 namespace scolopax {
 namespace {
 
-TileFunction chooseKernel(Scene scene, const kernel::SceneView& view) {
-  scene.shadows = scene.shadows && view.lightCount > 0;  // without light there is nothing to take away
-  if (hasStep(scene.method)) return quadratureTileFunction(scene, view);
-  return visitIntegrator(scene,
-                         [&](auto type) { return chooseTileFunction<typename decltype(type)::type>(scene); });
-}
-
-class CpuRenderer final : public Renderer {
+class Engine final : public Renderer {
  public:
-  CpuRenderer(std::shared_ptr<const Volume> volume, int threads, std::shared_ptr<MemoryBudget> memory)
-      : budget_(std::move(memory)),
+  Engine(std::unique_ptr<Launcher> launcher, std::shared_ptr<const Volume> volume,
+         std::shared_ptr<MemoryBudget> memory)
+      : launcher_(std::move(launcher)),
+        budget_(std::move(memory)),
         memory_(MemoryBudget::take(budget_, MemoryUse::films)),
-        plan_(std::move(volume), budget_),
-        arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
+        plan_(std::move(volume), budget_) {}
 
-  std::string_view backendName() const override { return "cpu"; }
+  std::string_view backendName() const override { return launcher_->name(); }
 
   RebuildStats setScene(const Scene& scene, std::stop_token stop) override {
     Film resized;
@@ -54,7 +43,7 @@ class CpuRenderer final : public Renderer {
       // Memory first: when there is none, plan and film stay as they were.
       memory_.resize(std::max<std::uint64_t>(bytesBefore, bytes));
       if (newSize) resized.reset(scene.width, scene.height);
-      arena_.execute([&] { stats = take(scene, stop); });
+      launcher_->run([&] { stats = take(scene, stop); });
     } catch (...) {
       memory_.resize(bytesBefore);
       throw;
@@ -93,17 +82,12 @@ class CpuRenderer final : public Renderer {
                     done_.data(),
                     &cancel,
                     std::chrono::steady_clock::now() + budget};
-    const TileFunction renderTileAt = chooseKernel(plan_.scene(), scene);
-    const int tilesX = (scene.width + kTile - 1) / kTile, tilesY = (scene.height + kTile - 1) / kTile;
     bool complete = false;
-    arena_.execute([&] {
-      tbb::parallel_for(0, tilesX * tilesY, [&](int i) { renderTileAt(pass, i % tilesX, i / tilesX); });
-      complete = std::find(done_.begin(), done_.end(), 0) == done_.end();
-    });
+    launcher_->run([&] { complete = launcher_->launch(plan_.scene(), pass); });
     return complete;
   }
   void addPixels() override {
-    arena_.execute([&] {
+    launcher_->run([&] {
       film_.add();
       noise_.reset();
       if (recording_) first_.add(plan_.visibleChannels());
@@ -114,8 +98,8 @@ class CpuRenderer final : public Renderer {
 
   std::uint32_t samples() const override { return film_.samples(); }
   double estimatedError(std::stop_token stop) const override {
-    if (!noise_) arena_.execute([&] { noise_ = film_.estimatedError(); });
-    if (errorTakesLong()) arena_.execute([&] { bias_ = estimateBias(plan_, stop); });
+    if (!noise_) launcher_->run([&] { noise_ = film_.estimatedError(); });
+    if (errorTakesLong()) launcher_->run([&] { bias_ = estimateBias(*launcher_, plan_, stop); });
     return std::hypot(*noise_, bias_.value_or(0));
   }
   bool errorTakesLong() const override {
@@ -124,7 +108,7 @@ class CpuRenderer final : public Renderer {
   }
   Image image() const override {
     Image image;
-    arena_.execute([&] { image = film_.image(); });
+    launcher_->run([&] { image = film_.image(); });
     return image;
   }
 
@@ -164,9 +148,7 @@ class CpuRenderer final : public Renderer {
   }
 
   std::unique_ptr<Picking> pick(const Scene& scene, const PixelArea& area) const override {
-    Scene unlit = scene;
-    unlit.shading = unlit.shadows = false;
-    return makeCpuPicking(plan_, scene, area, chooseKernel(unlit, plan_.view()));
+    return makePicking(*launcher_, plan_, scene, area);
   }
 
  private:
@@ -201,7 +183,7 @@ class CpuRenderer final : public Renderer {
     // Shadow rays are what costs most where there are any.
     const Method quadrature = scene.shadows ? Method::hybrid : Method::raymarch;
     // Half of the error is left to noise.
-    const auto found = largestStep(trial, quadrature, scene.targetError / 2, stop);
+    const auto found = largestStep(*launcher_, trial, quadrature, scene.targetError / 2, stop);
     if (!found) return {{Method::superposed, Scene().step}, 0};
     return {{quadrature, found->step}, found->bias};
   }
@@ -244,6 +226,7 @@ class CpuRenderer final : public Renderer {
     }
   }
 
+  const std::unique_ptr<Launcher> launcher_;
   const std::shared_ptr<MemoryBudget> budget_;
   MemoryBudget::Share memory_;  // of the film and what is recorded
   RenderPlan plan_;
@@ -260,14 +243,19 @@ class CpuRenderer final : public Renderer {
   double target_ = 0;                    // for which it was made
   mutable std::optional<double> noise_;  // of the film as it stands, once somebody has asked for its error
   mutable std::optional<double> bias_;   // of the film, once somebody has asked for its error
-  mutable tbb::task_arena arena_;
 };
 
 }  // namespace
 
+std::unique_ptr<Renderer> makeRenderer(std::unique_ptr<Launcher> launcher,
+                                       std::shared_ptr<const Volume> volume,
+                                       std::shared_ptr<MemoryBudget> memory) {
+  return std::make_unique<Engine>(std::move(launcher), std::move(volume), std::move(memory));
+}
+
 std::unique_ptr<Renderer> makeCpuRenderer(std::shared_ptr<const Volume> volume, int threads,
                                           std::shared_ptr<MemoryBudget> memory) {
-  return std::make_unique<CpuRenderer>(std::move(volume), threads, std::move(memory));
+  return makeRenderer(makeCpuLauncher(threads), std::move(volume), std::move(memory));
 }
 
 }  // namespace scolopax

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/cpu/pick.h"
+#include "renderer/engine/picking.h"
 
 #include <algorithm>
 #include <utility>
@@ -14,18 +14,19 @@ const std::atomic<bool> kNever{false};
 /// Of a pixel: within it, the samples of the filter `point` are one.
 constexpr float kPointUnit = 0x1p-20f;
 
-class CpuPicking final : public Picking {
+class SampledPicking final : public Picking {
  public:
-  CpuPicking(const RenderPlan& plan, const Scene& scene, const PixelArea& area, TileFunction tiles)
-      : plan_(plan),
-        tiles_(tiles),
+  SampledPicking(Launcher& launcher, const RenderPlan& plan, const Scene& scene, const PixelArea& area)
+      : launcher_(launcher),
+        plan_(plan),
+        unlit_(scene),
         number_(sampleNumber(Sampling::independent, 0)),
         pixels_(pixelsToPick(area)),
         side_(pickSamplesSide(pixels_.size())),
         isPoint_(scene.filter == PixelFilter::point),
         unit_(isPoint_ ? kPointUnit : 1.0f / float(side_)),
         view_(plan.view()) {
-    static_assert(kMaxPickSamplesSide <= kTile);
+    unlit_.shading = unlit_.shadows = false;  // light changes nothing of what a ray meets
     view_.rays = makeCameraRays(scene.camera, plan.grid(), scene.width, scene.height);
     // Depths from where rays start: from a far eye they would be too coarse for a point.
     start_ = double(std::exchange(view_.rays.start, 0.0f));
@@ -48,8 +49,9 @@ class CpuPicking final : public Picking {
       // A picture of the pixel, whose own pixels are the samples: kernels take many at a time.
       const glm::vec2 corner = glm::vec2(pixels_[at_]) + (isPoint_ ? 0.5f : 0.0f);
       view_.rays.halfSize = (halfSize_ - corner) / unit_;
-      tiles_({view_, number_, colors_.data(), nullptr, met_.data(), done_.data(), &kNever, deadline}, 0, 0);
-      if (std::find(done_.begin(), done_.end(), 0) != done_.end()) return false;
+      if (!launcher_.launch(unlit_, {view_, number_, colors_.data(), nullptr, met_.data(), done_.data(),
+                                     &kNever, deadline}))
+        return false;
       if (const auto sample = visibleSample(met_)) found_.push_back(pickedBy(int(*sample)));
       std::fill(done_.begin(), done_.end(), std::uint8_t(0));
     }
@@ -62,7 +64,8 @@ class CpuPicking final : public Picking {
   /// Where a sample of the pixel has ended.
   Picked pickedBy(int sample) const {
     const kernel::FirstCollision& met = met_[std::size_t(sample)];
-    const float x = float(sample % side_) + 0.5f, y = float(sample / side_) + 0.5f;
+    const int column = sample % side_, row = sample / side_;
+    const float x = float(column) + 0.5f, y = float(row) + 0.5f;
     const kernel::Ray ray = view_.rays(x, y);
     const float t = met.depth / view_.rays.depth(x, y, 1.0f);
     const glm::dvec3 voxel = glm::dvec3(ray.origin) + double(t) * glm::dvec3(ray.direction);
@@ -70,8 +73,9 @@ class CpuPicking final : public Picking {
             plan_.visibleChannels()[std::size_t(met.channel)], start_ + double(met.depth)};
   }
 
+  Launcher& launcher_;
   const RenderPlan& plan_;
-  const TileFunction tiles_;
+  Scene unlit_;
   const kernel::SampleNumber number_;
   const std::vector<glm::ivec2> pixels_;
   const int side_;
@@ -89,9 +93,9 @@ class CpuPicking final : public Picking {
 
 }  // namespace
 
-std::unique_ptr<Picking> makeCpuPicking(const RenderPlan& plan, const Scene& scene, const PixelArea& area,
-                                        TileFunction tiles) {
-  return std::make_unique<CpuPicking>(plan, scene, area, tiles);
+std::unique_ptr<Picking> makePicking(Launcher& launcher, const RenderPlan& plan, const Scene& scene,
+                                     const PixelArea& area) {
+  return std::make_unique<SampledPicking>(launcher, plan, scene, area);
 }
 
 }  // namespace scolopax

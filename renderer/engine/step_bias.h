@@ -5,6 +5,7 @@
 #include <stop_token>
 
 #include "renderer/data/render_plan.h"
+#include "renderer/launcher.h"
 
 namespace scolopax {
 
@@ -18,9 +19,9 @@ inline constexpr double kDeviations = 2;
 /// RMSE, over linear premultiplied RGBA, of the expected picture of the plan's scene by quadrature at its
 /// step, with all its light: what a quarter of the step, and of a voxel, changes of it, and what still
 /// smaller steps would as the last differences foretell. No step is so small that a ray has more than 2^16 of
-/// them; for such a one, the bias of the smallest that is not. Takes the threads of the caller's arena.
-/// Throws Error(cancelled) soon after `stop` is requested.
-double estimateBias(const RenderPlan& plan, const std::stop_token& stop = {});
+/// them; for such a one, the bias of the smallest that is not. Takes the caller's threads, as
+/// Launcher::launch. Throws Error(cancelled) soon after `stop` is requested.
+double estimateBias(Launcher& launcher, const RenderPlan& plan, const std::stop_token& stop = {});
 
 /// A step, and the bias that was found for it.
 struct BiasedStep {
@@ -32,7 +33,8 @@ struct BiasedStep {
 /// none. The same for the same scene and volume, whatever the picture's size. `rays`: how many it took, at
 /// most 32 times kThumbnailSide^2 for each of eight steps. Throws Error(cancelled) soon after `stop` is
 /// requested.
-std::optional<BiasedStep> largestStep(const RenderPlan& plan, Method method, double target,
-                                      const std::stop_token& stop = {}, std::uint64_t* rays = nullptr);
+std::optional<BiasedStep> largestStep(Launcher& launcher, const RenderPlan& plan, Method method,
+                                      double target, const std::stop_token& stop = {},
+                                      std::uint64_t* rays = nullptr);
 
 }  // namespace scolopax

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/cpu/thumbnails.h"
-
-#include <tbb/parallel_for.h>
+#include "renderer/engine/step_bias.h"
 
 #include <algorithm>
 #include <atomic>
@@ -10,8 +8,6 @@
 #include <map>
 
 #include "renderer/core/error.h"
-#include "renderer/cpu/pass.h"
-#include "renderer/cpu/ray_packets.h"
 #include "renderer/data/camera.h"
 #include "renderer/data/sampling.h"
 
@@ -33,10 +29,9 @@ constexpr double kMostSegments = 1 << 16;
 
 class Thumbnails {
  public:
-  Thumbnails(const RenderPlan& plan, Scene scene, const std::stop_token& stop)
-      : view_(plan.view()), onStop_(stop, RaiseFlag{&stopped_}) {
-    scene.shadows = scene.shadows && view_.lightCount > 0;
-    const bool lit = scene.shading || scene.shadows;
+  Thumbnails(Launcher& launcher, const RenderPlan& plan, const Scene& scene, const std::stop_token& stop)
+      : launcher_(launcher), scene_(scene), view_(plan.view()), onStop_(stop, RaiseFlag{&stopped_}) {
+    const bool lit = scene.shading || (scene.shadows && view_.lightCount > 0);
     const double longer = std::max(scene.width, scene.height);
     const double scale = (lit ? kLitThumbnailSide : kThumbnailSide) / longer;
     view_.width = std::max(1, int(std::lround(scene.width * scale)));
@@ -45,7 +40,6 @@ class Thumbnails {
     view_.filterBox = false;  // all steps through the same points
     view_.seed = 0;
     view_.stratum = stratumOf(scene.method);
-    render_ = quadratureTileFunction(scene, view_);
   }
 
   Pictures render(double step) {
@@ -57,15 +51,14 @@ class Thumbnails {
   void addSamples(Pictures& pictures, std::size_t count) {
     view_.step = view_.smallestSpacing * float(pictures.step);
     const std::size_t pixels = std::size_t(view_.width) * std::size_t(view_.height);
-    const int tilesX = (view_.width + kTile - 1) / kTile, tilesY = (view_.height + kTile - 1) / kTile;
     while (pictures.samples.size() < count) {
       const auto number = sampleNumber(Sampling::independent, std::uint32_t(pictures.samples.size()));
       std::vector<glm::vec4>& sample = pictures.samples.emplace_back(pixels);
       std::vector<std::uint8_t> done(pixels, 0);
       const Pass pass{view_,   number,      sample.data(), nullptr,
                       nullptr, done.data(), &stopped_,     std::chrono::steady_clock::time_point::max()};
-      tbb::parallel_for(0, tilesX * tilesY, [&](int i) { render_(pass, i % tilesX, i / tilesX); });
-      if (stopped_) throw Error(ErrorCode::cancelled, "nobody waits for the bias of a step");
+      if (!launcher_.launch(scene_, pass))
+        throw Error(ErrorCode::cancelled, "nobody waits for the bias of a step");
       rays_ += pixels;
     }
   }
@@ -76,8 +69,9 @@ class Thumbnails {
     std::atomic<bool>* flag;
     void operator()() const { *flag = true; }
   };
+  Launcher& launcher_;
+  const Scene scene_;
   kernel::SceneView view_;
-  TileFunction render_;
   std::uint64_t rays_ = 0;
   std::atomic<bool> stopped_{false};
   std::stop_callback<RaiseFlag> onStop_;
@@ -114,8 +108,8 @@ Estimate squaredDifference(const Pictures& a, const Pictures& b) {
 /// Small pictures at all steps that somebody has asked for.
 class Steps {
  public:
-  Steps(const RenderPlan& plan, const Scene& scene, const std::stop_token& stop)
-      : thumbnails_(plan, scene, stop),
+  Steps(Launcher& launcher, const RenderPlan& plan, const Scene& scene, const std::stop_token& stop)
+      : thumbnails_(launcher, plan, scene, stop),
         finest_(plan.grid().diagonal() / double(plan.view().smallestSpacing) / kMostSegments) {}
 
   /// Whether a step that is small enough beside this one is not too small to be marched with.
@@ -165,15 +159,15 @@ class Steps {
 
 }  // namespace
 
-double estimateBias(const RenderPlan& plan, const std::stop_token& stop) {
-  return Steps(plan, plan.scene(), stop).bias(plan.scene().step);
+double estimateBias(Launcher& launcher, const RenderPlan& plan, const std::stop_token& stop) {
+  return Steps(launcher, plan, plan.scene(), stop).bias(plan.scene().step);
 }
 
-std::optional<BiasedStep> largestStep(const RenderPlan& plan, Method method, double target,
-                                      const std::stop_token& stop, std::uint64_t* rays) {
+std::optional<BiasedStep> largestStep(Launcher& launcher, const RenderPlan& plan, Method method,
+                                      double target, const std::stop_token& stop, std::uint64_t* rays) {
   Scene scene = plan.scene();
   scene.method = method;
-  Steps steps(plan, scene, stop);
+  Steps steps(launcher, plan, scene, stop);
   std::optional<BiasedStep> found;
   for (const double step : kSteps) {
     if (!steps.canTell(step)) break;
