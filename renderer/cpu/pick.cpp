@@ -62,7 +62,8 @@ class CpuPicking final : public Picking {
   /// Where a sample of the pixel has ended.
   Picked pickedBy(int sample) const {
     const kernel::FirstCollision& met = met_[std::size_t(sample)];
-    const float x = float(sample % side_) + 0.5f, y = float(sample / side_) + 0.5f;
+    const int column = sample % side_, row = sample / side_;
+    const float x = float(column) + 0.5f, y = float(row) + 0.5f;
     const kernel::Ray ray = view_.rays(x, y);
     const float t = met.depth / view_.rays.depth(x, y, 1.0f);
     const glm::dvec3 voxel = glm::dvec3(ray.origin) + double(t) * glm::dvec3(ray.direction);
