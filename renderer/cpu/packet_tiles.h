@@ -35,7 +35,7 @@ SCOLOPAX_LANES_APART void renderPacket(const Pass& pass, const Blend& blend, int
   const Int rows = Int(y) + right<std::countr_zero(unsigned(kPacketWidth))>(laneNumbers());
   const Mask wanted = maskOf(todo);
   kernel::SamplerOf<Lanes> sampler(rows * scene.width + columns, pass.number, scene.seed);
-  kernel::PixelRay<Lanes> from(scene, columns, rows, sampler, wanted);
+  kernel::PixelRay<Lanes> from = kernel::rayThrough<Lanes>(scene, columns, rows, sampler, wanted);
   from.inside.exit = where(wanted, from.inside.exit);
   kernel::CostOf<Lanes> cost{};
   kernel::FirstCollisionOf<Lanes> met{};

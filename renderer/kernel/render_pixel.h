@@ -15,21 +15,20 @@ struct PixelRay {
   typename L::Float x, y;  ///< on the film, in pixels
   RayOf<L> ray;
   IntervalOf<L> inside;
-
-  /// Takes a block of random numbers, of lanes in the mask.
-  SCOLOPAX_LANES PixelRay(const SceneView& scene, typename L::Int column, typename L::Int row,
-                          SamplerOf<L>& sampler, typename L::Mask which) {
-    const auto jitter = sampler.next(which);
-    x = toFloat(column) + 0.5f;
-    y = toFloat(row) + 0.5f;
-    if (scene.filterBox) {
-      x = toFloat(column) + uniformOf(jitter.x);
-      y = toFloat(row) + uniformOf(jitter.y);
-    }
-    ray = scene.rays.through<L>(x, y);
-    inside = clipToScene(scene, ray);
-  }
 };
+/// Takes a block of random numbers, of lanes in the mask.
+template <class L>
+SCOLOPAX_LANES PixelRay<L> rayThrough(const SceneView& scene, typename L::Int column, typename L::Int row,
+                                      SamplerOf<L>& sampler, typename L::Mask which) {
+  const auto jitter = sampler.next(which);
+  typename L::Float x = toFloat(column) + 0.5f, y = toFloat(row) + 0.5f;
+  if (scene.filterBox) {
+    x = toFloat(column) + uniformOf(jitter.x);
+    y = toFloat(row) + uniformOf(jitter.y);
+  }
+  const RayOf<L> ray = scene.rays.through<L>(x, y);
+  return {x, y, ray, clipToScene(scene, ray)};
+}
 
 /// Integrator: Analog<Tracker> or RayMarch.
 template <class Integrator, class Blend, class Features>
@@ -42,7 +41,7 @@ struct RenderPixel {
 
   SCOLOPAX_HD void operator()(int pixel) const {
     Sampler sampler(std::uint32_t(pixel), number, scene.seed);
-    const PixelRay<One> at(scene, pixel % scene.width, pixel / scene.width, sampler, true);
+    const PixelRay<One> at = rayThrough<One>(scene, pixel % scene.width, pixel / scene.width, sampler, true);
 #if defined(__CUDA_ARCH__)
     constexpr FirstCollision* const first = nullptr;  // devices are not asked, and need not compile it
 #endif

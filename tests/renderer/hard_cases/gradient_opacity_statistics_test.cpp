@@ -246,7 +246,7 @@ const Look kLooks[] = {
      }},
     {"ABand",
      [](Scene& scene, const Volume& volume) {
-       setAll(scene, volume, 0, 1, {{0.3, 0}, {0.3, 1}, {0.6, 1}, {0.6, 0.05}});
+       setAll(scene, volume, 0, 1, {{0.1, 0}, {0.1, 1}, {0.6, 1}, {0.6, 0.05}});
      }},
 };
 
