@@ -178,7 +178,7 @@ TEST(GradientOpacity, OfDenseMatterShowsItsEdgesOnly) {
   for (const BlendMode blend : kBlends)
     for (const double inside : {0.0, 1e-7}) {
       SCOPED_TRACE(testing::Message() << nameOf(blend) << ' ' << inside);
-      Scene scene = viewFrom(*volume, {-12, -9, -30}, {9.5, 9.5, 9.5}, 40, 12);
+      Scene scene = viewFrom(*volume, {-12, -9, -30}, {9.5, 9.5, 9.5}, 40, 8);
       scene.blend = blend;
       const auto fetchesPerRay = [&](Method method, double density) {
         scene.channels = {ramp(0, 200, density, kRed), ramp(0, 200, density, kBlue)};
@@ -195,7 +195,8 @@ TEST(GradientOpacity, OfDenseMatterShowsItsEdgesOnly) {
         const double thin = fetchesPerRay(method, 1e4);
         EXPECT_LT(fetchesPerRay(method, 1e6), 1.5 * thin + 70) << nameOf(method);
       }
-      expectUnbiased(volume, scene);
+      if ((inside == 0) == (blend == BlendMode::density || blend == BlendMode::mix))  // pairwise
+        expectUnbiased(volume, scene);
     }
 }
 
