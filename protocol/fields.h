@@ -91,8 +91,8 @@ template <>
 struct Table<GradientOpacity> {
   static constexpr std::string_view title = "GradientOpacity";
   static constexpr std::string_view doc =
-      "A factor of the opacity by the magnitude of the gradient: shows boundaries, hides what is "
-      "homogeneous.";
+      "A factor of the opacity by the magnitude of the gradient: emphasizes boundaries and "
+      "hides homogeneous regions.";
   static constexpr auto fields = std::tuple{
       field(
           "range", &GradientOpacity::range,

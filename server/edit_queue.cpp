@@ -17,6 +17,7 @@ void EditQueue::push(Edit edit) {
                                         std::to_string(kMaxBytes) +
                                         " bytes of them to wait in a stream, found more");
     bytes_ += edit.bytes;
+    ++count_;
     waiting_.push_back(std::move(edit));
     if (std::exchange(atWork_, true)) return;
   }
@@ -27,14 +28,27 @@ void EditQueue::push(Edit edit) {
 
 void EditQueue::end() {
   ended_.request_stop();
-  const std::lock_guard applied(applying_);
+  std::deque<Edit> left;
+  {
+    const std::lock_guard applied(applying_);
+    const std::lock_guard lock(mutex_);
+    left = std::exchange(waiting_, {});
+  }
+  for (const Edit& edit : left) {
+    edit.failed(std::make_exception_ptr(
+        protocol::ProtocolError(409, "", "the stream has left the session, in which this edit had to wait")));
+    done(edit);
+  }
+}
+
+void EditQueue::done(const Edit& edit) {
   const std::lock_guard lock(mutex_);
-  waiting_.clear();
-  bytes_ = 0;
+  bytes_ -= edit.bytes;
+  --count_;
 }
 
 bool EditQueue::roomFor(const Edit& edit) const {
-  return waiting_.empty() || (waiting_.size() < kMaxEdits && bytes_ + edit.bytes <= kMaxBytes);
+  return count_ == 0 || (count_ < kMaxEdits && bytes_ + edit.bytes <= kMaxBytes);
 }
 
 std::optional<EditQueue::Edit> EditQueue::next() {
@@ -45,7 +59,6 @@ std::optional<EditQueue::Edit> EditQueue::next() {
   }
   Edit edit = std::move(waiting_.front());
   waiting_.pop_front();
-  bytes_ -= edit.bytes;
   return edit;
 }
 
@@ -53,18 +66,21 @@ std::optional<EditQueue::Edit> EditQueue::next() {
 bool EditQueue::applyAll() {
   while (auto edit = next()) {
     const std::lock_guard applying(applying_);
-    if (ended_.stop_requested()) continue;
+    if (ended_.stop_requested()) {
+      done(*edit);
+      continue;
+    }
     try {
       edit->apply();
     } catch (const Unmeasured& missing) {
       missing_ = missing;
       const std::lock_guard lock(mutex_);
-      bytes_ += edit->bytes;
       waiting_.push_front(std::move(*edit));
       return false;
     } catch (...) {
       edit->failed(std::current_exception());
     }
+    done(*edit);
   }
   return true;
 }
@@ -75,7 +91,10 @@ void EditQueue::applyMeasured(const std::stop_token& stop) {
     try {
       missing_->measure(ended_.get_token());
     } catch (...) {
-      if (const auto edit = next()) edit->failed(std::current_exception());
+      if (const auto edit = next()) {
+        edit->failed(std::current_exception());
+        done(*edit);
+      }
     }
   } while (!applyAll());
 }

@@ -33,8 +33,8 @@ class EditQueue : public std::enable_shared_from_this<EditQueue> {
   /// Applies the edit, here, unless it or one before it has to wait; then it is applied later, in the
   /// background. Throws ProtocolError(429) when too many wait.
   void push(Edit edit);
-  /// Nobody waits any more: drops what waits, with its measuring. No edit is applied from its return on, and
-  /// nothing may be pushed.
+  /// Fails what waits and stops its measuring. No edit is applied after this returns, and nothing may be
+  /// pushed.
   void end();
 
  private:
@@ -42,15 +42,16 @@ class EditQueue : public std::enable_shared_from_this<EditQueue> {
   void applyMeasured(const std::stop_token& stop);
   bool roomFor(const Edit& edit) const;
   std::optional<Edit> next();
+  void done(const Edit& edit);
 
   Background& background_;
   std::stop_source ended_;
   std::mutex applying_;  ///< held while an edit is applied; taken before mutex_
 
-  std::mutex mutex_;          ///< of what follows
-  std::deque<Edit> waiting_;  ///< the oldest first, but for the one that is being applied
-  std::size_t bytes_ = 0;     ///< of what waits
-  bool atWork_ = false;       ///< somebody applies them, and has missing_ to himself
+  std::mutex mutex_;                   ///< of what follows
+  std::deque<Edit> waiting_;           ///< the oldest first, but for the one that is being applied
+  std::size_t count_ = 0, bytes_ = 0;  ///< of all that were pushed and are not done
+  bool atWork_ = false;                ///< one thread is applying edits; it owns missing_
   std::optional<Unmeasured> missing_;
 };
 

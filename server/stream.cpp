@@ -45,7 +45,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   }
 
   void receive(const std::string& text) {
-    receivedBytes_ = text.size();
+    received_ = &text;
     try {
       std::visit([this](const auto& message) { handle(message); },
                  protocol::parseClientMessage(text, limits_));
@@ -102,11 +102,15 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   void handle(const protocol::PatchMessage& message) {
     const EditOrigin origin{viewer_, message.id, std::nullopt};
     EditQueue::Edit edit;
-    edit.apply = [session = session_, patch = message.patch, origin] { session->patch(patch, origin); };
+    // Kept as text: parsed, it takes many times the memory while it waits.
+    edit.apply = [session = session_, text = *received_, origin, &limits = limits_] {
+      session->patch(std::get<protocol::PatchMessage>(protocol::parseClientMessage(text, limits)).patch,
+                     origin);
+    };
     edit.failed = [stream = weak_from_this(), id = message.id](const std::exception_ptr& failure) {
       if (const auto self = stream.lock()) self->refuse(id, failure);
     };
-    edit.bytes = receivedBytes_;
+    edit.bytes = received_->size();
     try {
       edits_->push(std::move(edit));
     } catch (const ProtocolError& error) {
@@ -116,7 +120,15 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   void handle(const protocol::AckMessage& message) {
     if (const auto socket = socket_.lock()) socket->acknowledge(message.frame);
   }
-  void handle(const protocol::PingMessage& message) { sendText(protocol::pongText(message.id)); }
+  /// In its turn among the edits, so that a pong tells that those before it are made or refused. Number 0
+  /// asks only whether there is somebody.
+  void handle(const protocol::PingMessage& message) {
+    if (message.id == 0) return sendText(protocol::pongText(0));
+    const auto answer = [stream = weak_from_this(), id = message.id] {
+      if (const auto self = stream.lock()) self->sendText(protocol::pongText(id));
+    };
+    edits_->push({answer, [answer](const std::exception_ptr&) { answer(); }, received_->size()});
+  }
   void handle(const protocol::ViewMessage& message) {
     session_->setView(viewer_, message.visible, message.maxFps.value_or(0));
     if ((message.maxWidth || message.maxHeight) && !std::exchange(sizeNoticeSent_, true))
@@ -175,8 +187,8 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   const std::weak_ptr<net::WebSocket> socket_;
   std::shared_ptr<Session> session_;
   ViewerId viewer_ = 0;
-  std::shared_ptr<EditQueue> edits_;  ///< of this session
-  std::size_t receivedBytes_ = 0;     ///< of the message that is handled
+  std::shared_ptr<EditQueue> edits_;       ///< of this session
+  const std::string* received_ = nullptr;  ///< the message that is handled
   bool sizeNoticeSent_ = false;
   std::atomic<std::uint32_t> frameNumber_{0};
 

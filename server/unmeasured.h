@@ -10,7 +10,7 @@
 
 namespace scolopax::server {
 
-/// Thrown in the place of an answer, with nothing changed, until it has been measured.
+/// Thrown, with nothing changed, when the result depends on data that has not been measured yet.
 class Unmeasured : public Error {
  public:
   using Measure = std::function<void(const std::stop_token&)>;

@@ -17,6 +17,9 @@ function append(list: JsonObject[], patch: JsonObject): void {
   else list[list.length - 1] = joined as JsonObject;
 }
 
+/** So many patches may be without an answer: later ones are joined. The server lets no more than 256 wait. */
+const kMostInFlight = 64;
+
 export class Edits {
   private waiting: JsonObject[] = [];
   private scheduled = false;
@@ -43,7 +46,7 @@ export class Edits {
   }
 
   flush(): void {
-    while (this.waiting[0] && this.send(this.lastId + 1, this.waiting[0])) {
+    while (this.waiting[0] && this.inFlight.size < kMostInFlight && this.send(this.lastId + 1, this.waiting[0])) {
       this.lastId += 1;
       this.inFlight.set(this.lastId, this.waiting[0]);
       this.sentAt.set(this.lastId, this.now());
@@ -54,6 +57,7 @@ export class Edits {
   /** The server has taken, or refused, all patches up to `id`. */
   answered(id: number): void {
     for (const known of this.inFlight.keys()) if (known <= id) this.inFlight.delete(known);
+    if (!this.scheduled) this.flush();
   }
 
   /** A picture that contains patches up to `id` has come; the age in milliseconds of that patch, if new. */
@@ -66,8 +70,9 @@ export class Edits {
 
   /** The server has refused the patch of this id: no picture will show it. */
   refused(id: number): void {
-    this.answered(id);
+    this.inFlight.delete(id); // those before it may still wait
     this.sentAt.delete(id);
+    if (!this.scheduled) this.flush();
   }
 
   /** How long the oldest patch that no picture has shown has waited; undefined when there is none. */

@@ -126,7 +126,9 @@ OpticalCurve makeOpticalCurve(const Curve<float>& opacity, const Curve<glm::vec3
 Placement::Placement(double lo, double hi, bool rising) {
   // The origin is a float near the range, what rounding it loses goes to the offset: 280 to 310 K, or a
   // spread of a few ulp, keep all the resolution that the voxels have.
-  constexpr double kLimit = 0x1p126;
+  constexpr double kLimit = 0x1p126, kFarthest = 1e300;
+  lo = std::clamp(lo, -kFarthest, kFarthest);
+  hi = std::clamp(hi, -kFarthest, kFarthest);
   origin = float(std::clamp(lo, -kLimit, kLimit));
   if (lo != hi) {
     const double perUnit = 1.0 / (hi - lo);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/data/gradient_cells.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -16,6 +17,10 @@ namespace scolopax {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+void checkWanted(const std::stop_token& stop) {
+  if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "gradients are not wanted any more");
+}
 
 /// Voxels from `low` to `high`, both included.
 struct Voxels {
@@ -109,7 +114,8 @@ class Steepness {
         slack += entries_[axis] * (value * 0x1p-19 + (steepest[0] + steepest[1] + steepest[2]) *
                                                          (double(dims_[axis]) * 0x1p-22 + 0x1p-20));
     const float most = float((length + slack) * (1 + 0x1p-20));
-    return std::nextafter(most, std::numeric_limits<float>::infinity());
+    constexpr float kLargest = std::numeric_limits<float>::max();
+    return most < kLargest ? std::nextafter(most, kLargest) : kLargest;
   }
 
   const StridedVoxels<T>& voxels_;
@@ -131,7 +137,7 @@ GradientCells buildGradientCells(const Volume& volume, int channel, int size, co
     tbb::parallel_for(0, cells.z, [&](int z) {
       std::size_t cell = std::size_t(z) * std::size_t(cells.y) * std::size_t(cells.x);
       for (int y = 0; y < cells.y; ++y) {
-        if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "gradients are not wanted any more");
+        checkWanted(stop);
         for (int x = 0; x < cells.x; ++x) {
           const glm::ivec3 low = glm::ivec3(x, y, z) * size;
           const float most = steep.most({low, glm::min(low + size, last)});
@@ -142,7 +148,12 @@ GradientCells buildGradientCells(const Volume& volume, int channel, int size, co
   });
   GradientCells result;
   result.levels.values = chooseLevels(steepness);
-  for (const ValueInterval& v : steepness) result.cells.push_back(encode(result.levels, v).hi);
+  result.cells.resize(steepness.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, steepness.size(), 4096), [&](const auto& range) {
+    checkWanted(stop);
+    for (std::size_t cell = range.begin(); cell < range.end(); ++cell)
+      result.cells[cell] = encode(result.levels, steepness[cell]).hi;
+  });
   return result;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Per macrocell: how steep a channel is at most, at any sample inside. Made from a Volume once for channels
-// whose opacity depends on the gradient; bound_columns reads it.
+// Per macrocell: an upper bound of |gradient| over all samples in the cell. Made from a Volume once for
+// channels whose opacity depends on the gradient; bound_columns reads it.
 #pragma once
 #include <stop_token>
 #include <vector>

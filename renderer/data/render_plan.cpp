@@ -119,14 +119,27 @@ void checkImageSize(const Scene& scene) {
                                          std::to_string(scene.width) + "x" + std::to_string(scene.height));
 }
 
+namespace {
+/// Whether the bounds of a channel depend on its gradients; as factorOf() and visible(), of any appearance.
+bool needsGradients(const Channel& channel, const ChannelAppearance& appearance) {
+  if (!appearance.visible || !(appearance.density > 0) || !appearance.gradientOpacity) return false;
+  const auto& factor = appearance.gradientOpacity->factor;
+  const auto any = [](const std::vector<OpacityKnot>& knots, auto&& is) {
+    return std::any_of(knots.begin(), knots.end(), [&](const OpacityKnot& knot) { return is(knot.value); });
+  };
+  const auto isAboveZero = [](double value) { return value > 0; };
+  return any(appearance.opacity, isAboveZero) && any(factor, isAboveZero) &&
+         (channel.histogram.nonFiniteCount > 0 || any(factor, [](double value) { return value != 1; }));
+}
+}  // namespace
+
 bool RenderPlan::takesLong(const Scene& scene) const {
   // An edit may change the totals of all cells.
   constexpr std::size_t kManyIntervals = 4 << 20;
   if (!macrocells_ || macrocells_->size != scene.macrocell || macrocells_->intervals.size() > kManyIntervals)
     return true;
   for (std::size_t i = 0; i < scene.channels.size() && i < channels_.gradients.size(); ++i)
-    if (scene.channels[i].visible && scene.channels[i].gradientOpacity && !channels_.gradients[i])
-      return true;
+    if (!channels_.gradients[i] && needsGradients(volume_->channels()[i], scene.channels[i])) return true;
   return false;
 }
 

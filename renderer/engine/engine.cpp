@@ -159,12 +159,13 @@ class Engine final : public Renderer {
     const bool automatic = scene.method == Method::automatic;
     Choice choice = automatic_;
     double bias = automaticBias_;
+    std::optional<RenderPlan> trial;  // holds what was measured for it until ours has it
     if (automatic) {
       // The choice before, if there was one: when nothing else is new either, the film goes on.
       chosen.method = choice.method;
       chosen.step = choice.step;
       if (!plan_.makesSamePicture(chosen) || scene.targetError != target_)
-        std::tie(choice, bias) = choose(scene, chosen, stop);
+        std::tie(choice, bias) = choose(scene, trial.emplace(plan_.volume(), budget_), chosen, stop);
       chosen.method = choice.method;
       chosen.step = choice.step;
     }
@@ -177,8 +178,8 @@ class Engine final : public Renderer {
 
   /// Method and step for a scene that leaves them to us, with the bias that was found. On a plan of its own:
   /// when it is stopped, ours is still that of the film.
-  std::pair<Choice, double> choose(const Scene& scene, const Scene& resolved, const std::stop_token& stop) {
-    RenderPlan trial(plan_.volume(), budget_);
+  std::pair<Choice, double> choose(const Scene& scene, RenderPlan& trial, const Scene& resolved,
+                                   const std::stop_token& stop) {
     trial.update(resolved, stop);
     // Shadow rays are what costs most where there are any.
     const Method quadrature = scene.shadows ? Method::hybrid : Method::raymarch;

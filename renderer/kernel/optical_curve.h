@@ -76,6 +76,21 @@ SCOLOPAX_LANES CurvePoint<L> pointOn(const OpticalCurveView& curve, typename L::
   }
   return {position, select(inside, k, select(above, Int(curve.count - 1), Int(-1)))};
 }
+/// pointOn() from a known point on: as many steps as there are knots in between. Of some lanes.
+template <class L>
+SCOLOPAX_LANES CurvePoint<L> pointFrom(const OpticalCurveView& curve, const CurvePoint<L>& from,
+                                       typename L::Float position, typename L::Mask which) {
+  using Int = typename L::Int;
+  using Mask = typename L::Mask;
+  const Int last(curve.count - 1);
+  Int k = from.piece;
+  for (;;) {
+    const Mask up = which & (last > k) & (knotPositions<L>(curve, minimum(k + Int(1), last)) <= position);
+    const Mask down = which & (k > Int(-1)) & (position < knotPositions<L>(curve, maximum(k, Int(0))));
+    if (!any(up | down)) return {position, k};
+    k = k + onesOf(up) - onesOf(down);
+  }
+}
 template <class L>
 SCOLOPAX_LANES CurvePoint<L> select(typename L::Mask m, const CurvePoint<L>& a, const CurvePoint<L>& b) {
   return {select(m, a.position, b.position), select(m, a.piece, b.piece)};
@@ -255,6 +270,7 @@ SCOLOPAX_LANES PartOf<L> meansOfProduct(const OpticalCurveView& curve, const Cur
   using Int = typename L::Int;
   using Mask = typename L::Mask;
   PartOf<L> all = noPart<L>();
+  CurvePoint<L> reached = p;
   const auto addPiece = [&](const Knots<L>& first, const Knots<L>& second, Int piece, Float from, Float to,
                             Float begin, Float end, Mask on) SCOLOPAX_LANES_LAMBDA {
     const Float u = opticalIn<Detail::extinction, L>(first, second, piece, from).opacity;
@@ -263,13 +279,16 @@ SCOLOPAX_LANES PartOf<L> meansOfProduct(const OpticalCurveView& curve, const Cur
     if (!any(on)) return;
     const Float width = end - begin, way = q.position - p.position;
     PartOf<L> means = noPart<L>();
-    forEachPiece<L>(
-        curve, pointOn<L>(curve, p.position + begin * way), pointOn<L>(curve, p.position + end * way), on,
-        [&](const Knots<L>& a, const Knots<L>& b, Int k, Float x, Float y, Float s, Float e,
-            Mask lanes) SCOLOPAX_LANES_LAMBDA {
-          detail::addProduct<kDetail, L>(opticalIn<kDetail, L>(a, b, k, x), opticalIn<kDetail, L>(a, b, k, y),
-                                         u + s * (v - u), u + e * (v - u), s, e, lanes, &means);
-        });
+    const CurvePoint<L> x0 = pointFrom<L>(curve, reached, p.position + begin * way, on);
+    const CurvePoint<L> x1 = pointFrom<L>(curve, x0, p.position + end * way, on);
+    reached = select(on, x1, reached);
+    forEachPiece<L>(curve, x0, x1, on,
+                    [&](const Knots<L>& a, const Knots<L>& b, Int k, Float x, Float y, Float s, Float e,
+                        Mask lanes) SCOLOPAX_LANES_LAMBDA {
+                      detail::addProduct<kDetail, L>(opticalIn<kDetail, L>(a, b, k, x),
+                                                     opticalIn<kDetail, L>(a, b, k, y), u + s * (v - u),
+                                                     u + e * (v - u), s, e, lanes, &means);
+                    });
     all.opacity = all.opacity + width * means.opacity;
     if constexpr (kDetail >= Detail::emission) all.emission = all.emission + means.emission * width;
     if constexpr (kDetail >= Detail::moment)

@@ -17,20 +17,22 @@ struct Blending {
 /// Finds partAlone() where the opacity depends on the gradient, whose magnitude is linear on the segment too.
 template <Detail kDetail, class L>
 SCOLOPAX_LANES_RARE void findPartWithFactor(const ChannelView& channel, const SegmentEnds<L>& ends, int n,
-                                            const CurvePoint<L>& p, const CurvePoint<L>& q,
-                                            const typename L::Float& density, const typename L::Mask& which,
-                                            PartOf<L>* part) {
+                                            const typename L::Mask& which, PartOf<L>* part) {
   using Float = typename L::Float;
   using Mask = typename L::Mask;
   const OpticalCurveView& factor = channel.gradient.optical;
-  const Float from = ends.gradientFrom[n], to = ends.gradientTo[n];
-  const Mask known = from == from, other = to == to, some = which & (known | other);
+  const CurvePoint<L>& from = ends.from[n];
+  const CurvePoint<L>& to = ends.to[n];
+  const Float g = ends.gradientFrom[n], h = ends.gradientTo[n];
+  // An end has a value and a gradient, or counts for nothing.
+  const Mask known = (from.position == from.position) & (g == g);
+  const Mask other = (to.position == to.position) & (h == h), some = which & (known | other);
   *part = noPart<L>();
   if (!any(some)) return;
-  const CurvePoint<L> g = pointOn<L>(factor, select(known, from, to)),
-                      h = pointOn<L>(factor, select(other, to, from));
-  *part = scaled(meansOfProduct<kDetail, L>(channel.optical, p, q, factor, g, h, some),
-                 select(known & other, density, 0.5f * density));
+  const PartOf<L> means = meansOfProduct<kDetail, L>(
+      channel.optical, select(known, from, to), select(other, to, from), factor,
+      pointOn<L>(factor, select(known, g, h)), pointOn<L>(factor, select(other, h, g)), some);
+  *part = scaled(means, select(known & other, Float(channel.density), Float(0.5f * channel.density)));
 }
 
 /// Part of channel n on a segment of some rays, as if it were alone; of the others nothing. Next to voxels
@@ -42,6 +44,11 @@ SCOLOPAX_LANES PartOf<L> partAlone(const SceneView& scene, const SegmentEnds<L>&
   using Mask = typename L::Mask;
   const ChannelView& channel = scene.channels[n];
   const OpticalCurveView& curve = channel.optical;
+  if (channel.gradient.factor.count != 0) [[unlikely]] {
+    PartOf<L> part;
+    findPartWithFactor<kDetail, L>(channel, ends, n, which, &part);
+    return part;
+  }
   CurvePoint<L> from = ends.from[n], to = ends.to[n];
   Float density(channel.density);
   if (!channel.finite) {
@@ -56,11 +63,6 @@ SCOLOPAX_LANES PartOf<L> partAlone(const SceneView& scene, const SegmentEnds<L>&
   const Mask outside = ((p <= curve.first) & (q <= curve.first)) | ((p >= curve.last) & (q >= curve.last));
   const Mask seen = without(which, outside);
   if (!any(seen)) return noPart<L>();
-  if (channel.gradient.factor.count != 0) [[unlikely]] {
-    PartOf<L> part;
-    findPartWithFactor<kDetail, L>(channel, ends, n, from, to, density, seen, &part);
-    return part;
-  }
   return scaled(meansBetween<kDetail, L>(curve, from, to, seen), density);
 }
 

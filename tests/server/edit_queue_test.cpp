@@ -111,7 +111,7 @@ TEST(EditQueue, MeasuresWhatSeveralEditsNeedOneAfterTheOther) {
   EXPECT_TRUE(workshop.background.waiting.empty()) << "all in one job";
 }
 
-TEST(EditQueue, DropsWhatWaitsWhenItsClientLeaves) {
+TEST(EditQueue, FailsWhatWaitsWhenItsClientLeaves) {
   Workshop workshop;
   workshop.background.atOnce = false;
   Editor editor(workshop.store, workshop.background);
@@ -120,7 +120,7 @@ TEST(EditQueue, DropsWhatWaitsWhenItsClientLeaves) {
   editor.queue->end();
   workshop.background.finish();
   EXPECT_EQ(editor.revision(), 1u);
-  EXPECT_TRUE(editor.failures.empty());
+  EXPECT_EQ(editor.failures.size(), 2u);
   EXPECT_THROW(editor.session->patch(gradientPatch(), {}), Unmeasured) << "nor was it measured";
 }
 

@@ -77,8 +77,8 @@ struct CellGradient {
   float magnitude, change, slack;  ///< slack: what rounding may add
   bool finite;                     ///< the cell has gradients
 };
-/// In the cell every difference is a mean of slopes between neighbours along its axis, and linear in each
-/// coordinate or, at the border, changes less: by no more than the slopes differ.
+/// Inside a cell each difference is an average of neighbour-to-neighbour slopes along its axis, so that a
+/// step of one voxel along any axis changes it by at most the spread of those slopes.
 SCOLOPAX_RARE inline CellGradient gradientIn(const ChannelView& channel, glm::ivec3 dims, glm::ivec3 cell,
                                              glm::vec3 point) {
   const glm::mat3& fromVoxel = channel.gradient.fromVoxel;
@@ -113,15 +113,17 @@ SCOLOPAX_RARE inline CellGradient gradientIn(const ChannelView& channel, glm::iv
     }
   });
   glm::vec3 turned(0.0f);
-  float scale = 0.0f;
+  float scale = 0.0f, longest = 0.0f;
   for (int axis = 0; axis < 3; ++axis) {
+    longest = maximum(longest, float(dims[axis]));
     const glm::vec3& column = fromVoxel[axis];
     turned += glm::vec3(magnitude(column.x), magnitude(column.y), magnitude(column.z)) * change[axis];
     scale = maximum(scale, sumOfMagnitudes(column));
   }
   const Gradient<One> here = gradientAt<One>(channel, dims, fromVoxel, point);
-  CellGradient gradient{lengthOf<One>(here.perSpacing), lengthOf<One>(turned), 3.0f * scale * most * 0x1p-19f,
-                        finite};
+  CellGradient gradient{lengthOf<One>(here.perSpacing), lengthOf<One>(turned), 0.0f, finite};
+  // Of values, and of places among as many voxels.
+  gradient.slack = 3.0f * scale * most * 0x1p-19f + gradient.change * longest * 0x1p-22f;
   // Only on a face does a point see voxels that are not the cell's.
   if (!here.finite) gradient.magnitude = 0.0f, gradient.change = kLargestFinite;
   return gradient;
