@@ -34,11 +34,13 @@ void EditQueue::end() {
     const std::lock_guard lock(mutex_);
     left = std::exchange(waiting_, {});
   }
-  for (const Edit& edit : left) {
-    edit.failed(std::make_exception_ptr(
-        protocol::ProtocolError(409, "", "the stream has left the session, in which this edit had to wait")));
-    done(edit);
-  }
+  for (const Edit& edit : left) abandon(edit);
+}
+
+void EditQueue::abandon(const Edit& edit) {
+  edit.failed(std::make_exception_ptr(
+      protocol::ProtocolError(409, "", "the stream has left the session in which this edit had to wait")));
+  done(edit);
 }
 
 void EditQueue::done(const Edit& edit) {
@@ -67,7 +69,7 @@ bool EditQueue::applyAll() {
   while (auto edit = next()) {
     const std::lock_guard applying(applying_);
     if (ended_.stop_requested()) {
-      done(*edit);
+      abandon(*edit);
       continue;
     }
     try {

@@ -42,6 +42,7 @@ class EditQueue : public std::enable_shared_from_this<EditQueue> {
   void applyMeasured(const std::stop_token& stop);
   bool roomFor(const Edit& edit) const;
   std::optional<Edit> next();
+  void abandon(const Edit& edit);
   void done(const Edit& edit);
 
   Background& background_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How often values of a channel and magnitudes of its gradient come together: for the page's plot, and for
-// the default range of GradientOpacity. A pass over the volume, made when somebody first needs it.
+// Joint histogram of a channel's values and gradient magnitudes: for the page's plot, and for the default
+// range of GradientOpacity. A pass over the volume, made when somebody first needs it.
 #pragma once
 #include <cstddef>
 #include <cstdint>

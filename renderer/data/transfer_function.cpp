@@ -3,15 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <limits>
 #include <string>
 
 #include "renderer/core/error.h"
-#include "renderer/core/short_text.h"
 #include "renderer/kernel/classify.h"
 
 namespace scolopax {
+
 TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearance& a)
     : gamma_(float(a.gamma)),
       density_(float(std::min(a.density, 1e30))),
