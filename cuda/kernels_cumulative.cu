@@ -5,6 +5,6 @@
 
 namespace scolopax::cuda {
 
-template LaunchFunction chooseLaunch<kernel::Analog<kernel::Cumulative>>(const Scene&);
+template LaunchFunction chooseLaunch<kernel::Analog<kernel::Cumulative>>(const Scene&, bool);
 
 }  // namespace scolopax::cuda

@@ -5,6 +5,6 @@
 
 namespace scolopax::cuda {
 
-template LaunchFunction chooseLaunch<kernel::Analog<kernel::NDda>>(const Scene&);
+template LaunchFunction chooseLaunch<kernel::Analog<kernel::NDda>>(const Scene&, bool);
 
 }  // namespace scolopax::cuda

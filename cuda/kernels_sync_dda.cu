@@ -5,6 +5,6 @@
 
 namespace scolopax::cuda {
 
-template LaunchFunction chooseLaunch<kernel::Analog<kernel::SyncDda>>(const Scene&);
+template LaunchFunction chooseLaunch<kernel::Analog<kernel::SyncDda>>(const Scene&, bool);
 
 }  // namespace scolopax::cuda

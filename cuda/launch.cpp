@@ -4,10 +4,20 @@
 #include "renderer/data/instances.h"
 
 namespace scolopax::cuda {
+namespace {
+
+bool isPlain(const kernel::SceneView& view) {
+  for (int n = 0; n < view.channelCount; ++n)
+    if (view.hasFactor(n)) return false;
+  return true;
+}
+
+}  // namespace
 
 Passes::Passes(const Scene& scene, const kernel::SceneView& view, bool counting)
-    : launch_(visitIntegrator(scene,
-                              [&](auto type) { return chooseLaunch<typename decltype(type)::type>(scene); })),
+    : launch_(visitIntegrator(
+          scene,
+          [&](auto type) { return chooseLaunch<typename decltype(type)::type>(scene, isPlain(view)); })),
       scene_(view),
       pixels_(std::size_t(view.width) * std::size_t(view.height)),
       cost_(counting ? pixels_.count() : 0) {

@@ -23,9 +23,10 @@ struct DevicePass {
 /// Starts a pass without waiting for it.
 using LaunchFunction = cudaError_t (*)(const DevicePass&);
 
-/// The kernels of one integrator, each in a file of its own.
+/// The kernels of one integrator, each in a file of its own; `plain` ones draw only what a PlainSceneView can
+/// show.
 template <class Integrator>
-LaunchFunction chooseLaunch(const Scene& scene);
+LaunchFunction chooseLaunch(const Scene& scene, bool plain);
 
 class Passes {
  public:

@@ -20,26 +20,26 @@ SCOLOPAX_HD std::optional<Collision> firstInSpans(const SceneView& scene, const 
   return hit;
 }
 /// The first collision with any channel.
-template <class Tracker, class Blend>
-SCOLOPAX_HD std::optional<Collision> trackAll(const SceneView& scene, const Ray& ray, Interval inside,
+template <class Tracker, class Blend, class View>
+SCOLOPAX_HD std::optional<Collision> trackAll(const View& scene, const Ray& ray, Interval inside,
                                               Sampler& sampler, SampleCost* cost) {
   return firstInSpans(scene, ray, inside, ~0u, [&](Interval span) {
     return Tracker::template track<Blend>(scene, ray, span, sampler, cost);
   });
 }
 /// The first collision with channel n, as if it were alone.
-template <class Blend>
-SCOLOPAX_HD std::optional<Collision> trackAlone(const SceneView& scene, int n, const Ray& ray,
-                                                Interval inside, Sampler& sampler, SampleCost* cost) {
+template <class Blend, class View>
+SCOLOPAX_HD std::optional<Collision> trackAlone(const View& scene, int n, const Ray& ray, Interval inside,
+                                                Sampler& sampler, SampleCost* cost) {
   return firstInSpans(scene, ray, inside, 1u << n, [&](Interval span) {
     return trackChannel<Blend>(scene, n, {}, ray, span, sampler, cost);
   });
 }
 
 /// Whether a shadow ray meets anything; in separate blend modes, anything of the channel that cast it.
-template <class Tracker, class Blend>
-SCOLOPAX_HD bool isBlocked(const SceneView& scene, const Ray& ray, Interval inside, int channel,
-                           Sampler& sampler, SampleCost* cost) {
+template <class Tracker, class Blend, class View>
+SCOLOPAX_HD bool isBlocked(const View& scene, const Ray& ray, Interval inside, int channel, Sampler& sampler,
+                           SampleCost* cost) {
   if constexpr (Blend::kSeparate) {
     return trackAlone<Blend>(scene, channel, ray, inside, sampler, cost).has_value();
   } else {
@@ -49,8 +49,8 @@ SCOLOPAX_HD bool isBlocked(const SceneView& scene, const Ray& ray, Interval insi
 
 /// What a collision shows: its channel, or in mix all of them, each lit with its own material before it is
 /// weighted (Eq. 10).
-template <class Tracker, class Blend, class Features>
-SCOLOPAX_HD glm::vec3 radiance(const SceneView& scene, const Ray& ray, const Collision& hit, Sampler& sampler,
+template <class Tracker, class Blend, class Features, class View>
+SCOLOPAX_HD glm::vec3 radiance(const View& scene, const Ray& ray, const Collision& hit, Sampler& sampler,
                                SampleCost* cost) {
   const LitPoint<One> at{ray, hit.place.t(), insideOf<One>(scene.clip, hit.point)};
   Visibility<One> visibility;
@@ -85,9 +85,9 @@ template <class Tracker>
 struct Analog {
   /// Linear premultiplied RGBA of one sample along a ray; `first`, where it is not null, is set at a
   /// collision.
-  template <class Blend, class Features>
-  SCOLOPAX_HD static glm::vec4 sample(const SceneView& scene, const Ray& ray, Interval inside,
-                                      Sampler& sampler, SampleCost* cost, FirstCollision* first) {
+  template <class Blend, class Features, class View>
+  SCOLOPAX_HD static glm::vec4 sample(const View& scene, const Ray& ray, Interval inside, Sampler& sampler,
+                                      SampleCost* cost, FirstCollision* first) {
     if constexpr (Blend::kSeparate) {
       // Channels draw independent numbers, so 1 - prod(1 - hit_n) has the expected value 1 - prod(1 -
       // alpha_n).

@@ -12,14 +12,15 @@ namespace scolopax::kernel {
 struct Classified {
   float extinction, position;
 };
-SCOLOPAX_HD inline Classified classify(const SceneView& scene, int n, glm::vec3 point, SampleCost* cost) {
+template <class View>
+SCOLOPAX_HD Classified classify(const View& scene, int n, glm::vec3 point, SampleCost* cost) {
   const ChannelView& channel = scene.channels[n];
   ++cost->fetches;
   const float stored = sampleStored(channel, scene.dims, point);
   if (!isFinite(stored)) return {0.0f, 0.0f};
   const float position = curvePosition(channel, stored);
   float extinction = extinctionAt(channel, position);
-  if (channel.gradient.factor.count != 0 && extinction > 0.0f) [[unlikely]] {
+  if (scene.hasFactor(n) && extinction > 0.0f) [[unlikely]] {
     extinction *= gradientFactorAt(channel, scene.dims, point);
     cost->fetches += gradientFetches(scene.dims);
   }
@@ -41,8 +42,8 @@ struct Largest {
   int channel = 0;
   float position = 0.0f;
 };
-template <class Channels>
-SCOLOPAX_HD Largest largestOf(const SceneView& scene, Channels channels, glm::vec3 point, SampleCost* cost) {
+template <class Channels, class View>
+SCOLOPAX_HD Largest largestOf(const View& scene, Channels channels, glm::vec3 point, SampleCost* cost) {
   Largest largest;
   for (int n = 0; n < scene.channelCount; ++n) {
     if (!channels.has(n)) continue;

@@ -41,11 +41,10 @@ inline constexpr std::uint32_t kMaxTentativeCollisions = 1u << 20;
 struct PickOneChannel {
   /// Draws the channel first, with probability bound_n / bound, and fetches only that one. What the bounds
   /// leave of the total belongs to none.
-  template <class Channels>
-  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, Channels channels,
-                                                   std::size_t cell, float bound, Place place,
-                                                   glm::vec3 point, const RandomBlock& random,
-                                                   SampleCost* cost) {
+  template <class Channels, class View>
+  SCOLOPAX_HD static std::optional<Collision> test(const View& scene, Channels channels, std::size_t cell,
+                                                   float bound, Place place, glm::vec3 point,
+                                                   const RandomBlock& random, SampleCost* cost) {
     float pick = uniformOf(random.y) * bound;
     for (int n = 0; n < scene.channelCount; ++n) {
       if (!channels.has(n)) continue;
@@ -62,8 +61,8 @@ struct PickOneChannel {
 };
 struct TestAllChannels {
   /// Fetches channel after channel until the drawn share of the bound is used up.
-  template <class Channels>
-  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, Channels channels, std::size_t,
+  template <class Channels, class View>
+  SCOLOPAX_HD static std::optional<Collision> test(const View& scene, Channels channels, std::size_t,
                                                    float bound, Place place, glm::vec3 point,
                                                    const RandomBlock& random, SampleCost* cost) {
     float left = uniformOf(random.y) * bound;
@@ -78,8 +77,8 @@ struct TestAllChannels {
 };
 /// The same for max and mix, whose bound is the largest of the channels'.
 struct TestLargest {
-  template <class Channels>
-  SCOLOPAX_HD static std::optional<Collision> test(const SceneView& scene, Channels channels, std::size_t,
+  template <class Channels, class View>
+  SCOLOPAX_HD static std::optional<Collision> test(const View& scene, Channels channels, std::size_t,
                                                    float bound, Place place, glm::vec3 point,
                                                    const RandomBlock& random, SampleCost* cost) {
     const Largest largest = largestOf(scene, channels, point, cost);
@@ -90,10 +89,10 @@ struct TestLargest {
 
 /// Tests a tentative collision of channel n's own process. In max and mix a channel has extinction only where
 /// it is the largest of `channels` (Eq. 8).
-template <class Blend, class Channels>
-SCOLOPAX_HD std::optional<Collision> testChannel(const SceneView& scene, Channels channels, int n,
-                                                 float bound, Place place, glm::vec3 point,
-                                                 const RandomBlock& random, SampleCost* cost) {
+template <class Blend, class Channels, class View>
+SCOLOPAX_HD std::optional<Collision> testChannel(const View& scene, Channels channels, int n, float bound,
+                                                 Place place, glm::vec3 point, const RandomBlock& random,
+                                                 SampleCost* cost) {
   const Classified c = classify(scene, n, point, cost);
   if (!(uniformOf(random.z) * bound < c.extinction)) return std::nullopt;
   if constexpr (!Blend::kSums)

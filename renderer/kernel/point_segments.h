@@ -9,7 +9,7 @@
 
 namespace scolopax::kernel {
 
-template <class L>
+template <class L, class View>
 class PointSegments {
  public:
   using Float = typename L::Float;
@@ -17,7 +17,7 @@ class PointSegments {
   using Word = typename L::Word;
   using Mask = typename L::Mask;
 
-  SCOLOPAX_LANES PointSegments(SegmentEnds<L>& ends, const SceneView& scene, const RayOf<L>& rays,
+  SCOLOPAX_LANES PointSegments(SegmentEnds<L>& ends, const View& scene, const RayOf<L>& rays,
                                const IntervalOf<L>& inside, std::uint32_t channels, Float offset, float step,
                                CostOf<L>* cost)
       : ends_(ends),
@@ -134,7 +134,7 @@ class PointSegments {
       const int n = std::countr_zero(left);
       const ChannelView& channel = scene_.channels[n];
       points[n] = pointOn<L>(channel.optical, stretchPosition(channel, stored[n]));
-      if (channel.gradient.factor.count != 0) [[unlikely]] {
+      if (scene_.hasFactor(n)) [[unlikely]] {
         findFactorPosition<L>(channel, scene_.dims, point, &gradients[n]);
         fetches += gradientFetches(scene_.dims);
       }
@@ -143,7 +143,7 @@ class PointSegments {
   }
 
   SegmentEnds<L>& ends_;
-  const SceneView& scene_;
+  const View& scene_;
   const RayOf<L>& rays_;
   IntervalOf<L> inside_;
   std::uint32_t channels_;
@@ -160,7 +160,7 @@ class PointSegments {
 };
 
 /// Segments of rays: cell by cell for one, which takes fewer steps; point by point for many.
-template <class L>
-using Segments = std::conditional_t<L::kLanes == 1, CellSegments, PointSegments<L>>;
+template <class L, class View>
+using Segments = std::conditional_t<L::kLanes == 1, CellSegments<View>, PointSegments<L, View>>;
 
 }  // namespace scolopax::kernel

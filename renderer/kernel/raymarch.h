@@ -34,8 +34,8 @@ SCOLOPAX_LANES void keepNearer(FirstCollisionOf<L>* first, typename L::Mask whic
 }
 
 /// Keeps collisions that are nearer than what rays have met so far.
-template <class L, class Blend>
-SCOLOPAX_LANES_APART void meet(const SceneView& scene, const Blend& blend, const SegmentEnds<L>& ends,
+template <class L, class Blend, class View>
+SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const SegmentEnds<L>& ends,
                                Hidden<L, Blend::kSums>& hidden, const SegmentCollision<L>& collision,
                                FirstCollisionOf<L>* first) {
   using Float = typename L::Float;
@@ -58,8 +58,8 @@ SCOLOPAX_LANES_APART void meet(const SceneView& scene, const Blend& blend, const
 }
 
 /// Of rays among some channels, by their bits; `set` tells the random numbers of such marches apart.
-template <class Features, class L, class Blend>
-SCOLOPAX_LANES Radiance<L> marchRay(const SceneView& scene, const Blend& blend, const RayOf<L>& ray,
+template <class Features, class L, class Blend, class View>
+SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                     const IntervalOf<L>& inside, std::uint32_t channels, int set,
                                     SamplerOf<L>& sampler, const SamplerOf<L>& ofStrata, CostOf<L>* cost,
                                     FirstCollisionOf<L>* first) {
@@ -74,7 +74,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const SceneView& scene, const Blend& blend, 
   // A tracker's ray would end where the opacity passes this number.
   const Float end = uniformOf(random.y);
   Mask open = meets;
-  using OfStrata = Strata<Features, L, Blend>;
+  using OfStrata = Strata<Features, L, Blend, View>;
   [[maybe_unused]] typename OfStrata::Memory memory;
   [[maybe_unused]] OfStrata strata(memory, scene, blend, ray, channels, set, ofStrata, cost);
   SegmentEnds<L> ends;
@@ -83,7 +83,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const SceneView& scene, const Blend& blend, 
   Spans<L> spans(scene, ray, inside, channels);
   for (bool last = false; !last;) {
     const auto span = spans.next(transmittance > kOpaqueTransmittance);
-    Segments<L> along(ends, scene, ray, span, channels, uniformOf(random.x), scene.step, cost);
+    Segments<L, View> along(ends, scene, ray, span, channels, uniformOf(random.x), scene.step, cost);
     for (bool more = true; more;) {
       more = along.next(segment);
       const Float length = segment.length(), before = opacity;
@@ -120,16 +120,16 @@ SCOLOPAX_LANES Radiance<L> marchRay(const SceneView& scene, const Blend& blend, 
 }
 
 struct RayMarch {
-  template <class Blend, class Features>
-  SCOLOPAX_HD static glm::vec4 sample(const SceneView& scene, const Ray& ray, Interval inside,
-                                      Sampler& sampler, SampleCost* cost, FirstCollision* first) {
+  template <class Blend, class Features, class View>
+  SCOLOPAX_HD static glm::vec4 sample(const View& scene, const Ray& ray, Interval inside, Sampler& sampler,
+                                      SampleCost* cost, FirstCollision* first) {
     const Blending<Blend::kSums> blend{Blend::kSeparate, Blend::kMixes};
     const Radiance<One> radiance = march<Features>(scene, blend, ray, inside, sampler, cost, first);
     return glm::vec4(radiance.color, radiance.opacity);
   }
 
-  template <class Features, class L, class Blend>
-  SCOLOPAX_LANES static Radiance<L> march(const SceneView& scene, const Blend& blend, const RayOf<L>& ray,
+  template <class Features, class L, class Blend, class View>
+  SCOLOPAX_LANES static Radiance<L> march(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                           const IntervalOf<L>& inside, SamplerOf<L>& sampler, CostOf<L>* cost,
                                           FirstCollisionOf<L>* first) {
     using Float = typename L::Float;

@@ -31,9 +31,9 @@ SCOLOPAX_LANES PixelRay<L> rayThrough(const SceneView& scene, typename L::Int co
 }
 
 /// Integrator: Analog<Tracker> or RayMarch.
-template <class Integrator, class Blend, class Features>
+template <class Integrator, class Blend, class Features, class View = SceneView>
 struct RenderPixel {
-  SceneView scene;
+  View scene;
   SampleNumber number;
   glm::vec4* pass;                  ///< width x height: this sample's linear premultiplied RGBA
   SampleCost* cost;                 ///< the same shape, or null where nobody counts

@@ -37,14 +37,14 @@ SCOLOPAX_LANES_RARE void findPartWithFactor(const ChannelView& channel, const Se
 
 /// Part of channel n on a segment of some rays, as if it were alone; of the others nothing. Next to voxels
 /// that are not finite only the half of the segment that has a value counts.
-template <Detail kDetail, class L>
-SCOLOPAX_LANES PartOf<L> partAlone(const SceneView& scene, const SegmentEnds<L>& ends, int n,
+template <Detail kDetail, class L, class View>
+SCOLOPAX_LANES PartOf<L> partAlone(const View& scene, const SegmentEnds<L>& ends, int n,
                                    typename L::Mask which) {
   using Float = typename L::Float;
   using Mask = typename L::Mask;
   const ChannelView& channel = scene.channels[n];
   const OpticalCurveView& curve = channel.optical;
-  if (channel.gradient.factor.count != 0) [[unlikely]] {
+  if (scene.hasFactor(n)) [[unlikely]] {
     PartOf<L> part;
     findPartWithFactor<kDetail, L>(channel, ends, n, which, &part);
     return part;
@@ -107,8 +107,8 @@ SCOLOPAX_LANES_RARE void multiplyByFactor(const ChannelView& channel, const Segm
 }
 
 /// What channel n is at a place in [0,1] of a segment; of other rays anything.
-template <Detail kDetail, class L>
-SCOLOPAX_LANES Optical<L> opticalOn(const SceneView& scene, const SegmentEnds<L>& ends, int n,
+template <Detail kDetail, class L, class View>
+SCOLOPAX_LANES Optical<L> opticalOn(const View& scene, const SegmentEnds<L>& ends, int n,
                                     typename L::Float place, typename L::Mask which) {
   using Mask = typename L::Mask;
   const ChannelView& channel = scene.channels[n];
@@ -120,7 +120,7 @@ SCOLOPAX_LANES Optical<L> opticalOn(const SceneView& scene, const SegmentEnds<L>
   if (any(without(which, p.piece == q.piece))) point = pointOn<L>(channel.optical, point.position);
   Optical<L> optical = opticalAt<kDetail, L>(channel.optical, point, which);
   optical.opacity = where(known | other, optical.opacity * channel.density);
-  if (channel.gradient.factor.count != 0) [[unlikely]]
+  if (scene.hasFactor(n)) [[unlikely]]
     multiplyByFactor<L>(channel, ends, n, place, which, &optical.opacity);
   return optical;
 }
@@ -136,8 +136,8 @@ SCOLOPAX_LANES void add(typename L::Float opacity, const typename L::Vec& color,
 
 /// Compares the channels of a segment, for some rays: the mean of the largest extinction, and what is seen of
 /// each channel.
-template <Detail kDetail, class L>
-SCOLOPAX_LANES typename L::Float compare(const SceneView& scene, bool mixes, const Segment<L>& segment,
+template <Detail kDetail, class L, class View>
+SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Segment<L>& segment,
                                          const SegmentEnds<L>& ends, typename L::Mask which,
                                          Hidden<L, false>& hidden) {
   using Float = typename L::Float;
@@ -147,7 +147,7 @@ SCOLOPAX_LANES typename L::Float compare(const SceneView& scene, bool mixes, con
   for (int n = 0; n < scene.channelCount; ++n) {
     if (!(segment.channels >> n & 1)) continue;
     Mask straight = ends.from[n].piece == ends.to[n].piece;
-    if (scene.channels[n].gradient.factor.count != 0) [[unlikely]]
+    if (scene.hasFactor(n)) [[unlikely]]
       dropWhereFactorChanges<L>(scene.channels[n], ends, n, &straight);
     bent = bent | without(segment.of(n), straight);
     if constexpr (kDetail >= Detail::emission) hidden.of[n] = noPart<L>();
@@ -189,9 +189,9 @@ SCOLOPAX_LANES typename L::Float compare(const SceneView& scene, bool mixes, con
 }
 /// Calls visit(n, part of channel n) for all channels of the segment, and returns the mean extinction that is
 /// seen. One channel alone needs no comparisons.
-template <Detail kDetail, class L, class Blend, class Visit>
-SCOLOPAX_LANES typename L::Float visitParts(const SceneView& scene, const Blend& blend,
-                                            const Segment<L>& segment, const SegmentEnds<L>& ends,
+template <Detail kDetail, class L, class Blend, class Visit, class View>
+SCOLOPAX_LANES typename L::Float visitParts(const View& scene, const Blend& blend, const Segment<L>& segment,
+                                            const SegmentEnds<L>& ends,
                                             [[maybe_unused]] Hidden<L, Blend::kSums>& hidden, Visit&& visit) {
   using Float = typename L::Float;
   Float extinction(0.0f);

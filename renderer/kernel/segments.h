@@ -20,9 +20,10 @@ struct SegmentEnds {
   typename L::Float gradientFrom[kMaxVisibleChannels], gradientTo[kMaxVisibleChannels];
 
   /// The next segment of channel n begins where this one ends.
-  SCOLOPAX_LANES void passOn(const SceneView& scene, int n) {
+  template <class View>
+  SCOLOPAX_LANES void passOn(const View& scene, int n) {
     from[n] = to[n];
-    if (scene.channels[n].gradient.factor.count != 0) gradientFrom[n] = gradientTo[n];
+    if (scene.hasFactor(n)) gradientFrom[n] = gradientTo[n];
   }
 };
 
@@ -63,12 +64,12 @@ SCOLOPAX_HD inline std::uint32_t activeChannels(const SceneView& scene, std::siz
 
 /// Finds the segments of one ray, front to back, by going from cell to cell. Segment k ends at inside.enter +
 /// (k + offset) * step, with offset in (0, 1], or at inside.exit.
+template <class View>
 class CellSegments {
  public:
   /// Of channels by their bits.
-  SCOLOPAX_HD CellSegments(SegmentEnds<One>& ends, const SceneView& scene, const Ray& ray,
-                           const Interval& inside, std::uint32_t channels, float offset, float step,
-                           SampleCost* cost)
+  SCOLOPAX_HD CellSegments(SegmentEnds<One>& ends, const View& scene, const Ray& ray, const Interval& inside,
+                           std::uint32_t channels, float offset, float step, SampleCost* cost)
       : ends_(ends),
         scene_(scene),
         ray_(ray),
@@ -117,7 +118,7 @@ class CellSegments {
     const glm::vec3 point = ray_.origin + t * ray_.direction;
     const float stored = sampleStored(channel, scene_.dims, point);
     points[n] = pointOn<One>(channel.optical, stretchPosition(channel, stored));
-    if (channel.gradient.factor.count != 0) [[unlikely]] {
+    if (scene_.hasFactor(n)) [[unlikely]] {
       findFactorPosition<One>(channel, scene_.dims, point, &gradients[n]);
       cost_->fetches += gradientFetches(scene_.dims);
     }
@@ -167,7 +168,7 @@ class CellSegments {
   }
 
   SegmentEnds<One>& ends_;
-  const SceneView& scene_;
+  const View& scene_;
   const Ray& ray_;
   Interval inside_;
   std::uint32_t channels_;

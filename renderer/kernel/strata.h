@@ -15,8 +15,8 @@ inline constexpr float kOpaqueDepth = 9.21034f;
 inline constexpr float kShadowSteps = 2.0f;
 
 /// Transmittance of shadow rays, of channels by their bits.
-template <class L, class Blend>
-SCOLOPAX_LANES typename L::Float marchTransmittance(const SceneView& scene, const Blend& blend,
+template <class L, class Blend, class View>
+SCOLOPAX_LANES typename L::Float marchTransmittance(const View& scene, const Blend& blend,
                                                     const RayOf<L>& ray, const IntervalOf<L>& inside,
                                                     std::uint32_t channels, typename L::Float offset,
                                                     CostOf<L>* cost) {
@@ -27,7 +27,7 @@ SCOLOPAX_LANES typename L::Float marchTransmittance(const SceneView& scene, cons
   Spans<L> spans(scene, ray, inside, channels);
   do {
     const auto span = spans.next(depth < kOpaqueDepth);
-    Segments<L> along(ends, scene, ray, span, channels, offset, kShadowSteps * scene.step, cost);
+    Segments<L, View> along(ends, scene, ray, span, channels, offset, kShadowSteps * scene.step, cost);
     for (bool more = true; more && along.next(segment); more = along.keep(depth < kOpaqueDepth))
       depth = depth + visitParts<Detail::extinction>(scene, blend, segment, ends, hidden,
                                                      [](int, const PartOf<L>&) SCOLOPAX_LANES_LAMBDA {}) *
@@ -61,8 +61,8 @@ struct StratumPlaces {
 };
 
 /// Light of a unit of absorbed light at such places, for lanes in the mask.
-template <class Features, class L, class Blend>
-SCOLOPAX_LANES typename L::Vec lightOf(const SceneView& scene, const Blend& blend, const RayOf<L>& ray,
+template <class Features, class L, class Blend, class View>
+SCOLOPAX_LANES typename L::Vec lightOf(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                        std::uint32_t channels, const StratumPlaces<L>& places,
                                        typename L::Mask which, CostOf<L>* cost) {
   using Word = typename L::Word;
@@ -135,7 +135,7 @@ class StrataSum {
 /// process are scale-free). As absorption passes a record, the place moves on to it.
 ///
 /// One ray's strata are lit as they end; those of many wait until there are as many as lanes.
-template <class Features, class L, class Blend>
+template <class Features, class L, class Blend, class View>
 class Strata {
  public:
   using Float = typename L::Float;
@@ -158,7 +158,7 @@ class Strata {
   };
 
   /// Of channels by their bits, with random numbers number `set` of those of the sampler.
-  SCOLOPAX_LANES Strata(Memory& memory, const SceneView& scene, const Blend& blend, const RayOf<L>& ray,
+  SCOLOPAX_LANES Strata(Memory& memory, const View& scene, const Blend& blend, const RayOf<L>& ray,
                         std::uint32_t channels, int set, const SamplerOf<L>& sampler, CostOf<L>* cost)
       : memory_(memory),
         scene_(scene),
@@ -334,7 +334,7 @@ class Strata {
   }
 
   Memory& memory_;
-  const SceneView& scene_;
+  const View& scene_;
   const Blend& blend_;
   const RayOf<L>& ray_;
   std::uint32_t channels_;

@@ -120,6 +120,15 @@ struct SceneView {
   glm::mat3 worldFromVoxel;  ///< linear part, in units of the smallest spacing: lengths near 1 at any scale
   glm::mat3 gradientFromVoxel;  ///< its inverse transpose
   float smallestSpacing;        ///< world units
+
+  /// Whether the opacity of channel n depends on the gradient.
+  SCOLOPAX_HD bool hasFactor(int n) const { return channels[n].gradient.factor.count != 0; }
+};
+
+/// A scene of curves alone: kernels of this view are compiled without what other scenes need. Only devices
+/// have such kernels, whose registers and local memory are taken for all that is compiled.
+struct PlainSceneView : SceneView {
+  SCOLOPAX_HD static constexpr bool hasFactor(int) { return false; }
 };
 
 /// What the samples of all lanes cost, for tests, benchmarks and the cost heat map.

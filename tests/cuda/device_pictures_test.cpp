@@ -79,29 +79,50 @@ class DevicePicture : public testing::Test {
 };
 class DevicePictures : public DevicePicture, public testing::WithParamInterface<Method> {};
 
-TEST_P(DevicePictures, AreThoseOfTheCpuInEveryBlendModeAndLight) {
-  const auto mixed = mixedVolume(), withSign = signedVolume();
+/// Calls f(scene) with scenes of every instance of an integrator's kernels.
+template <class F>
+void forEveryBlendModeAndLight(Scene scene, Method method, F&& f) {
+  scene.method = method;
   for (const BlendMode blend : {BlendMode::density, BlendMode::max, BlendMode::mix, BlendMode::composite})
     for (const bool shading : {false, true})
       for (const bool shadows : {false, true}) {
         SCOPED_TRACE(std::string(nameOf(blend)) + (shading ? ", shading" : "") +
                      (shadows ? ", shadows" : ""));
-        // Sizes that fill the last blocks of threads and sizes that do not.
-        Scene scene = obliqueScene(*mixed, 24, 24);
-        scene.method = GetParam();
         scene.blend = blend;
         scene.shading = shading;
         scene.shadows = shadows;
-        expectSameOnBoth(mixed, scene, 3);
-        scene = obliqueScene(*withSign, 19, 13);
-        scene.method = GetParam();
-        scene.blend = blend;
-        scene.shading = shading;
-        scene.shadows = shadows;
-        scene.filter = PixelFilter::point;
-        scene.sampling = Sampling::independent;
-        expectSameOnBoth(withSign, scene, 2);
+        f(scene);
       }
+}
+
+// Sizes that fill the last blocks of threads and sizes that do not.
+TEST_P(DevicePictures, AreThoseOfTheCpuInEveryBlendModeAndLight) {
+  const auto mixed = mixedVolume(), withSign = signedVolume();
+  forEveryBlendModeAndLight(obliqueScene(*mixed, 24, 24), GetParam(),
+                            [&](const Scene& scene) { expectSameOnBoth(mixed, scene, 3); });
+  Scene scene = obliqueScene(*withSign, 19, 13);
+  scene.filter = PixelFilter::point;
+  scene.sampling = Sampling::independent;
+  forEveryBlendModeAndLight(scene, GetParam(),
+                            [&](const Scene& each) { expectSameOnBoth(withSign, each, 2); });
+}
+
+// Of integers, of voxels that are not finite, and beside a channel without.
+TEST_P(DevicePictures, WithOpacityByTheGradientAreThoseOfTheCpuInEveryBlendModeAndLight) {
+  const auto volume = mixedVolume();
+  Scene scene = obliqueScene(*volume, 17, 14);
+  for (const std::size_t n : {1, 2}) {
+    const Histogram& histogram = volume->channels()[n].histogram;
+    GradientOpacity factor;
+    factor.rangeLo = 0;
+    factor.rangeHi = 0.3 * (histogram.maximum - histogram.minimum);
+    factor.factor = {{0, 0.1}, {0.3, 1}, {0.6, 0.2}, {1, 0.8}};
+    scene.channels[n].gradientOpacity = factor;
+  }
+  forEveryBlendModeAndLight(scene, GetParam(), [&](const Scene& each) { expectSameOnBoth(volume, each, 2); });
+  for (ChannelAppearance& channel : scene.channels) channel.density = 1e5;
+  scene.method = GetParam();
+  expectSameOnBoth(volume, scene, 2, Counts::fewer);
 }
 
 // Trackers look closer at such cells; the CPU's, for which that is a loop of its own, track such rays twice.

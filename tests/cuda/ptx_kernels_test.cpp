@@ -13,8 +13,9 @@ namespace {
 using namespace test;
 
 TEST(PtxKernels, AreOneForEveryMethodBlendModeAndLight) {
-  // auto is one of the others, and hybrid is raymarch with another number in its view.
-  EXPECT_EQ(ptx::kernelNames().size(), (std::size(kMethods) - 2) * std::size(kBlendModes) * 4);
+  // auto is one of the others, and hybrid is raymarch with another number in its view. Of each there is one
+  // for plain scenes.
+  EXPECT_EQ(ptx::kernelNames().size(), (std::size(kMethods) - 2) * std::size(kBlendModes) * 4 * 2);
 }
 
 TEST(PtxKernels, AreCaughtReadingAndWritingWhereTheyMayNot) {
@@ -24,7 +25,7 @@ TEST(PtxKernels, AreCaughtReadingAndWritingWhereTheyMayNot) {
   plan.update(scene);
   const auto faultOf = [&](kernel::SceneView view, std::size_t pixels) {
     const cuda::DeviceBuffer<glm::vec4> film(pixels);
-    const auto launch = cuda::chooseLaunch<kernel::Analog<kernel::Superposed>>(scene);
+    const auto launch = cuda::chooseLaunch<kernel::Analog<kernel::Superposed>>(scene, true);
     EXPECT_EQ(launch({view, sampleNumber(scene.sampling, 0), film.data(), nullptr}), cudaSuccess);
     return cudaDeviceSynchronize() == cudaSuccess ? "" : substitute::lastFault();
   };

@@ -131,8 +131,9 @@ SCOLOPAX_RARE inline CellGradient gradientIn(const ChannelView& channel, glm::iv
 
 /// Bound of channel n's extinction from `point` on, for at most `*way`, which becomes shorter where the bound
 /// would be loose, down to `least`. The scalar's slope along the ray is bounded by the corners' range.
-SCOLOPAX_HD inline float boundAhead(const SceneView& scene, int n, const Ray& ray, const VoxelCell& cell,
-                                    glm::vec3 point, float least, float* way, SampleCost* cost) {
+template <class View>
+SCOLOPAX_HD float boundAhead(const View& scene, int n, const Ray& ray, const VoxelCell& cell, glm::vec3 point,
+                             float least, float* way, SampleCost* cost) {
   const ChannelView& channel = scene.channels[n];
   ++cost->fetches;
   const CellValues values = valuesIn(channel, scene.dims, cell, point);
@@ -146,7 +147,7 @@ SCOLOPAX_HD inline float boundAhead(const SceneView& scene, int n, const Ray& ra
   float here = extinctionAt(channel, curvePosition(channel, values.value));
   const GradientFactorView& factor = channel.gradient;
   CellGradient gradient{};
-  if (factor.factor.count != 0) {
+  if (scene.hasFactor(n)) {
     gradient = gradientIn(channel, scene.dims, cell.low, point);
     cost->fetches += gradientFetches(scene.dims);
     if (!gradient.finite) return 0.0f;
@@ -157,7 +158,7 @@ SCOLOPAX_HD inline float boundAhead(const SceneView& scene, int n, const Ray& ra
     const float reach = slope * *way + slack;
     float bound =
         largestExtinction(channel, maximum(lo, values.value - reach), minimum(hi, values.value + reach));
-    if (factor.factor.count != 0) {
+    if (scene.hasFactor(n)) {
       const float around = gradient.change * *way + gradient.slack;
       bound *= largestFactor(factor, maximum(gradient.magnitude - around, 0.0f), gradient.magnitude + around);
     }
@@ -169,11 +170,11 @@ SCOLOPAX_HD inline float boundAhead(const SceneView& scene, int n, const Ray& ra
 /// their own. On entry and exit, `random` and `depth` belong to the next tentative collision. `boundOf(cell,
 /// point, least, &way)` bounds a stretch as boundAhead does; `test(bound, place, point, random)` tests a
 /// tentative collision.
-template <class Bound, class Test>
-SCOLOPAX_HD CellOutcome trackCellClosely(const SceneView& scene, const Ray& ray, const CellWalk& walk,
-                                         float past, float end, Sampler& sampler, RandomBlock* random,
-                                         float* depth, std::uint32_t* tentative,
-                                         std::optional<Collision>* hit, Bound&& boundOf, Test&& test) {
+template <class Bound, class Test, class View>
+SCOLOPAX_HD CellOutcome trackCellClosely(const View& scene, const Ray& ray, const CellWalk& walk, float past,
+                                         float end, Sampler& sampler, RandomBlock* random, float* depth,
+                                         std::uint32_t* tentative, std::optional<Collision>* hit,
+                                         Bound&& boundOf, Test&& test) {
   float way = end - past;
   while (past < end) {
     const float t = walk.enter() + past;
@@ -222,8 +223,8 @@ struct CloselyTracked {
   std::uint32_t blocks;  ///< random numbers that were drawn before and by it
   SampleCost cost;
 };
-template <class Track>
-SCOLOPAX_APART CloselyTracked trackClosely(Track track, const SceneView& scene, Ray ray, Interval inside,
+template <class Track, class View>
+SCOLOPAX_APART CloselyTracked trackClosely(Track track, const View& scene, Ray ray, Interval inside,
                                            Sampler sampler) {
   SampleCost cost;
   bool stuck = false;
@@ -236,10 +237,9 @@ SCOLOPAX_APART CloselyTracked trackClosely(Track track, const SceneView& scene, 
 /// random numbers, so that it comes to the same place. This keeps the close look out of the loop that most
 /// rays run, which is up to a fifth slower with it. A device, where both loops would be in one function and
 /// take registers and local memory for both, looks closer at once.
-template <class Track>
-SCOLOPAX_HOT std::optional<Collision> trackWithPatience(const Track& track, const SceneView& scene,
-                                                        const Ray& ray, Interval inside, Sampler& sampler,
-                                                        SampleCost* cost) {
+template <class Track, class View>
+SCOLOPAX_HOT std::optional<Collision> trackWithPatience(const Track& track, const View& scene, const Ray& ray,
+                                                        Interval inside, Sampler& sampler, SampleCost* cost) {
   bool stuck = false;
 #if defined(__CUDACC__)
   return track.template along<true>(scene, ray, inside, sampler, cost, &stuck);

@@ -9,8 +9,8 @@
 namespace scolopax::kernel {
 
 /// Bound of several channels together ahead of a point, as boundAhead gives it of one.
-template <bool kSums>
-SCOLOPAX_HD float boundAheadOf(SomeChannels channels, const SceneView& scene, std::size_t macrocell,
+template <bool kSums, class View>
+SCOLOPAX_HD float boundAheadOf(SomeChannels channels, const View& scene, std::size_t macrocell,
                                const Ray& ray, const VoxelCell& cell, glm::vec3 point, float least,
                                float* way, SampleCost* cost) {
   float all = 0.0f;
@@ -44,8 +44,8 @@ SCOLOPAX_HD float totalBound(const SceneView& scene, SomeChannels channels, std:
 /// at closely, TestClosely, which needs no bounds of single channels, takes the place of Test.
 template <class Test, class TestClosely, bool kSums>
 struct OneProcess {
-  template <bool kClosely>
-  SCOLOPAX_HD std::optional<Collision> along(const SceneView& scene, const Ray& ray, Interval inside,
+  template <bool kClosely, class View>
+  SCOLOPAX_HD std::optional<Collision> along(const View& scene, const Ray& ray, Interval inside,
                                              Sampler& sampler, SampleCost* cost, bool* stuck) const {
     const auto channels = channelsFor<kClosely>(inside);
     RandomBlock random = sampler.next();
@@ -105,8 +105,8 @@ struct OneProcess {
 
 /// A drawn channel is fetched and tested.
 struct Superposed {
-  template <class Blend>
-  SCOLOPAX_HD static std::optional<Collision> track(const SceneView& scene, const Ray& ray, Interval inside,
+  template <class Blend, class View>
+  SCOLOPAX_HD static std::optional<Collision> track(const View& scene, const Ray& ray, Interval inside,
                                                     Sampler& sampler, SampleCost* cost) {
     using Test = std::conditional_t<Blend::kSums, PickOneChannel, TestLargest>;
     using TestClosely = std::conditional_t<Blend::kSums, TestAllChannels, TestLargest>;
@@ -117,8 +117,8 @@ struct Superposed {
 
 /// All channels are fetched and their sum is tested (section 5.1).
 struct Cumulative {
-  template <class Blend>
-  SCOLOPAX_HD static std::optional<Collision> track(const SceneView& scene, const Ray& ray, Interval inside,
+  template <class Blend, class View>
+  SCOLOPAX_HD static std::optional<Collision> track(const View& scene, const Ray& ray, Interval inside,
                                                     Sampler& sampler, SampleCost* cost) {
     using Test = std::conditional_t<Blend::kSums, TestAllChannels, TestLargest>;
     return trackWithPatience(OneProcess<Test, Test, Blend::kSums>{}, scene, ray, inside, sampler, cost);

@@ -8,8 +8,8 @@ namespace scolopax::kernel {
 
 /// Tracks channel n, if it is one of `channels`, through the walk's current cell, as far as `nearest`, which
 /// a hit replaces.
-template <bool kClosely, class Blend, class Channels>
-SCOLOPAX_HD CellOutcome trackCell(const SceneView& scene, Channels channels, int n,
+template <bool kClosely, class Blend, class Channels, class View>
+SCOLOPAX_HD CellOutcome trackCell(const View& scene, Channels channels, int n,
                                   [[maybe_unused]] const Ray& ray, const CellWalk& walk, Sampler& sampler,
                                   std::optional<Collision>* nearest, std::uint32_t* tentative,
                                   SampleCost* cost) {
@@ -60,8 +60,8 @@ struct AlongChannel {
   int n;
   std::optional<Collision> nearest;
 
-  template <bool kClosely>
-  SCOLOPAX_HD std::optional<Collision> along(const SceneView& scene, const Ray& ray, Interval inside,
+  template <bool kClosely, class View>
+  SCOLOPAX_HD std::optional<Collision> along(const View& scene, const Ray& ray, Interval inside,
                                              Sampler& sampler, SampleCost* cost, bool* stuck) const {
     CellWalk walk(ray, inside, scene.majorants);
     std::optional<Collision> hit = nearest;
@@ -80,8 +80,8 @@ struct AlongChannel {
 };
 
 /// The nearest of `nearest` and what channel n meets along the ray.
-template <class Blend>
-SCOLOPAX_HD std::optional<Collision> trackChannel(const SceneView& scene, int n,
+template <class Blend, class View>
+SCOLOPAX_HD std::optional<Collision> trackChannel(const View& scene, int n,
                                                   const std::optional<Collision>& nearest, const Ray& ray,
                                                   Interval inside, Sampler& sampler, SampleCost* cost) {
   return trackWithPatience(AlongChannel<Blend>{n, nearest}, scene, ray, inside, sampler, cost);
@@ -89,8 +89,8 @@ SCOLOPAX_HD std::optional<Collision> trackChannel(const SceneView& scene, int n,
 
 /// Listing 3, with the order of its two tests mended.
 struct NDda {
-  template <class Blend>
-  SCOLOPAX_HD static std::optional<Collision> track(const SceneView& scene, const Ray& ray, Interval inside,
+  template <class Blend, class View>
+  SCOLOPAX_HD static std::optional<Collision> track(const View& scene, const Ray& ray, Interval inside,
                                                     Sampler& sampler, SampleCost* cost) {
     std::optional<Collision> nearest;
     for (int n = 0; n < scene.channelCount; ++n)
@@ -102,8 +102,8 @@ struct NDda {
 /// All channels, macrocell by macrocell.
 template <class Blend>
 struct AlongCells {
-  template <bool kClosely>
-  SCOLOPAX_HD std::optional<Collision> along(const SceneView& scene, const Ray& ray, Interval inside,
+  template <bool kClosely, class View>
+  SCOLOPAX_HD std::optional<Collision> along(const View& scene, const Ray& ray, Interval inside,
                                              Sampler& sampler, SampleCost* cost, bool* stuck) const {
     CellWalk walk(ray, inside, scene.majorants);
     std::uint32_t tentative = 0;
@@ -126,8 +126,8 @@ struct AlongCells {
 
 /// Listing 4.
 struct SyncDda {
-  template <class Blend>
-  SCOLOPAX_HD static std::optional<Collision> track(const SceneView& scene, const Ray& ray, Interval inside,
+  template <class Blend, class View>
+  SCOLOPAX_HD static std::optional<Collision> track(const View& scene, const Ray& ray, Interval inside,
                                                     Sampler& sampler, SampleCost* cost) {
     return trackWithPatience(AlongCells<Blend>{}, scene, ray, inside, sampler, cost);
   }

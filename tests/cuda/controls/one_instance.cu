@@ -10,7 +10,7 @@ namespace scolopax::test {
 
 cuda::LaunchFunction oneInstance() {
   return cuda::launch<kernel::Analog<kernel::SyncDda>, kernel::BlendDensity,
-                      kernel::LightFeatures<true, true>>;
+                      kernel::LightFeatures<true, true>, kernel::PlainSceneView>;
 }
 
 }  // namespace scolopax::test
