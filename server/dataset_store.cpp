@@ -68,11 +68,19 @@ std::shared_ptr<const Dataset> DatasetStore::find(std::string_view id) const {
   return found == datasets_.end() ? nullptr : *found;
 }
 
+DatasetStore::Gradients DatasetStore::kept(const Dataset& dataset, int channel) const {
+  const auto known = std::find_if(gradients_.begin(), gradients_.end(), [&](const Measured& m) {
+    return m.dataset == &dataset && m.channel == channel;
+  });
+  if (known == gradients_.end()) return nullptr;
+  gradients_.splice(gradients_.begin(), gradients_, known);
+  return known->gradients;
+}
+
 DatasetStore::Gradients DatasetStore::gradients(const Dataset& dataset, int channel) const {
   channelOf(dataset, channel);
   const std::lock_guard lock(mutex_);
-  const auto known = gradients_.find({&dataset, channel});
-  return known == gradients_.end() ? nullptr : known->second;
+  return kept(dataset, channel);
 }
 
 DatasetStore::Gradients DatasetStore::measuredGradients(const Dataset& dataset, int channel,
@@ -80,7 +88,10 @@ DatasetStore::Gradients DatasetStore::measuredGradients(const Dataset& dataset, 
   if (Gradients known = gradients(dataset, channel)) return known;
   Gradients measured = sharedGradientHistogram(dataset.volume, channel, stop, memory_);
   const std::lock_guard lock(mutex_);
-  return gradients_[{&dataset, channel}] = std::move(measured);
+  if (Gradients known = kept(dataset, channel)) return known;  // another has waited for the same
+  gradients_.push_front({&dataset, channel, measured});
+  if (gradients_.size() > kMostGradients) gradients_.pop_back();
+  return measured;
 }
 
 std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesystem::path>& paths,

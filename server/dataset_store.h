@@ -2,7 +2,7 @@
 // The data sets named on the command line, loaded once, and what clients may ask about them.
 #pragma once
 #include <filesystem>
-#include <map>
+#include <list>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
@@ -32,18 +32,28 @@ class DatasetStore {
   const std::vector<std::shared_ptr<const Dataset>>& all() const { return datasets_; }
 
   using Gradients = std::shared_ptr<const GradientHistogram>;
-  /// Of a channel of a data set of the store; nullptr where nobody has measured them yet. Throws
+  /// 64 MiB; more than several scenes of 32 channels need at once.
+  static constexpr std::size_t kMostGradients = 128;
+  /// Of a channel of a data set of the store; nullptr where they are yet to be measured. Throws
   /// ProtocolError(422) when there is no such channel.
   Gradients gradients(const Dataset& dataset, int channel) const;
-  /// The same, which waits until they are measured; they are kept. Throws also Error: cancelled once `stop`
-  /// is requested, busy and tooLarge where there is no memory for them.
+  /// The same, which waits until they are measured. The last kMostGradients that were asked for are kept.
+  /// Throws also Error: cancelled once `stop` is requested, busy and tooLarge where there is no memory.
   Gradients measuredGradients(const Dataset& dataset, int channel, const std::stop_token& stop) const;
 
  private:
   std::vector<std::shared_ptr<const Dataset>> datasets_;
   std::shared_ptr<MemoryBudget> memory_;
-  mutable std::mutex mutex_;  ///< never held while measuring
-  mutable std::map<std::pair<const Dataset*, int>, Gradients> gradients_;
+  /// With the mutex held; nullptr where they are not kept.
+  Gradients kept(const Dataset& dataset, int channel) const;
+
+  struct Measured {
+    const Dataset* dataset;
+    int channel;
+    Gradients gradients;
+  };
+  mutable std::mutex mutex_;               ///< never held while measuring
+  mutable std::list<Measured> gradients_;  ///< the last asked for in front
 };
 
 /// The files to load: each path as it is, or, with a data root, below it. Throws Error when one leaves the

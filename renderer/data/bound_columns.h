@@ -16,6 +16,10 @@ struct BoundColumn {
   std::vector<std::uint8_t> cells;  ///< per macrocell: the least level that is a bound
 };
 
+/// Memory that buildBoundColumn takes while it builds.
+inline std::size_t bytesToBuildBoundColumn(const MacrocellGrid& macrocells) {
+  return macrocells.cellCount() * (sizeof(std::uint8_t) + sizeof(ValueInterval));
+}
 /// Bounds `channel` of the macrocells, which `ofValues` bounds where the factor is 1.
 BoundColumn buildBoundColumn(const MacrocellGrid& macrocells, int channel, const kernel::BoundTable& ofValues,
                              const GradientCells& gradients, const GradientFactor& factor);

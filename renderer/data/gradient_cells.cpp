@@ -10,17 +10,13 @@
 #include <glm/mat3x3.hpp>
 #include <limits>
 
-#include "renderer/core/error.h"
+#include "renderer/data/measuring.h"
 #include "renderer/data/value_levels.h"
 
 namespace scolopax {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-void checkWanted(const std::stop_token& stop) {
-  if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "gradients are not wanted any more");
-}
 
 /// Voxels from `low` to `high`, both included.
 struct Voxels {

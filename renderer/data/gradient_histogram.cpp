@@ -5,7 +5,6 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -14,9 +13,8 @@
 #include <limits>
 #include <numeric>
 
-#include "renderer/core/error.h"
 #include "renderer/core/shared_builds.h"
-#include "renderer/core/thread_priority.h"
+#include "renderer/data/measuring.h"
 #include "renderer/data/transfer_function.h"
 
 namespace scolopax {
@@ -29,10 +27,6 @@ static_assert(kBins == Histogram::kBins);
 constexpr float kLeastOpacity = 1e-6f;
 
 using Rows = tbb::blocked_range<std::size_t>;
-
-void checkWanted(const std::stop_token& stop) {
-  if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "the gradients are not wanted any more");
-}
 
 /// The gradients of a channel at its voxels, row by row.
 template <class T>
@@ -193,21 +187,15 @@ std::shared_ptr<const GradientHistogram> sharedGradientHistogram(
   using Builds = SharedBuilds<std::weak_ptr<const Volume>, GradientHistogram,
                               std::owner_less<std::weak_ptr<const Volume>>>;
   static std::array<Builds, std::size_t(kMaxChannels)> builds;
-  const int threads = tbb::this_task_arena::max_concurrency();  // as many as whoever asked first may have
+  // While it is measured every thread has counts of its own.
+  constexpr std::size_t kBytes = kBins * kBins * sizeof(std::uint64_t) + kBins * sizeof(ValueInterval);
+  const auto copies = std::size_t(tbb::this_task_arena::max_concurrency() + 1);
   return builds[std::size_t(channel)].get(
       volume,
-      [volume, channel, threads, memory](const std::stop_token& abandoned) {
-        lowerThreadPriority();
-        // While it is measured every thread has counts of its own.
-        constexpr std::size_t kBytes = kBins * kBins * sizeof(std::uint64_t) + kBins * sizeof(ValueInterval);
-        auto share = MemoryBudget::take(memory, MemoryUse::grids, std::size_t(threads + 1) * kBytes);
-        GradientHistogram histogram;
-        tbb::task_arena(threads, 1, tbb::task_arena::priority::low).execute([&] {
-          histogram = measureGradientHistogram(*volume, channel, abandoned);
-        });
-        share.resize(histogram.sizeBytes());
-        return withShare(std::move(share), std::move(histogram));
-      },
+      measuring<GradientHistogram>(memory, copies * kBytes,
+                                   [volume, channel](const std::stop_token& abandoned) {
+                                     return measureGradientHistogram(*volume, channel, abandoned);
+                                   }),
       stop);
 }
 

@@ -10,6 +10,7 @@
 #include <type_traits>
 
 #include "renderer/core/error.h"
+#include "renderer/data/measuring.h"
 #include "renderer/data/value_levels.h"
 
 namespace scolopax {
@@ -26,10 +27,6 @@ ValueInterval widen(ValueInterval v) {
   if (v.lo != 0) v.lo -= slack;
   if (v.hi != 0) v.hi += slack;
   return v;
-}
-
-void checkWanted(const std::stop_token& stop) {
-  if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "the macrocells are not wanted any more");
 }
 
 /// Calls visit(cell, interval) for every macrocell, from many threads. lo > hi where no voxel is finite.

@@ -187,9 +187,11 @@ RenderPlan::Channels RenderPlan::planChannels(const Scene& scene, const Macrocel
     }
     if (!next.gradients[i])
       next.gradients[i] = sharedGradientCells(volume_, int(i), macrocells.size, stop, memory_);
-    if (!plan->column)
+    if (!plan->column) {
+      const auto share = MemoryBudget::take(memory_, MemoryUse::grids, bytesToBuildBoundColumn(macrocells));
       plan->column = std::make_shared<BoundColumn>(
           buildBoundColumn(macrocells, int(i), *plan->bounds, *next.gradients[i], *plan->factor));
+    }
     next.tables.push_back(
         boundsOfExtinction(plan->column->levels, int(macrocells.levels.size() + next.columns.size())));
     next.columns.push_back(plan->column);

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/data/shared_macrocells.h"
 
-#include <tbb/task_arena.h>
-
 #include "renderer/core/shared_builds.h"
-#include "renderer/core/thread_priority.h"
+#include "renderer/data/measuring.h"
 
 namespace scolopax {
 namespace {
@@ -20,21 +18,6 @@ struct KeyLess {
     return a.volume.owner_before(b.volume);
   }
 };
-
-/// Runs build(stop) at low priority on as many threads as this one may use. `bytes` of the budget are its
-/// while it runs, then as many as the result has.
-template <class Result, class Build>
-auto measuring(const std::shared_ptr<MemoryBudget>& memory, std::size_t bytes, Build build) {
-  const int threads = tbb::this_task_arena::max_concurrency();  // as many as whoever asked first may have
-  return [=](const std::stop_token& abandoned) {
-    lowerThreadPriority();
-    auto share = MemoryBudget::take(memory, MemoryUse::grids, bytes);
-    Result result;
-    tbb::task_arena(threads, 1, tbb::task_arena::priority::low).execute([&] { result = build(abandoned); });
-    share.resize(result.sizeBytes());
-    return withShare(std::move(share), std::move(result));
-  };
-}
 
 std::size_t cellCount(const Volume& volume, int size) {
   return intervalCount(volume, size) / volume.channels().size();

@@ -74,6 +74,7 @@ class Core {
   asio::thread_pool& workersFor(std::size_t bytes) { return bytes > kBulkBytes ? bulkWorkers : workers; }
   asio::thread_pool slowWorkers;
   std::atomic<int> slowRunning{0};
+  std::atomic<int> quickRunningSlowly{0};  ///< of these, requests of quick routes
 
  private:
   struct Entry {

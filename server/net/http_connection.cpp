@@ -72,18 +72,26 @@ class Deadline {
   std::shared_ptr<State> state_;
 };
 
-/// One of the slots for slow requests, if there is one.
+/// One of the slots for slow requests, if there is one. Those of quick routes may have a quarter of them:
+/// what such a request waits for is done once for all, and who asks for much of it must not keep others out.
 class SlowSlot {
  public:
-  explicit SlowSlot(Core& core) : core_(core), taken_(++core.slowRunning <= core.options.longRequests) {}
-  ~SlowSlot() { --core_.slowRunning; }
+  SlowSlot(Core& core, RouteKind kind) : core_(core), quick_(kind == RouteKind::quick) {
+    const int most = core.options.longRequests;
+    taken_ = ++core.slowRunning <= most;
+    if (quick_) taken_ = ++core.quickRunningSlowly <= std::max(1, most / 4) && taken_;
+  }
+  ~SlowSlot() {
+    --core_.slowRunning;
+    if (quick_) --core_.quickRunningSlowly;
+  }
   SlowSlot(const SlowSlot&) = delete;
   SlowSlot& operator=(const SlowSlot&) = delete;
   bool taken() const { return taken_; }
 
  private:
   Core& core_;
-  bool taken_;
+  bool quick_, taken_;
 };
 
 /// While it lives, notices within kWatchInterval that the client has closed its end. Asked of the system:
@@ -303,7 +311,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
                                                    [&] { return core_.guarded(quick, request); });
       if (!takesLong) co_return response;
     }
-    const SlowSlot slot(core_);
+    const SlowSlot slot(core_, route.kind);
     if (!slot.taken()) co_return withRetry(core_.problem(503, "Too many long requests at once."));
     const ClientWatch watch(transport_.socket());
     request.mayWait = true;

@@ -33,8 +33,9 @@ struct Options {
   TextLimits unsentTexts;
   /// Beyond: 503. Half of them at most may be strangers', who have shown no token yet.
   std::size_t maxConnections = 512;
-  int workers = 4;        ///< threads for ordinary handlers and WebSocket events
-  int longRequests = 16;  ///< RouteKind::slow requests at once; beyond: 503
+  int workers = 4;  ///< threads for ordinary handlers and WebSocket events
+  int longRequests =
+      16;  ///< RouteKind::slow requests at once, and of quick routes a quarter as many; beyond: 503
 
   std::chrono::milliseconds headTimeout{5'000};   ///< from the first byte of a head to its end
   std::chrono::milliseconds idleTimeout{30'000};  ///< between the requests of a kept connection

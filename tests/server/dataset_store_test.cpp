@@ -70,6 +70,23 @@ TEST(DatasetStore, KeepsTheGradientsThatItHasMeasured) {
   EXPECT_THROW(store->measuredGradients(dataset, -1, {}), protocol::ProtocolError);
 }
 
+TEST(DatasetStore, KeepsOnlyTheGradientsThatWereAskedForLast) {
+  const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(1) << 30);
+  std::vector<Dataset> datasets;
+  for (std::size_t i = 0; i <= DatasetStore::kMostGradients; ++i)
+    datasets.push_back({std::to_string(i), "", {}, testing::smallVolume()});
+  const DatasetStore store(std::move(datasets), memory);
+  const std::size_t bytes = store.measuredGradients(*store.all()[0], 0, {})->sizeBytes();
+  for (std::size_t i = 1; i < DatasetStore::kMostGradients; ++i)
+    store.measuredGradients(*store.all()[i], 0, {});
+  EXPECT_NE(store.gradients(*store.all()[0], 0), nullptr);  // and so it is not the one that goes
+  store.measuredGradients(*store.all().back(), 0, {});
+  EXPECT_NE(store.gradients(*store.all()[0], 0), nullptr);
+  EXPECT_EQ(store.gradients(*store.all()[1], 0), nullptr);
+  EXPECT_NE(store.gradients(*store.all().back(), 0), nullptr);
+  EXPECT_EQ(memory->used(MemoryUse::grids), DatasetStore::kMostGradients * bytes);
+}
+
 TEST(DatasetStore, ProbesBetweenVoxelCentres) {
   const auto dataset = testing::smallStore()->first();
   // Values are the voxel's index, x + 4 y + 12 z: linear, so interpolation is exact.

@@ -476,6 +476,30 @@ TEST_F(HttpTest, AQuickRequestThatTakesLongNeitherDelaysOthersNorGrowsWithoutBou
   EXPECT_EQ(other.request("POST /edit HTTP/1.1", "long").body, "long");
 }
 
+TEST_F(HttpTest, QuickRequestsThatTakeLongHaveAQuarterOfTheSlots) {
+  Options options = quickOptions();
+  options.longRequests = 8;
+  Gate gate;
+  Server server(options);
+  server.route("GET", "/measure", [&](const Request& request) {
+    if (!request.mayWait) throw TakesLong();
+    return gate.pass();
+  });
+  server.route(
+      "GET", "/poll", [](const Request&) { return Response{}; }, RouteKind::slow);
+  server.start();
+  TestClient first(server.port()), second(server.port()), other(server.port());
+  first.send("GET /measure HTTP/1.1\r\nHost: a\r\n\r\n");
+  second.send("GET /measure HTTP/1.1\r\nHost: a\r\n\r\n");
+  gate.waitFor(2);
+  EXPECT_EQ(other.request("GET /measure HTTP/1.1").status, 503);
+  EXPECT_EQ(other.request("GET /poll HTTP/1.1").status, 200);
+  gate.open();
+  EXPECT_EQ(first.answer().status, 200);
+  EXPECT_EQ(second.answer().status, 200);
+  EXPECT_EQ(other.request("GET /measure HTTP/1.1").status, 200);
+}
+
 TEST_F(HttpTest, TellsALongRequestThatItsClientHasGone) {
   Server server(quickOptions());
   std::atomic<int> running{0}, gone{0};
