@@ -90,7 +90,7 @@ class Renderer {
   /// Looks up what is visible in an area of the picture, by the method's own samples, without the film. The
   /// same for the same scene, whatever has been rendered. `scene`: that of setScene, but size, filter, method
   /// and step may differ: what is shown for a while may be smaller and coarser. Automatic looks as superposed
-  /// does. Valid until the next setScene; between these, and while others use what is const or add pixels,
+  /// does. Valid while the renderer lives, and stays with the scene that is set now, whatever comes after it;
   /// from any thread.
   virtual std::unique_ptr<Picking> pick(const Scene& scene, const PixelArea& area) const = 0;
   virtual Image image() const = 0;

@@ -10,12 +10,17 @@
 
 namespace scolopax {
 
-BoundColumn buildBoundColumn(const MacrocellGrid& macrocells, int channel, const kernel::BoundTable& ofValues,
-                             const GradientCells& gradients, const GradientFactor& factor) {
+std::shared_ptr<const BoundColumn> buildBoundColumn(const MacrocellGrid& macrocells, int channel,
+                                                    const kernel::BoundTable& ofValues,
+                                                    const GradientCells& gradients,
+                                                    const GradientFactor& factor,
+                                                    const std::shared_ptr<MemoryBudget>& memory) {
+  const std::size_t cells = macrocells.cellCount(), columnBytes = cells * sizeof(std::uint8_t);
+  auto share = MemoryBudget::take(memory, MemoryUse::grids, columnBytes + cells * sizeof(ValueInterval));
   std::vector<float> factors;
   for (const float level : gradients.levels.values) factors.push_back(factor.largest(level));
   const std::size_t columns = macrocells.levels.size();
-  std::vector<ValueInterval> bounds(macrocells.cellCount());
+  std::vector<ValueInterval> bounds(cells);
   const auto forCells = [&](auto&& f) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bounds.size(), 4096), [&](const auto& range) {
       for (std::size_t cell = range.begin(); cell < range.end(); ++cell) f(cell);
@@ -31,29 +36,31 @@ BoundColumn buildBoundColumn(const MacrocellGrid& macrocells, int channel, const
   column.levels.values = chooseLevels(bounds);
   column.cells.resize(bounds.size());
   forCells([&](std::size_t cell) { column.cells[cell] = encode(column.levels, bounds[cell]).hi; });
-  return column;
+  share.resize(columnBytes);
+  return withShare(std::move(share), std::move(column));
 }
 
-std::shared_ptr<const MacrocellGrid> withColumns(
-    const std::shared_ptr<const MacrocellGrid>& macrocells,
-    std::span<const std::shared_ptr<const BoundColumn>> columns) {
+std::shared_ptr<const MacrocellGrid> withColumns(const std::shared_ptr<const MacrocellGrid>& macrocells,
+                                                 std::span<const std::shared_ptr<const BoundColumn>> columns,
+                                                 const std::shared_ptr<MemoryBudget>& memory) {
   if (columns.empty()) return macrocells;
   const std::size_t before = macrocells->levels.size(), after = before + columns.size();
-  auto result = std::make_shared<MacrocellGrid>();
-  result->size = macrocells->size;
-  result->cells = macrocells->cells;
-  result->levels = macrocells->levels;
-  for (const auto& column : columns) result->levels.push_back(column->levels);
-  result->intervals.resize(macrocells->cellCount() * after);
+  auto share = MemoryBudget::take(memory, MemoryUse::grids, macrocells->sizeBytes() / before * after);
+  MacrocellGrid result;
+  result.size = macrocells->size;
+  result.cells = macrocells->cells;
+  result.levels = macrocells->levels;
+  for (const auto& column : columns) result.levels.push_back(column->levels);
+  result.intervals.resize(macrocells->cellCount() * after);
   const CellBlocks blocks(macrocells->cells);
-  result->blocks.resize(blocks.count() * after);
+  result.blocks.resize(blocks.count() * after);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.count(), 64), [&](const auto& range) {
     for (std::size_t block = range.begin(); block < range.end(); ++block) {
-      kernel::LevelInterval* all = &result->blocks[block * after];
+      kernel::LevelInterval* all = &result.blocks[block * after];
       std::copy_n(&macrocells->blocks[block * before], before, all);
       std::fill_n(all + before, columns.size(), kernel::LevelInterval{255, 0});
       blocks.visitCells(block, [&](std::size_t cell) {
-        kernel::LevelInterval* own = &result->intervals[cell * after];
+        kernel::LevelInterval* own = &result.intervals[cell * after];
         std::copy_n(&macrocells->intervals[cell * before], before, own);
         for (std::size_t i = 0; i < columns.size(); ++i) {
           const std::uint8_t level = columns[i]->cells[cell];
@@ -64,7 +71,7 @@ std::shared_ptr<const MacrocellGrid> withColumns(
       });
     }
   });
-  return result;
+  return withShare(std::move(share), std::move(result));
 }
 
 }  // namespace scolopax

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "renderer/core/memory_budget.h"
 #include "renderer/data/gradient_cells.h"
 #include "renderer/data/gradient_factor.h"
 
@@ -16,16 +17,17 @@ struct BoundColumn {
   std::vector<std::uint8_t> cells;  ///< per macrocell: the least level that is a bound
 };
 
-/// Memory that buildBoundColumn takes while it builds.
-inline std::size_t bytesToBuildBoundColumn(const MacrocellGrid& macrocells) {
-  return macrocells.cellCount() * (sizeof(std::uint8_t) + sizeof(ValueInterval));
-}
-/// Bounds `channel` of the macrocells, which `ofValues` bounds where the factor is 1.
-BoundColumn buildBoundColumn(const MacrocellGrid& macrocells, int channel, const kernel::BoundTable& ofValues,
-                             const GradientCells& gradients, const GradientFactor& factor);
+/// Bounds `channel` of the macrocells, which `ofValues` bounds where the factor is 1. The memory is of the
+/// budget, if there is one.
+std::shared_ptr<const BoundColumn> buildBoundColumn(const MacrocellGrid& macrocells, int channel,
+                                                    const kernel::BoundTable& ofValues,
+                                                    const GradientCells& gradients,
+                                                    const GradientFactor& factor,
+                                                    const std::shared_ptr<MemoryBudget>& memory = nullptr);
 
 /// The macrocells with further columns, behind those of the volume's channels.
 std::shared_ptr<const MacrocellGrid> withColumns(const std::shared_ptr<const MacrocellGrid>& macrocells,
-                                                 std::span<const std::shared_ptr<const BoundColumn>> columns);
+                                                 std::span<const std::shared_ptr<const BoundColumn>> columns,
+                                                 const std::shared_ptr<MemoryBudget>& memory = nullptr);
 
 }  // namespace scolopax

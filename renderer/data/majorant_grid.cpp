@@ -104,104 +104,129 @@ BoundTable boundsOfExtinction(const ValueLevels& levels, int column) {
                        [&](kernel::LevelInterval interval) { return levels.values[interval.hi]; });
 }
 
-std::size_t MajorantGrid::sizeBytes(const MacrocellGrid& macrocells) {
-  return macrocells.cellCount() * (sizeof(TotalCode) + sizeof(std::uint32_t)) +
-         CellBlocks(macrocells.cells).count();
+/// What is worked out per macrocell.
+struct MajorantGrid::Totals {
+  std::vector<TotalCode> codes;       ///< and two more: processors gather pairs of them
+  std::vector<std::uint8_t> radii;    ///< per block
+  std::vector<std::uint32_t> active;  ///< bits of the visible channels; empty unless they are kept apart
+  glm::ivec3 filledLow{0}, filledHigh{0};
+
+  Totals(std::size_t cells, std::size_t blocks, bool apart)
+      : codes(cells + 2), radii(blocks), active(apart ? cells : 0) {}
+  static std::size_t sizeBytes(std::size_t cells, std::size_t blocks, bool apart) {
+    return cells * (sizeof(TotalCode) + (apart ? sizeof(std::uint32_t) : 0)) + blocks;
+  }
+  void measureFilled(glm::ivec3 blocks, glm::ivec3 cells);
+};
+
+/// What an edit changes of the totals.
+struct MajorantGrid::Changes {
+  bool all;
+  std::vector<Change> some;
+  bool meet(const LevelInterval* intervals) const {
+    return all || std::any_of(some.begin(), some.end(),
+                              [&](const Change& change) { return change.meets(intervals[change.column]); });
+  }
+};
+
+MajorantGrid::MajorantGrid(std::shared_ptr<const MacrocellGrid> macrocells, std::vector<BoundTable> tables,
+                           bool sums, bool apart, const MajorantGrid* before,
+                           const std::shared_ptr<MemoryBudget>& memory)
+    : macrocells_(std::move(macrocells)),
+      tables_(std::make_shared<const std::vector<BoundTable>>(std::move(tables))),
+      sums_(sums) {
+  apart = apart || macrocells_->levels.size() > kFewColumns;
+  const Changes changes = before ? changesSince(*before, apart) : Changes{true, {}};
+  // There may be channels more or less that have no extinction anywhere.
+  if (!changes.all && changes.some.empty()) {
+    totals_ = before->totals_;
+    return;
+  }
+  const std::size_t cells = macrocells_->cellCount(), blocks = CellBlocks(macrocells_->cells).count();
+  auto share = MemoryBudget::take(memory, MemoryUse::grids, Totals::sizeBytes(cells, blocks, apart));
+  Totals totals = changes.all ? Totals(cells, blocks, apart) : *before->totals_;
+  cellsRebuilt_ = rebuild(changes, totals);
+  totals_ = withShare(std::move(share), std::move(totals));
 }
 
-std::size_t MajorantGrid::update(std::shared_ptr<const MacrocellGrid> macrocells,
-                                 std::vector<BoundTable> tables, bool sums, bool apart) {
-  apart = apart || macrocells->levels.size() > kFewColumns;
-  const bool newCells = macrocells != macrocells_;
+MajorantGrid::Changes MajorantGrid::changesSince(const MajorantGrid& before, bool apart) const {
+  const std::vector<BoundTable>&now = *tables_, &then = *before.tables_;
   // Bits of channels count visible ones: where others are visible than before, all change.
   const bool renumbered =
-      apart && !std::equal(tables.begin(), tables.end(), tables_.begin(), tables_.end(),
+      apart && !std::equal(now.begin(), now.end(), then.begin(), then.end(),
                            [](const BoundTable& a, const BoundTable& b) { return a.column == b.column; });
-  const bool all = newCells || renumbered || sums != sums_ || apart == active_.empty();
-  const CellBlocks blocks(macrocells->cells);
-  std::vector<Change> changes;
-  for (int column = 0; column < int(macrocells->levels.size()); ++column)
-    addChange(tableOf(tables_, column), tableOf(tables, column), changes);
-  if (!all && changes.empty()) {  // perhaps there are channels more or less that have no extinction anywhere
-    tables_ = std::move(tables);
-    return 0;
-  }
-  std::vector<std::uint8_t> radii(blocks.count()), scratch(blocks.count()), stale(blocks.count());
-  std::vector<std::uint32_t> active(all && apart ? macrocells->cellCount() : 0);
-  if (newCells) {
-    std::vector<std::uint8_t> noRadii(blocks.count());
-    std::vector<TotalCode> totals(macrocells->cellCount() + 2);  // processors gather pairs of them
-    totals_ = std::move(totals);
-    radii_ = std::move(noRadii);
-  }
-  if (all) active_ = std::move(active);
-  macrocells_ = std::move(macrocells);
-  tables_ = std::move(tables);
-  sums_ = sums;
+  if (macrocells_ != before.macrocells_ || renumbered || sums_ != before.sums_ ||
+      apart == before.totals_->active.empty())
+    return {true, {}};
+  Changes changes{false, {}};
+  for (int column = 0; column < int(macrocells_->levels.size()); ++column)
+    addChange(tableOf(then, column), tableOf(now, column), changes.some);
+  return changes;
+}
 
+/// Brings the totals up to date; returns of how many cells.
+std::size_t MajorantGrid::rebuild(const Changes& changes, Totals& totals) const {
+  const CellBlocks blocks(macrocells_->cells);
   const std::size_t columns = macrocells_->levels.size();
+  std::vector<std::uint8_t> radii(blocks.count()), scratch(blocks.count()), stale(blocks.count());
   std::atomic<std::size_t> touched = 0;
-  std::atomic<bool> other = false;  // whether other blocks are empty than before
-  const auto meets = [&](const LevelInterval* intervals) {
-    return all || std::any_of(changes.begin(), changes.end(),
-                              [&](const Change& change) { return change.meets(intervals[change.column]); });
-  };
+  std::atomic<bool> other = changes.all;  // whether other blocks are empty than before
   // Blocks first: most of them have none of the values that an edit changes.
   forBlocks(blocks, [&](std::size_t block) {
-    radii[block] = radii_[block] > 0 ? kernel::kMaxEmptyRadius : 0;
-    if (!meets(&macrocells_->blocks[block * columns])) return;
+    radii[block] = totals.radii[block] > 0 ? kernel::kMaxEmptyRadius : 0;
+    if (!changes.meet(&macrocells_->blocks[block * columns])) return;
     std::size_t count = 0;
     bool empty = true;
     blocks.visitCells(block, [&](std::size_t cell) {
       const LevelInterval* intervals = &macrocells_->intervals[cell * columns];
-      if (meets(intervals)) {
-        totals_[cell] = kernel::codeOfTotal(totalOf(intervals));
-        if (!active_.empty()) active_[cell] = activeOf(intervals);
+      if (changes.meet(intervals)) {
+        totals.codes[cell] = kernel::codeOfTotal(totalOf(intervals));
+        if (!totals.active.empty()) totals.active[cell] = activeOf(intervals);
         ++count;
       }
-      empty = empty && (totals_[cell] == 0 || totals_[cell] >= kernel::codeOfEmpty(0));
+      empty = empty && (totals.codes[cell] == 0 || totals.codes[cell] >= kernel::codeOfEmpty(0));
     });
     radii[block] = empty ? kernel::kMaxEmptyRadius : 0;
     stale[block] = count > 0;
     if (count > 0) touched += count;
-    if (empty != (radii_[block] > 0)) other = true;
+    if (empty != (totals.radii[block] > 0)) other = true;
   });
 
   if (other)
     measureRadii(blocks.size, radii, scratch);
   else
-    radii = radii_;
+    radii = totals.radii;
   forBlocks(blocks, [&](std::size_t block) {
-    if (radii[block] == radii_[block] && !(stale[block] && radii[block] > 0)) return;
+    if (radii[block] == totals.radii[block] && !(stale[block] && radii[block] > 0)) return;
     blocks.visitCells(block, [&](std::size_t cell) {
       if (radii[block] > 0)
-        totals_[cell] = kernel::codeOfEmpty(radii[block]);
-      else if (totals_[cell] >= kernel::codeOfEmpty(0))
-        totals_[cell] = 0;
+        totals.codes[cell] = kernel::codeOfEmpty(radii[block]);
+      else if (totals.codes[cell] >= kernel::codeOfEmpty(0))
+        totals.codes[cell] = 0;
     });
   });
-  radii_ = std::move(radii);
-  if (newCells || other) measureFilled(blocks.size);
+  totals.radii = std::move(radii);
+  if (other) totals.measureFilled(blocks.size, macrocells_->cells);
   return touched;
 }
 
-void MajorantGrid::measureFilled(glm::ivec3 blocks) {
+void MajorantGrid::Totals::measureFilled(glm::ivec3 blocks, glm::ivec3 cells) {
   glm::ivec3 low = blocks, high(0);
   std::size_t i = 0;
   for (int z = 0; z < blocks.z; ++z)
     for (int y = 0; y < blocks.y; ++y)
       for (int x = 0; x < blocks.x; ++x)
-        if (radii_[i++] == 0) {
+        if (radii[i++] == 0) {
           low = glm::min(low, glm::ivec3(x, y, z));
           high = glm::max(high, glm::ivec3(x, y, z) + 1);
         }
-  filledLow_ = low * kernel::kBlockEdge;
-  filledHigh_ = glm::min(high * kernel::kBlockEdge, macrocells_->cells);
+  filledLow = low * kernel::kBlockEdge;
+  filledHigh = glm::min(high * kernel::kBlockEdge, cells);
 }
 
 float MajorantGrid::totalOf(const LevelInterval* intervals) const {
   float total = 0.0f;
-  for (const BoundTable& table : tables_) {
+  for (const BoundTable& table : *tables_) {
     const float bound = table.over(intervals[table.column]);
     total = sums_ ? total + bound : std::max(total, bound);
   }
@@ -210,21 +235,23 @@ float MajorantGrid::totalOf(const LevelInterval* intervals) const {
 
 std::uint32_t MajorantGrid::activeOf(const LevelInterval* intervals) const {
   std::uint32_t active = 0;
-  for (std::size_t n = 0; n < tables_.size(); ++n)
-    if (tables_[n].over(intervals[tables_[n].column]) > 0.0f) active |= 1u << n;
+  for (std::size_t n = 0; n < tables_->size(); ++n) {
+    const BoundTable& table = (*tables_)[n];
+    if (table.over(intervals[table.column]) > 0.0f) active |= 1u << n;
+  }
   return active;
 }
 
 kernel::MajorantView MajorantGrid::view() const {
   return {macrocells_->cells,
           float(macrocells_->size),
-          totals_.data(),
+          totals_->codes.data(),
           macrocells_->intervals.data(),
           int(macrocells_->levels.size()),
-          tables_.data(),
-          filledLow_,
-          filledHigh_,
-          active_.empty() ? nullptr : active_.data()};
+          tables_->data(),
+          totals_->filledLow,
+          totals_->filledHigh,
+          totals_->active.empty() ? nullptr : totals_->active.data()};
 }
 
 }  // namespace scolopax

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Upper bounds of the extinction per macrocell, kept up to date edit by edit: an edit of a channel's curve
-// costs a new table of that channel, and the totals of those cells whose values it changes.
+// Upper bounds of the extinction per macrocell. An edit makes new ones: of a channel's curve, it costs a new
+// table of that channel, the totals of those cells whose values it changes, and a copy of the others'.
 #pragma once
 #include <memory>
 #include <vector>
 
+#include "renderer/core/memory_budget.h"
 #include "renderer/data/transfer_function.h"
 #include "renderer/kernel/majorants.h"
 
@@ -19,28 +20,31 @@ kernel::BoundTable boundsOfExtinction(const ValueLevels& levels, int column);
 
 class MajorantGrid {
  public:
-  /// Takes over the visible channels' tables, in the order of the channels, and the macrocells they belong
-  /// to. `sums`: the channels' extinctions add up; else the largest hides the others. `apart`: kernels need
-  /// to know of every cell which channels are active. Returns in how many cells the total was worked out
-  /// again. Nothing has changed when this throws.
-  std::size_t update(std::shared_ptr<const MacrocellGrid> macrocells, std::vector<kernel::BoundTable> tables,
-                     bool sums, bool apart = false);
-  /// Memory that it takes for these macrocells, without theirs.
-  static std::size_t sizeBytes(const MacrocellGrid& macrocells);
-  /// Valid until the next update.
+  /// Of the visible channels' tables, in the order of the channels, and the macrocells they belong to.
+  /// `sums`: the channels' extinctions add up; else the largest hides the others. `apart`: kernels need to
+  /// know of every cell which channels are active. What is as it was in `before`, if that is given, is not
+  /// worked out again, and shared where nothing is new. The memory is of the budget, if there is one.
+  MajorantGrid(std::shared_ptr<const MacrocellGrid> macrocells, std::vector<kernel::BoundTable> tables,
+               bool sums, bool apart, const MajorantGrid* before = nullptr,
+               const std::shared_ptr<MemoryBudget>& memory = nullptr);
+  /// In how many cells the total was worked out.
+  std::size_t cellsRebuilt() const { return cellsRebuilt_; }
+  /// Valid while a copy of this lives.
   kernel::MajorantView view() const;
 
  private:
+  struct Totals;
+  struct Changes;
+  Changes changesSince(const MajorantGrid& before, bool apart) const;
+  std::size_t rebuild(const Changes& changes, Totals& totals) const;
   float totalOf(const kernel::LevelInterval* intervals) const;
   std::uint32_t activeOf(const kernel::LevelInterval* intervals) const;
-  void measureFilled(glm::ivec3 blocks);
+
   std::shared_ptr<const MacrocellGrid> macrocells_;
-  std::vector<kernel::BoundTable> tables_;
-  bool sums_ = true;
-  std::vector<kernel::TotalCode> totals_;
-  std::vector<std::uint8_t> radii_;  // per block
-  std::vector<std::uint32_t> active_;
-  glm::ivec3 filledLow_{0}, filledHigh_{0};
+  std::shared_ptr<const std::vector<kernel::BoundTable>> tables_;
+  bool sums_;
+  std::shared_ptr<const Totals> totals_;
+  std::size_t cellsRebuilt_ = 0;
 
   /// Of so many channels all are looked at where one may be something, if that gives the same picture.
   static constexpr std::size_t kFewColumns = 4;

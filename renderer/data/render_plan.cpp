@@ -133,17 +133,16 @@ bool needsGradients(const Channel& channel, const ChannelAppearance& appearance)
 }
 }  // namespace
 
-bool RenderPlan::takesLong(const Scene& scene) const {
+bool RenderPlan::nextTakesLong(const Scene& scene) const {
   // An edit may change the totals of all cells.
   constexpr std::size_t kManyIntervals = 4 << 20;
-  if (!macrocells_ || macrocells_->size != scene.macrocell || macrocells_->intervals.size() > kManyIntervals)
-    return true;
+  if (macrocells_->size != scene.macrocell || macrocells_->intervals.size() > kManyIntervals) return true;
   for (std::size_t i = 0; i < scene.channels.size() && i < channels_.gradients.size(); ++i)
     if (!channels_.gradients[i] && needsGradients(volume_->channels()[i], scene.channels[i])) return true;
   return false;
 }
 
-bool RenderPlan::makesSamePicture(const Scene& scene) const { return scene_ && samePicture(*scene_, scene); }
+bool RenderPlan::makesSamePicture(const Scene& scene) const { return samePicture(scene_, scene); }
 
 bool RenderPlan::ChannelPlan::visible(const ChannelAppearance& appearance) const {
   return appearance.visible && !transfer.invisible() && !(factor && factor->isEverywhere(0));
@@ -158,117 +157,99 @@ std::optional<GradientFactor> RenderPlan::factorOf(const Channel& channel,
   return factor;
 }
 
-RenderPlan::Channels RenderPlan::planChannels(const Scene& scene, const MacrocellGrid& macrocells,
-                                              const std::stop_token& stop, RebuildStats* stats) const {
-  const bool newCells = &macrocells != macrocells_.get();
-  Channels next;
-  next.plans = channels_.plans;
-  next.plans.resize(scene.channels.size());
-  if (!newCells) next.gradients = channels_.gradients;
-  next.gradients.resize(scene.channels.size());
-  for (std::size_t i = 0; i < scene.channels.size(); ++i) {
+void RenderPlan::planChannels(const RenderPlan* before, const std::shared_ptr<MemoryBudget>& memory,
+                              const std::stop_token& stop) {
+  const bool newCells = !before || macrocells_ != before->macrocells_;
+  if (before) channels_.plans = before->channels_.plans;
+  channels_.plans.resize(scene_.channels.size());
+  if (!newCells) channels_.gradients = before->channels_.gradients;
+  channels_.gradients.resize(scene_.channels.size());
+  for (std::size_t i = 0; i < scene_.channels.size(); ++i) {
     const Channel& channel = volume_->channels()[i];
-    const ChannelAppearance& appearance = scene.channels[i];
-    std::optional<ChannelPlan>& plan = next.plans[i];
-    const bool stale = newCells || !scene_ || !sameExtinction(scene_->channels[i], appearance);
-    if (stale)
+    const ChannelAppearance& appearance = scene_.channels[i];
+    std::optional<ChannelPlan>& plan = channels_.plans[i];
+    if (newCells || !sameExtinction(before->scene_.channels[i], appearance))
       plan = {TransferFunction(channel, appearance), factorOf(channel, appearance), {}, {}};
-    else if (scene_->channels[i] != appearance)
+    else if (before->scene_.channels[i] != appearance)
       plan->transfer = TransferFunction(channel, appearance);
     if (!plan->visible(appearance)) continue;
+    channels_.visible.push_back(int(i));
     if (!plan->bounds) {
-      plan->bounds = buildBounds(macrocells.levels[i], plan->transfer, int(i));
-      ++stats->majorantChannels;
+      plan->bounds = buildBounds(macrocells_->levels[i], plan->transfer, int(i));
+      ++rebuilt_.majorantChannels;
     }
-    next.visible.push_back(int(i));
-    if (!plan->factor) {
-      next.tables.push_back(*plan->bounds);
-      continue;
-    }
-    if (!next.gradients[i])
-      next.gradients[i] = sharedGradientCells(volume_, int(i), macrocells.size, stop, memory_);
-    if (!plan->column) {
-      const auto share = MemoryBudget::take(memory_, MemoryUse::grids, bytesToBuildBoundColumn(macrocells));
-      plan->column = std::make_shared<BoundColumn>(
-          buildBoundColumn(macrocells, int(i), *plan->bounds, *next.gradients[i], *plan->factor));
-    }
-    next.tables.push_back(
-        boundsOfExtinction(plan->column->levels, int(macrocells.levels.size() + next.columns.size())));
-    next.columns.push_back(plan->column);
+    if (!plan->factor) continue;
+    if (!channels_.gradients[i])
+      channels_.gradients[i] = sharedGradientCells(volume_, int(i), macrocells_->size, stop, memory);
+    if (!plan->column)
+      plan->column = buildBoundColumn(*macrocells_, int(i), *plan->bounds, *channels_.gradients[i],
+                                      *plan->factor, memory);
+    channels_.columns.push_back(plan->column);
   }
-  return next;
+}
+
+/// Bounds of the visible channels: by value, or by a column behind those of the channels.
+std::vector<kernel::BoundTable> RenderPlan::boundTables() const {
+  std::vector<kernel::BoundTable> tables;
+  int column = int(macrocells_->levels.size());
+  for (const int i : channels_.visible) {
+    const ChannelPlan& plan = *channels_.plans[std::size_t(i)];
+    tables.push_back(plan.factor ? boundsOfExtinction(plan.column->levels, column++) : *plan.bounds);
+  }
+  return tables;
 }
 
 /// Whether packets need to know every ray's channels: where channels hide each other, where clipping differs
 /// between channels or regions, where voxels are not finite, and where an extinction depends on more than a
 /// value, so that it may be 0 at both ends of a segment and not between them.
-bool RenderPlan::needsApart(const Scene& scene, const Channels& channels,
-                            const kernel::ClipView& clip) const {
+bool RenderPlan::needsApart(const kernel::ClipView& clip) const {
   const auto& all = volume_->channels();
-  return (!sumsExtinction(scene.blend) && all.size() > 1) || clip.parts || !channels.columns.empty() ||
+  return (!sumsExtinction(scene_.blend) && all.size() > 1) || clip.parts || !channels_.columns.empty() ||
          std::any_of(all.begin(), all.end(), [](const Channel& c) { return c.histogram.nonFiniteCount > 0; });
 }
 
-RebuildStats RenderPlan::update(const Scene& scene, const std::stop_token& stop) {
+RenderPlan::RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene, const RenderPlan* before,
+                       const std::shared_ptr<MemoryBudget>& memory, const std::stop_token& stop)
+    : volume_(std::move(volume)), scene_(scene) {
   const auto start = std::chrono::steady_clock::now();
-  checkScene(scene, *volume_);
-  RebuildStats stats;
-  stats.filmReset = !makesSamePicture(scene);
-  const auto rays = makeCameraRays(scene.camera, volume_->grid(), scene.width, scene.height);
-
-  // Everything that can throw comes first and into new objects; the plan is replaced at the end.
-  const bool newCells = !macrocells_ || macrocells_->size != scene.macrocell;
-  const auto macrocells = newCells ? sharedMacrocells(volume_, scene.macrocell, stop, memory_) : macrocells_;
-  if (newCells) stats.macrocellChannels = int(volume_->channels().size());
-  Channels channels = planChannels(scene, *macrocells, stop, &stats);
-  const auto clip = clipView(scene.clip, scene.crop, volume_->grid(), channels.visible);
-
-  const std::size_t columnBytes = channels.columns.size() * macrocells->cellCount();
-  const std::size_t bytes = MajorantGrid::sizeBytes(*macrocells) +
-                            (columnBytes == 0 ? 0 : macrocells->sizeBytes() + 3 * columnBytes);
-  auto majorantMemory = MemoryBudget::take(memory_, MemoryUse::grids);
-  const bool otherMemory = bytes != majorantMemory_.bytes();
-  if (otherMemory) majorantMemory.resize(bytes);
-  const bool sameColumns = !newCells && channels.columns == channels_.columns;
-  auto bounded = sameColumns ? bounded_ : withColumns(macrocells, channels.columns);
-  std::vector<kernel::ChannelView> views;
-  views.reserve(channels.visible.size());
-  for (const int i : channels.visible) {
-    const ChannelPlan& plan = *channels.plans[std::size_t(i)];
-    views.push_back(plan.transfer.view(volume_->channels()[std::size_t(i)]));
-    if (plan.factor) views.back().gradient = plan.factor->view();
+  checkScene(scene_, *volume_);
+  rebuilt_.filmReset = !before || !before->makesSamePicture(scene_);
+  const auto rays = makeCameraRays(scene_.camera, volume_->grid(), scene_.width, scene_.height);
+  const bool newCells = !before || before->macrocells_->size != scene_.macrocell;
+  macrocells_ = newCells ? sharedMacrocells(volume_, scene_.macrocell, stop, memory) : before->macrocells_;
+  if (newCells) rebuilt_.macrocellChannels = int(volume_->channels().size());
+  planChannels(before, memory, stop);
+  const bool sameColumns = !newCells && channels_.columns == before->channels_.columns;
+  bounded_ = sameColumns ? before->bounded_ : withColumns(macrocells_, channels_.columns, memory);
+  for (const int i : channels_.visible) {
+    const ChannelPlan& plan = *channels_.plans[std::size_t(i)];
+    channelViews_.push_back(plan.transfer.view(volume_->channels()[std::size_t(i)]));
+    if (plan.factor) channelViews_.back().gradient = plan.factor->view();
   }
-  std::optional<Scene> next = scene;
-  stats.majorantCells = majorants_.update(bounded, std::move(channels.tables), sumsExtinction(scene.blend),
-                                          needsApart(scene, channels, clip.value_or(kernel::ClipView{})));
-
-  scene_ = std::move(next);
-  macrocells_ = macrocells;
-  bounded_ = std::move(bounded);
-  if (otherMemory) majorantMemory_ = std::move(majorantMemory);
-  channels_ = std::move(channels);
-  channelViews_ = std::move(views);
-  fillView(scene, rays, clip);
-  stats.rebuildMs =
+  const auto clip = clipView(scene_.clip, scene_.crop, volume_->grid(), channels_.visible);
+  majorants_.emplace(bounded_, boundTables(), sumsExtinction(scene_.blend),
+                     needsApart(clip.value_or(kernel::ClipView{})), before ? &*before->majorants_ : nullptr,
+                     memory);
+  rebuilt_.majorantCells = majorants_->cellsRebuilt();
+  fillView(rays, clip);
+  rebuilt_.rebuildMs =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-  return stats;
 }
 
-void RenderPlan::fillView(const Scene& scene, const kernel::CameraRays& rays,
-                          const std::optional<kernel::ClipView>& clip) {
-  placeLights(scene, volume_->grid(), &view_);
+void RenderPlan::fillView(const kernel::CameraRays& rays, const std::optional<kernel::ClipView>& clip) {
+  placeLights(scene_, volume_->grid(), &view_);
   view_.rays = rays;
-  view_.width = scene.width;
-  view_.height = scene.height;
-  view_.seed = scene.seed;
-  view_.filterBox = scene.filter == PixelFilter::box;
+  view_.width = scene_.width;
+  view_.height = scene_.height;
+  view_.seed = scene_.seed;
+  view_.filterBox = scene_.filter == PixelFilter::box;
   view_.dims = volume_->grid().dims;
   view_.clip = clip.value_or(kernel::ClipView{});
   view_.channelCount = clip ? int(channelViews_.size()) : 0;
   view_.channels = channelViews_.data();
-  view_.step = view_.smallestSpacing * float(scene.step);
-  view_.stratum = stratumOf(scene.method);
-  view_.majorants = majorants_.view();
+  view_.step = view_.smallestSpacing * float(scene_.step);
+  view_.stratum = stratumOf(scene_.method);
+  view_.majorants = majorants_->view();
 }
 
 }  // namespace scolopax

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // From scene to what a kernel needs and nothing else: only channels that can be seen, only what changed
-// rebuilt. Every backend owns one; the launcher uploads or borrows its view.
+// rebuilt. A plan never changes: who renders, picks or uploads from one holds it.
 #pragma once
 #include <memory>
 #include <optional>
@@ -25,19 +25,23 @@ void checkScene(const Scene& scene, const Volume& volume);
 
 class RenderPlan {
  public:
-  explicit RenderPlan(std::shared_ptr<const Volume> volume, std::shared_ptr<MemoryBudget> memory = nullptr)
-      : volume_(std::move(volume)), memory_(std::move(memory)) {}
-  /// Redoes what the new scene makes stale. The plan is unchanged when this throws, Error(badInput) or, once
-  /// `stop` is requested, Error(cancelled). Macrocells and what is kept of each are of the budget of memory.
-  RebuildStats update(const Scene& scene, const std::stop_token& stop = {});
-  /// Whether that takes longer than a few milliseconds.
-  bool takesLong(const Scene& scene) const;
-  /// Whether update() would leave the film as it is.
+  /// Throws Error(badInput) and, once `stop` is requested, Error(cancelled). What the scene leaves as it was
+  /// in `before`, if that is given, is shared with it: of the same volume. Macrocells and what is kept of
+  /// each are of the budget of memory.
+  RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene, const RenderPlan* before = nullptr,
+             const std::shared_ptr<MemoryBudget>& memory = nullptr, const std::stop_token& stop = {});
+  RenderPlan(const RenderPlan&) = delete;
+  RenderPlan& operator=(const RenderPlan&) = delete;
+
+  /// Whether a plan of this scene after this one takes longer than a few milliseconds.
+  bool nextTakesLong(const Scene& scene) const;
+  /// Whether a film of this plan is one of that scene.
   bool makesSamePicture(const Scene& scene) const;
-  const Scene& scene() const { return *scene_; }
-  const std::shared_ptr<const Volume>& volume() const { return volume_; }
+  /// What had to be done that was not shared.
+  const RebuildStats& rebuilt() const { return rebuilt_; }
+  const Scene& scene() const { return scene_; }
   const Grid& grid() const { return volume_->grid(); }
-  /// Valid until the next update.
+  /// Valid while the plan lives.
   const kernel::SceneView& view() const { return view_; }
   /// Index in the volume of every channel of the view.
   std::span<const int> visibleChannels() const { return channels_.visible; }
@@ -55,25 +59,23 @@ class RenderPlan {
   struct Channels {
     std::vector<std::optional<ChannelPlan>> plans;
     std::vector<int> visible;
-    std::vector<kernel::BoundTable> tables;
     std::vector<std::shared_ptr<const BoundColumn>> columns;
     std::vector<std::shared_ptr<const GradientCells>> gradients;  // per channel, once they were needed
   };
-  Channels planChannels(const Scene& scene, const MacrocellGrid& macrocells, const std::stop_token& stop,
-                        RebuildStats* stats) const;
+  void planChannels(const RenderPlan* before, const std::shared_ptr<MemoryBudget>& memory,
+                    const std::stop_token& stop);
   std::optional<GradientFactor> factorOf(const Channel& channel, const ChannelAppearance& appearance) const;
-  bool needsApart(const Scene& scene, const Channels& channels, const kernel::ClipView& clip) const;
-  void fillView(const Scene& scene, const kernel::CameraRays& rays,
-                const std::optional<kernel::ClipView>& clip);
+  std::vector<kernel::BoundTable> boundTables() const;
+  bool needsApart(const kernel::ClipView& clip) const;
+  void fillView(const kernel::CameraRays& rays, const std::optional<kernel::ClipView>& clip);
 
-  std::shared_ptr<const Volume> volume_;
-  const std::shared_ptr<MemoryBudget> memory_;
-  std::optional<Scene> scene_;
+  const std::shared_ptr<const Volume> volume_;
+  const Scene scene_;
+  RebuildStats rebuilt_;
   std::shared_ptr<const MacrocellGrid> macrocells_;
   Channels channels_;
   std::shared_ptr<const MacrocellGrid> bounded_;  // macrocells with the columns of channels
-  MemoryBudget::Share majorantMemory_;
-  MajorantGrid majorants_;
+  std::optional<MajorantGrid> majorants_;         // always, once it is made
   std::vector<kernel::ChannelView> channelViews_;
   kernel::SceneView view_{};
 };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The engine: owns plan and film, has a launcher render passes, and knows everything else of a picture.
+// The engine: makes plans, owns the film, has a launcher render passes, and knows everything else of a
+// picture.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -28,7 +29,7 @@ class Engine final : public Renderer {
       : launcher_(std::move(launcher)),
         budget_(std::move(memory)),
         memory_(MemoryBudget::take(budget_, MemoryUse::films)),
-        plan_(std::move(volume), budget_) {}
+        volume_(std::move(volume)) {}
 
   std::string_view backendName() const override { return launcher_->name(); }
 
@@ -65,17 +66,16 @@ class Engine final : public Renderer {
     // Memory of a large film takes its time to be given back, and records to be emptied.
     const bool largeFilm = std::max(pixels, film_.pixelCount()) >= kLargePicture &&
                            (pixels != film_.pixelCount() || recording_ || counting_);
-    return largeFilm || scene.method == Method::automatic || plan_.takesLong(scene);
+    return largeFilm || scene.method == Method::automatic || !plan_ || plan_->nextTakesLong(scene);
   }
   Choice choice() const override {
-    const Scene& scene = plan_.scene();
+    const Scene& scene = plan_->scene();
     return {scene.method, hasStep(scene.method) ? scene.step : 0};
   }
 
   bool renderPixels(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
-    const kernel::SceneView& scene = plan_.view();
-    const Pass pass{scene,
-                    sampleNumber(plan_.scene().sampling, film_.samples()),
+    const Pass pass{plan_->view(),
+                    sampleNumber(plan_->scene().sampling, film_.samples()),
                     film_.pass(),
                     counting_ ? cost_.data() : nullptr,
                     recording_ ? first_.pass() : nullptr,
@@ -83,14 +83,14 @@ class Engine final : public Renderer {
                     &cancel,
                     std::chrono::steady_clock::now() + budget};
     bool complete = false;
-    launcher_->run([&] { complete = launcher_->launch(plan_.scene(), pass); });
+    launcher_->run([&] { complete = launcher_->launch(plan_->scene(), pass); });
     return complete;
   }
   void addPixels() override {
     launcher_->run([&] {
       film_.add();
       noise_.reset();
-      if (recording_) first_.add(plan_.visibleChannels());
+      if (recording_) first_.add(plan_->visibleChannels());
       if (counting_) addCosts();
       std::fill(done_.begin(), done_.end(), std::uint8_t(0));
     });
@@ -99,12 +99,12 @@ class Engine final : public Renderer {
   std::uint32_t samples() const override { return film_.samples(); }
   double estimatedError(std::stop_token stop) const override {
     if (!noise_) launcher_->run([&] { noise_ = film_.estimatedError(); });
-    if (errorTakesLong()) launcher_->run([&] { bias_ = estimateBias(*launcher_, plan_, stop); });
+    if (errorTakesLong()) launcher_->run([&] { bias_ = estimateBias(*launcher_, *plan_, stop); });
     return std::hypot(*noise_, bias_.value_or(0));
   }
   bool errorTakesLong() const override {
     // A film of few samples may be one of many that edits make, and is not worth the thumbnails.
-    return hasStep(plan_.scene().method) && !bias_ && film_.samples() >= kSamplesWorthBias;
+    return hasStep(plan_->scene().method) && !bias_ && film_.samples() >= kSamplesWorthBias;
   }
   Image image() const override {
     Image image;
@@ -120,7 +120,7 @@ class Engine final : public Renderer {
 
   void recordAovs() override {
     counting_ = recording_ = true;
-    if (film_.pixelCount() > 0) memory_.resize(filmBytes(film_.pixelCount(), plan_.scene()));
+    if (film_.pixelCount() > 0) memory_.resize(filmBytes(film_.pixelCount(), plan_->scene()));
     if (film_.pixelCount() > 0) film_.reset(film_.width(), film_.height());
     resetRecords();
   }
@@ -152,35 +152,44 @@ class Engine final : public Renderer {
   }
 
  private:
-  /// Updates the plan; what is left to us of the scene is chosen.
+  /// Makes the plan; what is left to us of the scene is chosen.
   RebuildStats take(const Scene& scene, const std::stop_token& stop) {
     Scene chosen = scene;
     chosen.targetError = 0;  // makes no picture of its own
     const bool automatic = scene.method == Method::automatic;
     Choice choice = automatic_;
     double bias = automaticBias_;
-    std::optional<RenderPlan> trial;  // holds what was measured for it until ours has it
+    std::shared_ptr<const RenderPlan> before = plan_;
+    RebuildStats stats;
+    const auto plan = [&] {
+      before = std::make_shared<const RenderPlan>(volume_, chosen, before.get(), budget_, stop);
+      stats.macrocellChannels += before->rebuilt().macrocellChannels;
+      stats.majorantChannels += before->rebuilt().majorantChannels;
+      stats.majorantCells += before->rebuilt().majorantCells;
+      stats.rebuildMs += before->rebuilt().rebuildMs;
+    };
     if (automatic) {
       // The choice before, if there was one: when nothing else is new either, the film goes on.
       chosen.method = choice.method;
       chosen.step = choice.step;
-      if (!plan_.makesSamePicture(chosen) || scene.targetError != target_)
-        std::tie(choice, bias) = choose(scene, trial.emplace(plan_.volume(), budget_), chosen, stop);
+      if (!plan_ || !plan_->makesSamePicture(chosen) || scene.targetError != target_) {
+        plan();
+        std::tie(choice, bias) = choose(scene, *before, stop);
+      }
       chosen.method = choice.method;
       chosen.step = choice.step;
     }
-    const RebuildStats stats = plan_.update(chosen, stop);
+    plan();
+    stats.filmReset = !plan_ || !plan_->makesSamePicture(chosen);
+    plan_ = std::move(before);
     automatic_ = choice;
     automaticBias_ = bias;
     target_ = automatic ? scene.targetError : 0;  // what was chosen is of no other scene
     return stats;
   }
 
-  /// Method and step for a scene that leaves them to us, with the bias that was found. On a plan of its own:
-  /// when it is stopped, ours is still that of the film.
-  std::pair<Choice, double> choose(const Scene& scene, RenderPlan& trial, const Scene& resolved,
-                                   const std::stop_token& stop) {
-    trial.update(resolved, stop);
+  /// Method and step for a scene that leaves them to us, with the bias that was found; on a plan of it.
+  std::pair<Choice, double> choose(const Scene& scene, const RenderPlan& trial, const std::stop_token& stop) {
     // Shadow rays are what costs most where there are any.
     const Method quadrature = scene.shadows ? Method::hybrid : Method::raymarch;
     // Half of the error is left to noise.
@@ -206,7 +215,7 @@ class Engine final : public Renderer {
       if (counting_) cost_.assign(pixels, {});
       if (!recording_ || pixels == 0) return;
       fetches_.assign(pixels, 0);
-      first_.reset(pixels, plan_.scene().channels.size());
+      first_.reset(pixels, plan_->scene().channels.size());
     } catch (const std::bad_alloc&) {
       throw Error(ErrorCode::tooLarge, "image: no memory for what is recorded of " +
                                            std::to_string(film_.width()) + "x" +
@@ -230,7 +239,8 @@ class Engine final : public Renderer {
   const std::unique_ptr<Launcher> launcher_;
   const std::shared_ptr<MemoryBudget> budget_;
   MemoryBudget::Share memory_;  // of the film and what is recorded
-  RenderPlan plan_;
+  const std::shared_ptr<const Volume> volume_;
+  std::shared_ptr<const RenderPlan> plan_;  // null until there is a scene
   Film film_;
   std::vector<std::uint8_t> done_;  // pixels that a pass has behind it
   bool counting_ = false, recording_ = false;

@@ -16,18 +16,19 @@ constexpr float kPointUnit = 0x1p-20f;
 
 class SampledPicking final : public Picking {
  public:
-  SampledPicking(Launcher& launcher, const RenderPlan& plan, const Scene& scene, const PixelArea& area)
+  SampledPicking(Launcher& launcher, std::shared_ptr<const RenderPlan> plan, const Scene& scene,
+                 const PixelArea& area)
       : launcher_(launcher),
-        plan_(plan),
+        plan_(std::move(plan)),
         unlit_(scene),
         number_(sampleNumber(Sampling::independent, 0)),
         pixels_(pixelsToPick(area)),
         side_(pickSamplesSide(pixels_.size())),
         isPoint_(scene.filter == PixelFilter::point),
         unit_(isPoint_ ? kPointUnit : 1.0f / float(side_)),
-        view_(plan.view()) {
+        view_(plan_->view()) {
     unlit_.shading = unlit_.shadows = false;  // light changes nothing of what a ray meets
-    view_.rays = makeCameraRays(scene.camera, plan.grid(), scene.width, scene.height);
+    view_.rays = makeCameraRays(scene.camera, plan_->grid(), scene.width, scene.height);
     // Depths from where rays start: from a far eye they would be too coarse for a point.
     start_ = double(std::exchange(view_.rays.start, 0.0f));
     halfSize_ = view_.rays.halfSize;
@@ -69,12 +70,12 @@ class SampledPicking final : public Picking {
     const kernel::Ray ray = view_.rays(x, y);
     const float t = met.depth / view_.rays.depth(x, y, 1.0f);
     const glm::dvec3 voxel = glm::dvec3(ray.origin) + double(t) * glm::dvec3(ray.direction);
-    return {glm::dvec3(plan_.grid().worldFromVoxel * glm::dvec4(voxel, 1)), voxel,
-            plan_.visibleChannels()[std::size_t(met.channel)], start_ + double(met.depth)};
+    return {glm::dvec3(plan_->grid().worldFromVoxel * glm::dvec4(voxel, 1)), voxel,
+            plan_->visibleChannels()[std::size_t(met.channel)], start_ + double(met.depth)};
   }
 
   Launcher& launcher_;
-  const RenderPlan& plan_;
+  const std::shared_ptr<const RenderPlan> plan_;
   Scene unlit_;
   const kernel::SampleNumber number_;
   const std::vector<glm::ivec2> pixels_;
@@ -93,9 +94,9 @@ class SampledPicking final : public Picking {
 
 }  // namespace
 
-std::unique_ptr<Picking> makePicking(Launcher& launcher, const RenderPlan& plan, const Scene& scene,
-                                     const PixelArea& area) {
-  return std::make_unique<SampledPicking>(launcher, plan, scene, area);
+std::unique_ptr<Picking> makePicking(Launcher& launcher, std::shared_ptr<const RenderPlan> plan,
+                                     const Scene& scene, const PixelArea& area) {
+  return std::make_unique<SampledPicking>(launcher, std::move(plan), scene, area);
 }
 
 }  // namespace scolopax

@@ -9,9 +9,8 @@
 
 namespace scolopax {
 
-/// `scene`: that of the plan, but for size, method, step and filter. Borrows the launcher, and the plan,
-/// which must not be updated while this is in use.
-std::unique_ptr<Picking> makePicking(Launcher& launcher, const RenderPlan& plan, const Scene& scene,
-                                     const PixelArea& area);
+/// `scene`: that of the plan, but for size, method, step and filter. Borrows the launcher.
+std::unique_ptr<Picking> makePicking(Launcher& launcher, std::shared_ptr<const RenderPlan> plan,
+                                     const Scene& scene, const PixelArea& area);
 
 }  // namespace scolopax

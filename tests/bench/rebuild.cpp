@@ -105,22 +105,25 @@ void measure(const char* type, int edge, bool json, bool* first) {
       return std::vector<kernel::BoundTable>{buildBounds(cells->levels[0], TransferFunction(channel, a), 0)};
     };
     bool flip = false;
-    MajorantGrid majorants;
-    majorants.update(cells, boundsOf(ramp(largest, 0.32)), true);
+    MajorantGrid majorants(cells, boundsOf(ramp(largest, 0.32)), true, false);
+    const auto edit = [&](const ChannelAppearance& a, bool sums) {
+      majorants = MajorantGrid(cells, boundsOf(a), sums, false, &majorants);
+      return majorants.cellsRebuilt();
+    };
     const double fullMs = milliseconds([&] {  // every cell: sums and maxima in turn
-      majorants.update(cells, boundsOf(ramp(largest, 0.32)), flip);
+      edit(ramp(largest, 0.32), flip);
       flip = !flip;
     });
-    majorants.update(cells, boundsOf(ramp(largest, 0.32)), true);
+    edit(ramp(largest, 0.32), true);
     std::size_t narrowCells = 0, wideCells = 0;
     const double narrowMs = milliseconds([&] {  // a knot in the middle moves: values from 30 % to 34 % change
-      narrowCells = majorants.update(cells, boundsOf(ramp(largest, flip ? 0.9 : 0.5)), true);
+      narrowCells = edit(ramp(largest, flip ? 0.9 : 0.5), true);
       flip = !flip;
     });
     const double wideMs = milliseconds([&] {  // the whole ramp moves
       ChannelAppearance a = ramp(largest, 0.32);
       a.density = flip ? 1 : 2;
-      wideCells = majorants.update(cells, boundsOf(a), true);
+      wideCells = edit(a, true);
       flip = !flip;
     });
     const double data = double(channel.voxels.count() * sizeBytes(channel.voxels.type())),

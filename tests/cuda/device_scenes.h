@@ -79,8 +79,7 @@ struct PictureAndCost {
 };
 inline PictureAndCost renderOnDevice(const std::shared_ptr<const Volume>& volume, const Scene& scene,
                                      std::uint32_t samples) {
-  RenderPlan plan(volume);
-  plan.update(scene);
+  const RenderPlan plan(volume, scene);
   Film film;
   film.reset(scene.width, scene.height);
   cuda::Passes passes(scene, plan.view(), true);

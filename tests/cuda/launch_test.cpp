@@ -51,8 +51,7 @@ TEST(Passes, ThatDoNotFitTheDeviceSaySoAndLeaveNothingBehind) {
 TEST(Passes, ReportWhatAKernelDidWrong) {
   const auto volume = mixedVolume();
   const Scene scene = obliqueScene(*volume, 8, 8);
-  RenderPlan plan(volume);
-  plan.update(scene);
+  const RenderPlan plan(volume, scene);
   cuda::Passes passes(scene, plan.view(), false);
   std::vector<glm::vec4> pixels(64);
   substitute::reportFault("as a test");

@@ -21,8 +21,7 @@ TEST(PtxKernels, AreOneForEveryMethodBlendModeAndLight) {
 TEST(PtxKernels, AreCaughtReadingAndWritingWhereTheyMayNot) {
   const auto volume = mixedVolume();
   const Scene scene = obliqueScene(*volume, 8, 8);
-  RenderPlan plan(volume);
-  plan.update(scene);
+  const RenderPlan plan(volume, scene);
   const auto faultOf = [&](kernel::SceneView view, std::size_t pixels) {
     const cuda::DeviceBuffer<glm::vec4> film(pixels);
     const auto launch = cuda::chooseLaunch<kernel::Analog<kernel::Superposed>>(scene, true);

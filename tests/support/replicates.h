@@ -44,11 +44,11 @@ inline Replicates replicate(const std::shared_ptr<const Volume>& volume, Scene s
 template <class Integrator, class Blend, class Features, class Change>
 Replicates replicateKernel(const std::shared_ptr<const Volume>& volume, Scene scene, Change&& change) {
   Replicates result{{}, samplesPerReplicate()};
-  RenderPlan plan(volume);
+  std::shared_ptr<const RenderPlan> plan;
   for (int r = 0; r < kReplicates; ++r) {
     scene.seed = std::uint32_t(1000 + r);
-    plan.update(scene);
-    kernel::SceneView view = plan.view();
+    plan = std::make_shared<const RenderPlan>(volume, scene, plan.get());
+    kernel::SceneView view = plan->view();
     change(view);
     const std::size_t count = std::size_t(view.width) * std::size_t(view.height);
     std::vector<glm::vec4> pass(count);

@@ -13,8 +13,7 @@ int differenceOfOneInstance() {
   Scene scene = obliqueScene(*volume, 21, 35);  // of no size that blocks of threads fill
   scene.method = Method::syncDda;
   scene.shading = scene.shadows = true;
-  RenderPlan plan(volume);
-  plan.update(scene);
+  const RenderPlan plan(volume, scene);
   const cuda::DeviceScene uploaded(plan.view());
   const cuda::DeviceBuffer<glm::vec4> pixels(std::size_t(scene.width) * std::size_t(scene.height));
   cuda::check(oneInstance()({uploaded.view(), sampleNumber(scene.sampling, 0), pixels.data(), nullptr}),

@@ -73,8 +73,7 @@ TEST_P(Estimates, OfBiasIsThatOfTheReference) {
       }
       const double truth = std::sqrt(std::max(0.0, squares) / (4.0 * double(expected.pixels.size())));
       const auto launcher = makeCpuLauncher(0);
-      RenderPlan plan(made->volume);
-      plan.update(scene);
+      const RenderPlan plan(made->volume, scene);
       const double found = estimateBias(*launcher, plan);
       // Quadrature ends at a transmittance of 1e-4, which no step tells.
       EXPECT_GT(found, truth / 3 - 1e-4) << "lit " << lit << " step " << step;
@@ -148,8 +147,7 @@ TEST(Estimate, OfTheBiasOfBlackMatterIsThatOfItsAlpha) {
   const auto launcher = makeCpuLauncher(0);
   for (const double step : {4.0, 1.0}) {
     scene.step = step;
-    RenderPlan plan(volume);
-    plan.update(scene);
+    const RenderPlan plan(volume, scene);
     const double truth = compareImages(renderSamples(volume, scene, 256), expected).rmse;
     EXPECT_GT(estimateBias(*launcher, plan), truth / 3);
     EXPECT_LT(estimateBias(*launcher, plan), truth * 3);

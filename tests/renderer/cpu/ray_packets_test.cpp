@@ -168,8 +168,7 @@ class RayPackets : public testing::TestWithParam<InstructionSet> {
   /// False where packets leave the scene to single rays.
   bool take(const std::shared_ptr<const Volume>& volume, const Scene& scene) {
     scene_ = scene;
-    plan_.emplace(volume);
-    plan_->update(scene);
+    plan_.emplace(volume, scene);
     view_ = plan_->view();
     tiles_ = packetTileFunction(scene, view_, GetParam());
     return tiles_ != nullptr;

@@ -165,7 +165,7 @@ void searchForViolations(unsigned seed) {
     std::vector<ChannelSource> sources;
     for (int n = draw.among(1, 2); n > 0; --n) sources.push_back(drawChannel<T>(draw, grid.dims));
     const auto volume = std::make_shared<const Volume>(grid, std::move(sources));
-    RenderPlan plan(volume);
+    std::shared_ptr<const RenderPlan> plan;
     for (int look = 0; look < 6; ++look) {
       Scene scene = frontScene(*volume, 1, 1);
       constexpr int kSizes[] = {1, 2, 3, 4, 7, 16};
@@ -183,9 +183,9 @@ void searchForViolations(unsigned seed) {
       }
       SCOPED_TRACE(testing::Message() << "trial " << trial << " look " << look << " size " << scene.macrocell
                                       << " dims " << grid.dims.x << ' ' << grid.dims.y << ' ' << grid.dims.z);
-      plan.update(scene);
-      const glm::ivec3 cells = plan.view().majorants.cells;
-      seen += expectBound(draw, plan, 100 + 4000 / (cells.x * cells.y * cells.z));
+      plan = std::make_shared<const RenderPlan>(volume, scene, plan.get());
+      const glm::ivec3 cells = plan->view().majorants.cells;
+      seen += expectBound(draw, *plan, 100 + 4000 / (cells.x * cells.y * cells.z));
       if (testing::Test::HasFailure()) return;
     }
   }
@@ -222,8 +222,7 @@ void expectNothingWhereNothingIsSteep() {
   Scene scene = frontScene(*volume, 1, 1);
   scene.channels[0] = solid(5);
   scene.channels[0].gradientOpacity = GradientOpacity{1, 10, {{0, 0}, {1, 1}}};
-  RenderPlan plan(volume);
-  plan.update(scene);
+  const RenderPlan plan(volume, scene);
   const kernel::MajorantView bounds = plan.view().majorants;
   ASSERT_EQ(bounds.cells, glm::ivec3(8));
   std::size_t cell = 0;
@@ -257,8 +256,7 @@ TEST(GradientBounds, AreTightWhereTheGradientIsOne) {
   Scene scene = frontScene(*volume, 1, 1);
   scene.channels[0] = solid(1);
   scene.channels[0].gradientOpacity = GradientOpacity{0, 40, {{0, 0}, {1, 1}}};  // a quarter
-  RenderPlan plan(volume);
-  plan.update(scene);
+  const RenderPlan plan(volume, scene);
   const kernel::MajorantView bounds = plan.view().majorants;
   for (std::size_t cell = 0; cell < 64; ++cell) {
     EXPECT_GE(bounds.bound(cell, 0), 0.25f * (1 - 1e-5f));
@@ -278,7 +276,7 @@ TEST(GradientBounds, AreAfterAnySeriesOfEditsWhatAFreshPlanHas) {
                                channelOf<float>(dims, wave(1)), channelOf<std::int16_t>(dims, wave(2), -3));
   Scene scene = frontScene(*volume, 1, 1);
   for (ChannelAppearance& a : scene.channels) a.rangeLo = -600, a.rangeHi = 200;
-  RenderPlan edited(volume);
+  std::shared_ptr<const RenderPlan> edited;
   int changed = 0;
   std::vector<float> before;
   for (int edit = 0; edit < 120; ++edit) {
@@ -292,11 +290,10 @@ TEST(GradientBounds, AreAfterAnySeriesOfEditsWhatAFreshPlanHas) {
     if (kind == 4) a.gradientOpacity.reset();
     if (kind >= 5)
       a.gradientOpacity = draw.opacity(gradientMagnitudes(volume->grid(), volume->channels()[n]));
-    edited.update(scene);
-    RenderPlan fresh(volume);
-    fresh.update(scene);
-    const kernel::MajorantView found = edited.view().majorants, expected = fresh.view().majorants;
-    ASSERT_EQ(edited.view().channelCount, fresh.view().channelCount) << edit;
+    edited = std::make_shared<const RenderPlan>(volume, scene, edited.get());
+    const RenderPlan fresh(volume, scene);
+    const kernel::MajorantView found = edited->view().majorants, expected = fresh.view().majorants;
+    ASSERT_EQ(edited->view().channelCount, fresh.view().channelCount) << edit;
     ASSERT_EQ(found.cells, expected.cells);
     ASSERT_EQ(found.filledLow, expected.filledLow) << edit;
     ASSERT_EQ(found.filledHigh, expected.filledHigh) << edit;
@@ -306,7 +303,7 @@ TEST(GradientBounds, AreAfterAnySeriesOfEditsWhatAFreshPlanHas) {
       now.push_back(found.total(cell));
       ASSERT_EQ(found.total(cell), expected.total(cell)) << "edit " << edit << " cell " << cell;
       ASSERT_EQ(found.emptyRadius(cell), expected.emptyRadius(cell)) << "edit " << edit << " cell " << cell;
-      for (int i = 0; i < edited.view().channelCount; ++i)
+      for (int i = 0; i < edited->view().channelCount; ++i)
         ASSERT_EQ(found.bound(cell, i), expected.bound(cell, i)) << "edit " << edit << " cell " << cell;
     }
     changed += kind >= 5 && now != before;

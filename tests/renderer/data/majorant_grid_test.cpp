@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
 
 #include "renderer/kernel/classify.h"
@@ -36,9 +37,7 @@ std::vector<OpacityKnot> randomCurve(std::mt19937& random) {
 /// The bounds of one channel alone.
 MajorantGrid majorantsOf(const std::shared_ptr<const MacrocellGrid>& cells,
                          const TransferFunction& transfer) {
-  MajorantGrid majorants;
-  majorants.update(cells, {buildBounds(cells->levels[0], transfer, 0)}, true);
-  return majorants;
+  return MajorantGrid(cells, {buildBounds(cells->levels[0], transfer, 0)}, true, false);
 }
 std::shared_ptr<const MacrocellGrid> macrocellsOf(const Volume& volume, int size) {
   return std::make_shared<const MacrocellGrid>(buildMacrocells(volume, size));
@@ -244,8 +243,8 @@ TEST(MajorantGrid, IsAfterAnySeriesOfEditsWhatAFreshOneIs) {
   std::vector<bool> visible(3, true);
   for (std::size_t i = 0; i < 3; ++i) looks[i].rangeHi = largest[i];
   auto macrocells = macrocellsOf(*volume, 3);
-  MajorantGrid edited;
-  bool sums = true;
+  std::optional<MajorantGrid> edited;
+  bool sums = true, apart = false;
   for (int edit = 0; edit < 200; ++edit) {
     const std::size_t n = random() % 3;
     switch (random() % 8) {
@@ -256,7 +255,7 @@ TEST(MajorantGrid, IsAfterAnySeriesOfEditsWhatAFreshOneIs) {
         looks[n].density = double(random() % 3) * 0.75;
         break;
       case 2:
-        if (random() % 3 == 0) sums = !sums;
+        (random() % 2 == 0 ? sums : apart) = random() % 2 == 0;
         break;
       case 3:
         if (random() % 3 == 0) macrocells = macrocellsOf(*volume, 1 + int(random() % 5));
@@ -269,14 +268,18 @@ TEST(MajorantGrid, IsAfterAnySeriesOfEditsWhatAFreshOneIs) {
       if (visible[i])
         tables.push_back(
             buildBounds(macrocells->levels[i], TransferFunction(volume->channels()[i], looks[i]), int(i)));
-    MajorantGrid fresh;
-    edited.update(macrocells, tables, sums);
-    EXPECT_EQ(fresh.update(macrocells, tables, sums), macrocells->cellCount());
-    const kernel::MajorantView a = edited.view(), b = fresh.view();
+    const MajorantGrid fresh(macrocells, tables, sums, apart);
+    edited = MajorantGrid(macrocells, tables, sums, apart, edited ? &*edited : nullptr);
+    EXPECT_EQ(fresh.cellsRebuilt(), macrocells->cellCount());
+    const kernel::MajorantView a = edited->view(), b = fresh.view();
+    ASSERT_EQ(a.active == nullptr, !apart);
     ASSERT_EQ(a.filledLow, b.filledLow) << "edit " << edit;
     ASSERT_EQ(a.filledHigh, b.filledHigh) << "edit " << edit;
     for (std::size_t cell = 0; cell < macrocells->cellCount(); ++cell) {
       ASSERT_EQ(a.totals[cell], b.totals[cell]) << "edit " << edit << " cell " << cell;
+      if (apart) {
+        ASSERT_EQ(a.active[cell], b.active[cell]) << "edit " << edit << " cell " << cell;
+      }
       float sum = 0;
       for (int i = 0; i < int(tables.size()); ++i) {
         ASSERT_EQ(a.bound(cell, i), b.bound(cell, i));
@@ -299,13 +302,14 @@ TEST(MajorantGrid, WorksOutOnlyTheCellsWhoseValuesAnEditChanges) {
     look.rangeHi = 255;
     look.opacity = curve(0.1);
   }
-  MajorantGrid majorants;
+  std::optional<MajorantGrid> majorants;
   const auto update = [&] {
     std::vector<kernel::BoundTable> tables;
     for (std::size_t i = 0; i < 3; ++i)
       tables.push_back(
           buildBounds(macrocells->levels[i], TransferFunction(volume->channels()[i], looks[i]), int(i)));
-    return majorants.update(macrocells, tables, true);
+    majorants = MajorantGrid(macrocells, tables, true, false, majorants ? &*majorants : nullptr);
+    return majorants->cellsRebuilt();
   };
   EXPECT_EQ(update(), macrocells->cellCount());
   EXPECT_EQ(update(), 0u);
@@ -327,6 +331,35 @@ TEST(MajorantGrid, WorksOutOnlyTheCellsWhoseValuesAnEditChanges) {
     EXPECT_GE(touched, least);
     EXPECT_LE(touched, most);
   }
+}
+
+TEST(MajorantGrid, LeavesTheOneBeforeAsItWasAndSharesWhatIsNotNew) {
+  const auto volume = threeChannels();
+  const auto macrocells = macrocellsOf(*volume, 2);
+  const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(64) << 20);
+  ChannelAppearance look;
+  look.rangeHi = 255;
+  const auto tables = [&] {
+    return std::vector<kernel::BoundTable>{
+        buildBounds(macrocells->levels[0], TransferFunction(volume->channels()[0], look), 0)};
+  };
+  const MajorantGrid first(macrocells, tables(), true, false, nullptr, memory);
+  const std::uint64_t bytes = memory->used(MemoryUse::grids);
+  EXPECT_GT(bytes, macrocells->cellCount());
+  const std::vector<kernel::TotalCode> then(first.view().totals,
+                                            first.view().totals + macrocells->cellCount());
+  const MajorantGrid same(macrocells, tables(), true, false, &first, memory);
+  EXPECT_EQ(same.view().totals, first.view().totals);
+  EXPECT_EQ(memory->used(MemoryUse::grids), bytes);
+  {
+    look.opacity = {{0, 0}, {0.5, 0}, {1, 1}};
+    const MajorantGrid edited(macrocells, tables(), true, false, &same, memory);
+    EXPECT_GT(edited.cellsRebuilt(), 0u);
+    EXPECT_EQ(memory->used(MemoryUse::grids), 2 * bytes);
+    EXPECT_FALSE(std::equal(then.begin(), then.end(), edited.view().totals));
+  }
+  EXPECT_TRUE(std::equal(then.begin(), then.end(), first.view().totals));
+  EXPECT_EQ(memory->used(MemoryUse::grids), bytes);
 }
 
 TEST(MajorantGrid, KnowsHowFarAroundABlockNothingIsAndWhichBoxHasEverything) {

@@ -220,6 +220,23 @@ TEST(Pick, IsTheSameWhateverIsLitOrDrawnForAWhile) {
   }
 }
 
+TEST(Pick, StaysWithItsSceneWhateverComesAfter) {
+  const Ball ball;
+  const auto renderer = makeCpuRenderer(ball.volume, 1);
+  renderer->setScene(ball.scene);
+  const PixelArea area{8, 2, 16, 16};
+  const auto expected = pickedIn(*renderer, ball.scene, area);
+  const auto picking = renderer->pick(ball.scene, area);
+  Scene other = ball.scene;
+  for (ChannelAppearance& channel : other.channels) channel.opacity = {{0, 0}, {1, 0}};
+  other.macrocell = ball.scene.macrocell + 1;
+  renderer->setScene(other);
+  EXPECT_TRUE(picking->run(Renderer::kNoBudget));
+  ASSERT_EQ(picking->found().size(), expected.size());
+  ASSERT_FALSE(expected.empty());
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ(picking->found()[i].point, expected[i].point);
+}
+
 TEST(Pick, GoesOnWhereItsBudgetEnded) {
   const Ball ball;
   const auto renderer = makeCpuRenderer(ball.volume, 1);

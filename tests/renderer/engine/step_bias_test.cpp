@@ -59,8 +59,7 @@ void expectToEndWhenStopped(Work work) {
 TEST(StepBias, EndsSoonAfterAStopIsRequested) {
   const auto volume = deepVolume();
   const auto launcher = makeCpuLauncher(0);
-  RenderPlan plan(volume);
-  plan.update(slowScene(*volume));
+  const RenderPlan plan(volume, slowScene(*volume));
   expectToEndWhenStopped([&](const std::stop_token& stop) { estimateBias(*launcher, plan, stop); });
   expectToEndWhenStopped(
       [&](const std::stop_token& stop) { largestStep(*launcher, plan, Method::raymarch, 1e-9, stop); });
@@ -76,8 +75,7 @@ TEST(StepBias, MarchesNoFinerThanTheSmallestStepOfARay) {
   const auto launcher = makeCpuLauncher(0);
   const auto biasAt = [&](double step) {
     scene.step = step;
-    RenderPlan plan(volume);
-    plan.update(scene);
+    const RenderPlan plan(volume, scene);
     return estimateBias(*launcher, plan);
   };
   EXPECT_GT(biasAt(0.01), 0);

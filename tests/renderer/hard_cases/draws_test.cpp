@@ -71,8 +71,7 @@ TYPED_TEST(Draws, AtTheirEndsOnlyHitChannelsThatHaveExtinction) {
     const double density = heldExactly(wanted);
     Scene scene = frontScene(*volume, 1, 1);
     for (auto& channel : scene.channels) channel.density = density;  // a ramp: 0 in the outer two
-    RenderPlan plan(volume);
-    plan.update(scene);
+    const RenderPlan plan(volume, scene);
     ASSERT_EQ(plan.view().channelCount, 4);
     for (const std::uint32_t x : {kLow, kHigh})
       for (const std::uint32_t y : {kLow, kHigh})
@@ -99,8 +98,7 @@ TYPED_TEST(Draws, ThatNeverAcceptNorAdvanceEndAtTheBound) {
   Scene scene = frontScene(*volume, 1, 1);
   scene.channels[0].rangeHi = 5;
   scene.channels[0].opacity = {{0, 0}, {0.5, 1}};  // 0 at the box's face, 1 is the bound of every cell
-  RenderPlan plan(volume);
-  plan.update(scene);
+  const RenderPlan plan(volume, scene);
   const Outcome found = track<TypeParam>(plan, {kLow, kHigh, kHigh, 0});
   EXPECT_FALSE(found.hit);
   EXPECT_EQ(found.cost.truncated, 1u);
@@ -119,8 +117,7 @@ TYPED_TEST(Draws, EndTheFlightWhereTheOpticalDepthSaysFromOneMillionthToOneMilli
       Scene scene = frontScene(*volume, 1, 1);
       scene.macrocell = macrocell;
       scene.channels[0] = solid(density);
-      RenderPlan plan(volume);
-      plan.update(scene);
+      const RenderPlan plan(volume, scene);
       // First k whose flight leaves the box: its place among all 2^32 is the probability of a collision.
       std::uint32_t low = 0, high = kHigh;
       while (low < high) {

@@ -59,8 +59,7 @@ void expectBounds(double largest, unsigned seed, bool factors = false) {
       a.gradientOpacity = GradientOpacity{lo, hi, randomCurve(random)};
       if (trial % 2 == 0) a.opacity = {{0, 1}};
     }
-    RenderPlan plan(volume);
-    plan.update(scene);
+    const RenderPlan plan(volume, scene);
     if (plan.view().channelCount == 0) continue;
     for (int i = 0; i < 20; ++i) {
       Ray ray{glm::vec3(dims) * glm::vec3(uniform(random), uniform(random), uniform(random)) - 0.5f,
@@ -109,8 +108,7 @@ TEST(CloseLook, NeedsNoShortStretchWhereNothingChanges) {
   const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, [](int x, int, int) { return x < 2; }));
   Scene scene = frontScene(*volume, 1, 1);
   scene.channels[0].density = 1e9;
-  RenderPlan plan(volume);
-  plan.update(scene);
+  const RenderPlan plan(volume, scene);
   for (const float x : {0.5f, 2.5f}) {
     const Ray ray{{x, 1, 1.25f}, {0, 0, 1}};
     const VoxelCell cell(ray, dims, ray.origin);
