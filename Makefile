@@ -38,6 +38,7 @@ test: test-deps web
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null
 	cmake --build --preset release -j $(JOBS)
 	$(CTEST) --test-dir build/release -j $(JOBS) -LE hostile --output-on-failure
+	@sed -n 's/ ([0-9]* ms)$$//; /^\[  SKIPPED \] .*\./p' build/release/Testing/Temporary/LastTest.log | sort -u
 
 check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
 	$(CTEST) --test-dir build/release -L hostile --output-on-failure
