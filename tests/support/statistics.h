@@ -24,6 +24,9 @@ inline int statisticsFactor() {
   }();
   return factor;
 }
+/// Whether tests go through all combinations of what they vary, as `make check` has them do; else they cover
+/// pairs.
+inline bool allCombinations() { return statisticsFactor() > 1; }
 
 /// `samples`, times the factor, of the scene.
 inline Image renderSamples(const std::shared_ptr<const Volume>& volume, const Scene& scene, int samples,
