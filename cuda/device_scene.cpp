@@ -41,9 +41,9 @@ DeviceScene::DeviceScene(const kernel::SceneView& host) : view_(host) {
     moveToDevice(&channel.opacity);
     moveToDevice(&channel.color);
     moveToDevice(&channel.optical);
-    if (channel.gradient.factor.count == 0) continue;
-    moveToDevice(&channel.gradient.factor);
-    moveToDevice(&channel.gradient.optical);
+    if (channel.factor.curve.count == 0) continue;
+    moveToDevice(&channel.factor.curve);
+    moveToDevice(&channel.factor.optical);
   }
   view_.channels = channels.data();
   moveToDevice(&view_.channels, channels.size());

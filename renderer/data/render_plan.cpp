@@ -224,7 +224,7 @@ RenderPlan::RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene,
   for (const int i : channels_.visible) {
     const ChannelPlan& plan = *channels_.plans[std::size_t(i)];
     channelViews_.push_back(plan.transfer.view(volume_->channels()[std::size_t(i)]));
-    if (plan.factor) channelViews_.back().gradient = plan.factor->view();
+    if (plan.factor) channelViews_.back().factor = plan.factor->view();
   }
   const auto clip = clipView(scene_.clip, scene_.crop, volume_->grid(), channels_.visible);
   majorants_.emplace(bounded_, boundTables(), sumsExtinction(scene_.blend),

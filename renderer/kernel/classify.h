@@ -47,8 +47,8 @@ SCOLOPAX_HD inline float extinctionAt(const ChannelView& channel, float position
 }
 
 /// Position on the factor's curve of |gradient| of stored values per smallest spacing.
-SCOLOPAX_HD inline float factorPosition(const GradientFactorView& gradient, float magnitude) {
-  return clamp((magnitude - gradient.origin) * gradient.scale + gradient.offset, 0.0f, 1.0f);
+SCOLOPAX_HD inline float factorPosition(const GradientFactorView& factor, float magnitude) {
+  return clamp((magnitude - factor.origin) * factor.scale + factor.offset, 0.0f, 1.0f);
 }
 
 /// Largest value of the curve from position a to position b, in any order.
@@ -77,8 +77,8 @@ SCOLOPAX_HD inline float largestExtinction(const ChannelView& channel, float lo,
 }
 
 /// Largest factor where |gradient| is from lo to hi, in stored values per smallest spacing.
-SCOLOPAX_HD inline float largestFactor(const GradientFactorView& gradient, float lo, float hi) {
-  return largestBetween(gradient.factor, factorPosition(gradient, lo), factorPosition(gradient, hi));
+SCOLOPAX_HD inline float largestFactor(const GradientFactorView& factor, float lo, float hi) {
+  return largestBetween(factor.curve, factorPosition(factor, lo), factorPosition(factor, hi));
 }
 
 }  // namespace scolopax::kernel

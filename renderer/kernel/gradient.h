@@ -65,7 +65,7 @@ template <class L>
 SCOLOPAX_LANES_RARE void findFactorPosition(const ChannelView& channel, glm::ivec3 dims,
                                             const typename L::Vec& point, typename L::Float* position) {
   using Float = typename L::Float;
-  const GradientFactorView& factor = channel.gradient;
+  const GradientFactorView& factor = channel.factor;
   const Gradient<L> gradient = gradientAt<L>(channel, dims, factor.fromVoxel, point);
   const Float unbounded = (lengthOf<L>(gradient.perSpacing) - factor.origin) * factor.scale + factor.offset;
   *position = select(gradient.finite, clamp(unbounded, -kFarPosition, kFarPosition), Float(kNaN));
@@ -73,10 +73,10 @@ SCOLOPAX_LANES_RARE void findFactorPosition(const ChannelView& channel, glm::ive
 
 /// Factor of the opacity at a point.
 SCOLOPAX_RARE inline float gradientFactorAt(const ChannelView& channel, glm::ivec3 dims, glm::vec3 point) {
-  const GradientFactorView& factor = channel.gradient;
+  const GradientFactorView& factor = channel.factor;
   const Gradient<One> gradient = gradientAt<One>(channel, dims, factor.fromVoxel, point);
   if (!gradient.finite) return 0.0f;
-  return evaluate(factor.factor, factorPosition(factor, lengthOf<One>(gradient.perSpacing)));
+  return evaluate(factor.curve, factorPosition(factor, lengthOf<One>(gradient.perSpacing)));
 }
 
 }  // namespace scolopax::kernel

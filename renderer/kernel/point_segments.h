@@ -51,8 +51,8 @@ class PointSegments {
       const Mask met = apart ? without(live_, met_ == Word(0u)) : live_;
       const std::uint32_t wanted = apart ? unionOf(met_) : channels_;
       if (last_ != k_ - 1) known_ = 0;
-      if ((wanted & ~known_) != 0) sample(start, wanted & ~known_, ends_.from, ends_.gradientFrom);
-      sample(end, wanted, ends_.to, ends_.gradientTo);
+      if ((wanted & ~known_) != 0) sample(start, wanted & ~known_, ends_.from, ends_.factorFrom);
+      sample(end, wanted, ends_.to, ends_.factorTo);
       last_ = k_;
       known_ = wanted;
       segment = {start, end, wanted, met, apart, met_};
@@ -125,7 +125,7 @@ class PointSegments {
     return k > 0 && any(live_ & (t < endOf(k - 1))) ? k - 1 : k;
   }
 
-  SCOLOPAX_LANES void sample(Float t, std::uint32_t channels, CurvePoint<L>* points, Float* gradients) {
+  SCOLOPAX_LANES void sample(Float t, std::uint32_t channels, CurvePoint<L>* points, Float* factors) {
     Float stored[kMaxVisibleChannels];
     const typename L::Vec point = rays_.origin + t * rays_.direction;
     sampleChannels(scene_, channels, point, stored);
@@ -135,7 +135,7 @@ class PointSegments {
       const ChannelView& channel = scene_.channels[n];
       points[n] = pointOn<L>(channel.optical, stretchPosition(channel, stored[n]));
       if (scene_.hasFactor(n)) [[unlikely]] {
-        findFactorPosition<L>(channel, scene_.dims, point, &gradients[n]);
+        findFactorPosition<L>(channel, scene_.dims, point, &factors[n]);
         fetches += gradientFetches(scene_.dims);
       }
     }

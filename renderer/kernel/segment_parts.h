@@ -20,10 +20,10 @@ SCOLOPAX_LANES_RARE void findPartWithFactor(const ChannelView& channel, const Se
                                             const typename L::Mask& which, PartOf<L>* part) {
   using Float = typename L::Float;
   using Mask = typename L::Mask;
-  const OpticalCurveView& factor = channel.gradient.optical;
+  const OpticalCurveView& factor = channel.factor.optical;
   const CurvePoint<L>& from = ends.from[n];
   const CurvePoint<L>& to = ends.to[n];
-  const Float g = ends.gradientFrom[n], h = ends.gradientTo[n];
+  const Float g = ends.factorFrom[n], h = ends.factorTo[n];
   // An end has a value and a gradient, or counts for nothing.
   const Mask known = (from.position == from.position) & (g == g);
   const Mask other = (to.position == to.position) & (h == h), some = which & (known | other);
@@ -83,8 +83,8 @@ struct Hidden<L, true> {};
 template <class L>
 SCOLOPAX_LANES_RARE void dropWhereFactorChanges(const ChannelView& channel, const SegmentEnds<L>& ends, int n,
                                                 typename L::Mask* straight) {
-  const OpticalCurveView& curve = channel.gradient.optical;
-  const CurvePoint<L> g = pointOn<L>(curve, ends.gradientFrom[n]), h = pointOn<L>(curve, ends.gradientTo[n]);
+  const OpticalCurveView& curve = channel.factor.optical;
+  const CurvePoint<L> g = pointOn<L>(curve, ends.factorFrom[n]), h = pointOn<L>(curve, ends.factorTo[n]);
   *straight = *straight & (g.piece == h.piece) &
               (opticalAt<Detail::extinction, L>(curve, g, L::everywhere()).opacity ==
                opticalAt<Detail::extinction, L>(curve, h, L::everywhere()).opacity);
@@ -97,10 +97,10 @@ SCOLOPAX_LANES_RARE void multiplyByFactor(const ChannelView& channel, const Segm
                                           typename L::Float* opacity) {
   using Float = typename L::Float;
   using Mask = typename L::Mask;
-  const Float from = ends.gradientFrom[n], to = ends.gradientTo[n];
+  const Float from = ends.factorFrom[n], to = ends.factorTo[n];
   const Mask known = from == from, other = to == to;
   const Float g = select(known, from, to), h = select(other, to, from);
-  const OpticalCurveView& curve = channel.gradient.optical;
+  const OpticalCurveView& curve = channel.factor.optical;
   const CurvePoint<L> point = pointOn<L>(curve, g + place * (h - g));
   const Float factor = opticalAt<Detail::extinction, L>(curve, point, which).opacity;
   *opacity = where(known | other, *opacity * factor);

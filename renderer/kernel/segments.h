@@ -17,13 +17,13 @@ inline constexpr int kMaxSegments = 1 << 20;
 template <class L>
 struct SegmentEnds {
   CurvePoint<L> from[kMaxVisibleChannels], to[kMaxVisibleChannels];
-  typename L::Float gradientFrom[kMaxVisibleChannels], gradientTo[kMaxVisibleChannels];
+  typename L::Float factorFrom[kMaxVisibleChannels], factorTo[kMaxVisibleChannels];
 
   /// The next segment of channel n begins where this one ends.
   template <class View>
   SCOLOPAX_LANES void passOn(const View& scene, int n) {
     from[n] = to[n];
-    if (scene.hasFactor(n)) gradientFrom[n] = gradientTo[n];
+    if (scene.hasFactor(n)) factorFrom[n] = factorTo[n];
   }
 };
 
@@ -97,8 +97,8 @@ class CellSegments {
       if (known_ >> n & 1)
         ends_.passOn(scene_, n);
       else
-        sample(n, segment.start, ends_.from, ends_.gradientFrom);
-      sample(n, segment.end, ends_.to, ends_.gradientTo);
+        sample(n, segment.start, ends_.from, ends_.factorFrom);
+      sample(n, segment.end, ends_.to, ends_.factorTo);
     }
     known_ = has_;
     return true;
@@ -112,14 +112,14 @@ class CellSegments {
     return minimum(inside_.enter + (float(segment) + offset_) * step_, inside_.exit);
   }
 
-  SCOLOPAX_HD void sample(int n, float t, CurvePoint<One>* points, float* gradients) {
+  SCOLOPAX_HD void sample(int n, float t, CurvePoint<One>* points, float* factors) {
     ++cost_->fetches;
     const ChannelView& channel = scene_.channels[n];
     const glm::vec3 point = ray_.origin + t * ray_.direction;
     const float stored = sampleStored(channel, scene_.dims, point);
     points[n] = pointOn<One>(channel.optical, stretchPosition(channel, stored));
     if (scene_.hasFactor(n)) [[unlikely]] {
-      findFactorPosition<One>(channel, scene_.dims, point, &gradients[n]);
+      findFactorPosition<One>(channel, scene_.dims, point, &factors[n]);
       cost_->fetches += gradientFetches(scene_.dims);
     }
   }

@@ -80,7 +80,7 @@ inline constexpr int kMaxVisibleChannels = 32;
 /// Factor of the opacity by |gradient| of stored values per smallest spacing.
 struct GradientFactorView {
   float origin, scale, offset;  ///< position = clamp((|gradient| - origin) * scale + offset, 0, 1)
-  CurveView<float> factor;      ///< no knots: opacity does not depend on the gradient
+  CurveView<float> curve;       ///< no knots: opacity does not depend on the gradient
   OpticalCurveView optical;     ///< the same, for quadrature
   glm::mat3 fromVoxel;          ///< as SceneView::gradientFromVoxel
 };
@@ -100,7 +100,7 @@ struct ChannelView {
   MaterialView material;
   float inverseRange;  ///< 1 / |hi - lo| of the range in stored values
   bool finite;         ///< all voxels are
-  GradientFactorView gradient;
+  GradientFactorView factor;
 };
 
 struct SceneView {
@@ -122,7 +122,7 @@ struct SceneView {
   float smallestSpacing;        ///< world units
 
   /// Whether the opacity of channel n depends on the gradient.
-  SCOLOPAX_HD bool hasFactor(int n) const { return channels[n].gradient.factor.count != 0; }
+  SCOLOPAX_HD bool hasFactor(int n) const { return channels[n].factor.curve.count != 0; }
 };
 
 /// A scene of curves alone: kernels of this view are compiled without what other scenes need. Only devices

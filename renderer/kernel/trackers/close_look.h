@@ -81,7 +81,7 @@ struct CellGradient {
 /// step of one voxel along any axis changes it by at most the spread of those slopes.
 SCOLOPAX_RARE inline CellGradient gradientIn(const ChannelView& channel, glm::ivec3 dims, glm::ivec3 cell,
                                              glm::vec3 point) {
-  const glm::mat3& fromVoxel = channel.gradient.fromVoxel;
+  const glm::mat3& fromVoxel = channel.factor.fromVoxel;
   const std::size_t strides[] = {std::size_t(channel.stride),
                                  std::size_t(channel.stride) * std::size_t(dims.x),
                                  std::size_t(channel.stride) * std::size_t(dims.x) * std::size_t(dims.y)};
@@ -145,7 +145,7 @@ SCOLOPAX_HD float boundAhead(const View& scene, int n, const Ray& ray, const Vox
   const float lo = values.lo == 0.0f ? 0.0f : values.lo - slack;
   const float hi = values.hi == 0.0f ? 0.0f : values.hi + slack;
   float here = extinctionAt(channel, curvePosition(channel, values.value));
-  const GradientFactorView& factor = channel.gradient;
+  const GradientFactorView& factor = channel.factor;
   CellGradient gradient{};
   if (scene.hasFactor(n)) {
     gradient = gradientIn(channel, scene.dims, cell.low, point);

@@ -28,7 +28,7 @@ struct ShadowsWithoutFactors {
                                                 kernel::SampleCost* cost) {
     std::vector<kernel::ChannelView> channels(scene.channels, scene.channels + scene.channelCount);
     if (!(inside.enter > 0)) {
-      for (kernel::ChannelView& channel : channels) channel.gradient.factor.count = 0;
+      for (kernel::ChannelView& channel : channels) channel.factor.curve.count = 0;
       scene.channels = channels.data();
     }
     return kernel::Superposed::track<Blend>(scene, ray, inside, sampler, cost);
@@ -65,7 +65,7 @@ class GradientDefect : public testing::Test {
     return [this, change](SceneView& view) {
       channels_.assign(view.channels, view.channels + view.channelCount);
       view.channels = channels_.data();
-      for (kernel::ChannelView& channel : channels_) change(channel.gradient);
+      for (kernel::ChannelView& channel : channels_) change(channel.factor);
     };
   }
 
@@ -90,7 +90,7 @@ TEST_F(GradientDefect, NoneIsFoundWhereThereIsNone) {
 
 TEST_F(GradientDefect, OfAFactorThatIsIgnoredIsFound) {
   use(TestScene::lumps);
-  const auto ignored = inFactors([](kernel::GradientFactorView& gradient) { gradient.factor.count = 0; });
+  const auto ignored = inFactors([](kernel::GradientFactorView& factor) { factor.curve.count = 0; });
   EXPECT_FALSE(trackerPasses(ignored));
   EXPECT_GT(marcherError(ignored), 10 * kQuadratureError);
   // In the bounds as well, which otherwise cut off what is too much.
@@ -107,7 +107,7 @@ TEST_F(GradientDefect, OfShadowsThatIgnoreItIsFound) {
 TEST_F(GradientDefect, OfGradientsInUnitsOfVoxelsIsFound) {
   use(TestScene::lumps);  // spacing 1 : 0.8 : 1.7
   const auto perVoxel =
-      inFactors([](kernel::GradientFactorView& gradient) { gradient.fromVoxel = glm::mat3(1.0f); });
+      inFactors([](kernel::GradientFactorView& factor) { factor.fromVoxel = glm::mat3(1.0f); });
   EXPECT_FALSE(trackerPasses(perVoxel));
   EXPECT_GT(marcherError(perVoxel), 3 * kQuadratureError);
 }
@@ -115,9 +115,9 @@ TEST_F(GradientDefect, OfGradientsInUnitsOfVoxelsIsFound) {
 TEST_F(GradientDefect, OfARangePerSmallestSpacingIsFound) {
   use(TestScene::lumps);
   const double spacing = made_.volume->grid().smallestSpacing();
-  const auto perSpacing = inFactors([spacing](kernel::GradientFactorView& gradient) {
-    gradient.scale *= float(spacing);
-    gradient.origin /= float(spacing);
+  const auto perSpacing = inFactors([spacing](kernel::GradientFactorView& factor) {
+    factor.scale *= float(spacing);
+    factor.origin /= float(spacing);
   });
   EXPECT_FALSE(trackerPasses(perSpacing));
   EXPECT_GT(marcherError(perSpacing), 3 * kQuadratureError);
@@ -125,17 +125,17 @@ TEST_F(GradientDefect, OfARangePerSmallestSpacingIsFound) {
 
 TEST_F(GradientDefect, OfARangeOfStoredValuesIsFound) {
   use(TestScene::noise);
-  EXPECT_FALSE(trackerPasses(inFactors([this](kernel::GradientFactorView& gradient) {
-    if (&gradient != &channels_[1].gradient) return;  // of slope -2
-    gradient.scale /= 2;
-    gradient.origin *= 2;
+  EXPECT_FALSE(trackerPasses(inFactors([this](kernel::GradientFactorView& factor) {
+    if (&factor != &channels_[1].factor) return;  // of slope -2
+    factor.scale /= 2;
+    factor.origin *= 2;
   })));
 }
 
 TEST_F(GradientDefect, OfARangeThatIsShiftedIsFound) {
   use(TestScene::lumps);
   EXPECT_FALSE(
-      trackerPasses(inFactors([](kernel::GradientFactorView& gradient) { gradient.offset += 0.1f; })));
+      trackerPasses(inFactors([](kernel::GradientFactorView& factor) { factor.offset += 0.1f; })));
 }
 
 }  // namespace
