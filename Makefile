@@ -9,8 +9,11 @@ PORT ?= 8080
 JOBS ?= $(shell nproc)
 FUZZ_SECONDS ?= 600
 SCENES ?= 20000
-# A label that no test has is a mistake in this file.
-CTEST := ctest --no-tests=error
+# run-tests,BUILD,OPTIONS: a label that no test has is a mistake in this file; tests that were skipped are listed.
+define run-tests
+ctest --no-tests=error --test-dir build/$(1) --output-on-failure $(2)
+@sed -n 's/ ([0-9]* ms)$$//; /^\[  SKIPPED \] .*\./p' build/$(1)/Testing/Temporary/LastTest.log | sort -u
+endef
 DEMO := build/demo/orbitals.nrrd
 SCOLOPAX := build/release/scolopax
 
@@ -37,29 +40,28 @@ web: deps
 test: test-deps web
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null
 	cmake --build --preset release -j $(JOBS)
-	$(CTEST) --test-dir build/release -j $(JOBS) -LE hostile --output-on-failure
-	@sed -n 's/ ([0-9]* ms)$$//; /^\[  SKIPPED \] .*\./p' build/release/Testing/Temporary/LastTest.log | sort -u
+	$(call run-tests,release,-j $(JOBS) -LE hostile)
 
 check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
-	$(CTEST) --test-dir build/release -L hostile --output-on-failure
-	SCOLOPAX_STATISTICS=4 $(CTEST) --test-dir build/release -j $(JOBS) -L statistics --output-on-failure
-	SCOLOPAX_RANDOM_SCENES=3000 $(CTEST) --test-dir build/release -j $(JOBS) -L random-scenes --output-on-failure
+	$(call run-tests,release,-L hostile)
+	SCOLOPAX_STATISTICS=4 $(call run-tests,release,-j $(JOBS) -L statistics)
+	SCOLOPAX_RANDOM_SCENES=3000 $(call run-tests,release,-j $(JOBS) -L random-scenes)
 
 check-asan-ubsan: test-deps
 	cmake --preset asan-ubsan > /dev/null
 	cmake --build --preset asan-ubsan -j $(JOBS)
-	SCOLOPAX_RANDOM_SCENES=20 $(CTEST) --test-dir build/asan-ubsan -j $(JOBS) -LE 'web|statistics|hostile' --output-on-failure
-	$(CTEST) --test-dir build/asan-ubsan -j $(JOBS) -L hard --output-on-failure
+	SCOLOPAX_RANDOM_SCENES=20 $(call run-tests,asan-ubsan,-j $(JOBS) -LE 'web|statistics|hostile')
+	$(call run-tests,asan-ubsan,-j $(JOBS) -L hard)
 
 # The server's threads, with renderers that tests make up: those of the true ones are TBB's, which is not instrumented.
 check-tsan: test-deps
 	cmake --preset tsan > /dev/null
 	cmake --build --preset tsan -j $(JOBS)
 	TSAN_OPTIONS=suppressions=$(CURDIR)/tests/support/tsan.supp \
-	  $(CTEST) --test-dir build/tsan -j $(JOBS) -L unit-server --output-on-failure
+	  $(call run-tests,tsan,-j $(JOBS) -L unit-server)
 
 check-fuzz: fuzzers
-	$(CTEST) --test-dir build/fuzz -L fuzz --output-on-failure
+	$(call run-tests,fuzz,-L fuzz)
 
 fuzzers: test-deps
 	cmake --preset fuzz > /dev/null
@@ -87,7 +89,7 @@ soak: test-deps
 check-cuda: test-deps
 	cmake --preset cuda > /dev/null
 	cmake --build --preset cuda -j $(JOBS) --target cuda_checks
-	$(CTEST) --test-dir build/cuda -L cuda --output-on-failure
+	$(call run-tests,cuda,-L cuda)
 
 # clang 14 has coroutines but does not say so; Boost and libstdc++ ask.
 TIDY := clang-tidy --quiet -p build/release --extra-arg=-D__cpp_impl_coroutine=201902L \

@@ -25,7 +25,8 @@ DeviceScene::DeviceScene(const kernel::SceneView& host) : view_(host) {
   const glm::ivec3 dims = host.dims, cells = host.majorants.cells;
   const std::size_t voxels = std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z);
   std::vector<kernel::ChannelView> channels(host.channels, host.channels + host.channelCount);
-  for (kernel::ChannelView& channel : channels) {
+  for (int n = 0; n < host.channelCount; ++n) {
+    kernel::ChannelView& channel = channels[std::size_t(n)];
     // By itself: neighbouring threads read neighbouring voxels of one channel.
     visitScalarType(channel.type, [&](auto zero) {
       using T = decltype(zero);
@@ -41,7 +42,7 @@ DeviceScene::DeviceScene(const kernel::SceneView& host) : view_(host) {
     moveToDevice(&channel.opacity);
     moveToDevice(&channel.color);
     moveToDevice(&channel.optical);
-    if (channel.factor.curve.count == 0) continue;
+    if (!host.hasFactor(n)) continue;
     moveToDevice(&channel.factor.curve);
     moveToDevice(&channel.factor.optical);
   }

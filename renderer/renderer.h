@@ -26,7 +26,7 @@ struct RebuildStats {
   int majorantChannels = 0;       ///< channels whose table of bounds was rebuilt
   std::size_t majorantCells = 0;  ///< macrocells whose majorant was worked out again
   bool filmReset = false;         ///< false: the new scene makes the same picture, samples are kept
-  double rebuildMs = 0;
+  double rebuildMs = 0;           ///< of the plans; where method and step are chosen, of the trial's too
 };
 
 /// Counts over all samples since the film was reset. Those of trackers are the same on every machine; of
@@ -90,8 +90,8 @@ class Renderer {
   /// Looks up what is visible in an area of the picture, by the method's own samples, without the film. The
   /// same for the same scene, whatever has been rendered. `scene`: that of setScene, but size, filter, method
   /// and step may differ: what is shown for a while may be smaller and coarser. Automatic looks as superposed
-  /// does. Valid while the renderer lives, and stays with the scene that is set now, whatever comes after it;
-  /// from any thread.
+  /// does. Not while setScene runs. What it returns keeps the scene of now, and may be used from any thread
+  /// while the renderer lives, also during a later setScene.
   virtual std::unique_ptr<Picking> pick(const Scene& scene, const PixelArea& area) const = 0;
   virtual Image image() const = 0;
 };

@@ -42,11 +42,11 @@ class DatasetStore {
   Gradients measuredGradients(const Dataset& dataset, int channel, const std::stop_token& stop) const;
 
  private:
-  std::vector<std::shared_ptr<const Dataset>> datasets_;
-  std::shared_ptr<MemoryBudget> memory_;
   /// With the mutex held; nullptr where they are not kept.
   Gradients kept(const Dataset& dataset, int channel) const;
 
+  std::vector<std::shared_ptr<const Dataset>> datasets_;
+  std::shared_ptr<MemoryBudget> memory_;
   struct Measured {
     const Dataset* dataset;
     int channel;

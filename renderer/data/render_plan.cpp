@@ -213,7 +213,6 @@ RenderPlan::RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene,
     : volume_(std::move(volume)), scene_(scene) {
   const auto start = std::chrono::steady_clock::now();
   checkScene(scene_, *volume_);
-  rebuilt_.filmReset = !before || !before->makesSamePicture(scene_);
   const auto rays = makeCameraRays(scene_.camera, volume_->grid(), scene_.width, scene_.height);
   const bool newCells = !before || before->macrocells_->size != scene_.macrocell;
   macrocells_ = newCells ? sharedMacrocells(volume_, scene_.macrocell, stop, memory) : before->macrocells_;

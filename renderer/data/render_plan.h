@@ -20,7 +20,7 @@ float stratumOf(Method method);
 void checkImageSize(const Scene& scene);
 /// Throws Error(badInput) for a light whose numbers cannot be worked with.
 void checkLight(const Light& light);
-/// Throws Error(badInput) when update() would refuse the scene for anything but its camera and curves.
+/// Throws Error(badInput) where a plan of the scene would be refused for anything but its camera and curves.
 void checkScene(const Scene& scene, const Volume& volume);
 
 class RenderPlan {

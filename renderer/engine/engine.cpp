@@ -159,29 +159,30 @@ class Engine final : public Renderer {
     const bool automatic = scene.method == Method::automatic;
     Choice choice = automatic_;
     double bias = automaticBias_;
-    std::shared_ptr<const RenderPlan> before = plan_;
+    std::shared_ptr<const RenderPlan> plan = plan_;
     RebuildStats stats;
-    const auto plan = [&] {
-      before = std::make_shared<const RenderPlan>(volume_, chosen, before.get(), budget_, stop);
-      stats.macrocellChannels += before->rebuilt().macrocellChannels;
-      stats.majorantChannels += before->rebuilt().majorantChannels;
-      stats.majorantCells += before->rebuilt().majorantCells;
-      stats.rebuildMs += before->rebuilt().rebuildMs;
+    const auto makeNext = [&] {
+      plan = std::make_shared<const RenderPlan>(volume_, chosen, plan.get(), budget_, stop);
+      const RebuildStats& own = plan->rebuilt();
+      stats.macrocellChannels += own.macrocellChannels;
+      stats.majorantChannels += own.majorantChannels;
+      stats.majorantCells += own.majorantCells;
+      stats.rebuildMs += own.rebuildMs;
     };
     if (automatic) {
       // The choice before, if there was one: when nothing else is new either, the film goes on.
       chosen.method = choice.method;
       chosen.step = choice.step;
       if (!plan_ || !plan_->makesSamePicture(chosen) || scene.targetError != target_) {
-        plan();
-        std::tie(choice, bias) = choose(scene, *before, stop);
+        makeNext();
+        std::tie(choice, bias) = choose(scene, *plan, stop);
       }
       chosen.method = choice.method;
       chosen.step = choice.step;
     }
-    plan();
+    makeNext();
     stats.filmReset = !plan_ || !plan_->makesSamePicture(chosen);
-    plan_ = std::move(before);
+    plan_ = std::move(plan);
     automatic_ = choice;
     automaticBias_ = bias;
     target_ = automatic ? scene.targetError : 0;  // what was chosen is of no other scene

@@ -17,7 +17,7 @@ class PointSegments {
   using Word = typename L::Word;
   using Mask = typename L::Mask;
 
-  SCOLOPAX_LANES PointSegments(SegmentEnds<L>& ends, const View& scene, const RayOf<L>& rays,
+  SCOLOPAX_LANES PointSegments(SegmentEnds<L, View>& ends, const View& scene, const RayOf<L>& rays,
                                const IntervalOf<L>& inside, std::uint32_t channels, Float offset, float step,
                                CostOf<L>* cost)
       : ends_(ends),
@@ -51,8 +51,8 @@ class PointSegments {
       const Mask met = apart ? without(live_, met_ == Word(0u)) : live_;
       const std::uint32_t wanted = apart ? unionOf(met_) : channels_;
       if (last_ != k_ - 1) known_ = 0;
-      if ((wanted & ~known_) != 0) sample(start, wanted & ~known_, ends_.from, ends_.factorFrom);
-      sample(end, wanted, ends_.to, ends_.factorTo);
+      if ((wanted & ~known_) != 0) sample(start, wanted & ~known_, ends_.from, ends_.factorPositionFrom);
+      sample(end, wanted, ends_.to, ends_.factorPositionTo);
       last_ = k_;
       known_ = wanted;
       segment = {start, end, wanted, met, apart, met_};
@@ -125,7 +125,7 @@ class PointSegments {
     return k > 0 && any(live_ & (t < endOf(k - 1))) ? k - 1 : k;
   }
 
-  SCOLOPAX_LANES void sample(Float t, std::uint32_t channels, CurvePoint<L>* points, Float* factors) {
+  SCOLOPAX_LANES void sample(Float t, std::uint32_t channels, CurvePoint<L>* points, Float* factorPositions) {
     Float stored[kMaxVisibleChannels];
     const typename L::Vec point = rays_.origin + t * rays_.direction;
     sampleChannels(scene_, channels, point, stored);
@@ -135,14 +135,14 @@ class PointSegments {
       const ChannelView& channel = scene_.channels[n];
       points[n] = pointOn<L>(channel.optical, stretchPosition(channel, stored[n]));
       if (scene_.hasFactor(n)) [[unlikely]] {
-        findFactorPosition<L>(channel, scene_.dims, point, &factors[n]);
+        findFactorPosition<L>(channel, scene_.dims, point, &factorPositions[n]);
         fetches += gradientFetches(scene_.dims);
       }
     }
     cost_->fetches = cost_->fetches + Word(onesOf(live_)) * Word(fetches);
   }
 
-  SegmentEnds<L>& ends_;
+  SegmentEnds<L, View>& ends_;
   const View& scene_;
   const RayOf<L>& rays_;
   IntervalOf<L> inside_;

@@ -35,7 +35,7 @@ SCOLOPAX_LANES void keepNearer(FirstCollisionOf<L>* first, typename L::Mask whic
 
 /// Keeps collisions that are nearer than what rays have met so far.
 template <class L, class Blend, class View>
-SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const SegmentEnds<L>& ends,
+SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const SegmentEnds<L, View>& ends,
                                Hidden<L, Blend::kSums>& hidden, const SegmentCollision<L>& collision,
                                FirstCollisionOf<L>* first) {
   using Float = typename L::Float;
@@ -77,7 +77,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
   using OfStrata = Strata<Features, L, Blend, View>;
   [[maybe_unused]] typename OfStrata::Memory memory;
   [[maybe_unused]] OfStrata strata(memory, scene, blend, ray, channels, set, ofStrata, cost);
-  SegmentEnds<L> ends;
+  SegmentEnds<L, View> ends;
   Hidden<L, Blend::kSums> hidden;
   Segment<L> segment;
   Spans<L> spans(scene, ray, inside, channels);

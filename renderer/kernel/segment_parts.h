@@ -15,15 +15,15 @@ struct Blending {
 };
 
 /// Finds partAlone() where the opacity depends on the gradient, whose magnitude is linear on the segment too.
-template <Detail kDetail, class L>
-SCOLOPAX_LANES_RARE void findPartWithFactor(const ChannelView& channel, const SegmentEnds<L>& ends, int n,
-                                            const typename L::Mask& which, PartOf<L>* part) {
+template <Detail kDetail, class L, class View>
+SCOLOPAX_LANES_RARE void findPartWithFactor(const ChannelView& channel, const SegmentEnds<L, View>& ends,
+                                            int n, const typename L::Mask& which, PartOf<L>* part) {
   using Float = typename L::Float;
   using Mask = typename L::Mask;
   const OpticalCurveView& factor = channel.factor.optical;
   const CurvePoint<L>& from = ends.from[n];
   const CurvePoint<L>& to = ends.to[n];
-  const Float g = ends.factorFrom[n], h = ends.factorTo[n];
+  const Float g = ends.factorPositionFrom[n], h = ends.factorPositionTo[n];
   // An end has a value and a gradient, or counts for nothing.
   const Mask known = (from.position == from.position) & (g == g);
   const Mask other = (to.position == to.position) & (h == h), some = which & (known | other);
@@ -38,7 +38,7 @@ SCOLOPAX_LANES_RARE void findPartWithFactor(const ChannelView& channel, const Se
 /// Part of channel n on a segment of some rays, as if it were alone; of the others nothing. Next to voxels
 /// that are not finite only the half of the segment that has a value counts.
 template <Detail kDetail, class L, class View>
-SCOLOPAX_LANES PartOf<L> partAlone(const View& scene, const SegmentEnds<L>& ends, int n,
+SCOLOPAX_LANES PartOf<L> partAlone(const View& scene, const SegmentEnds<L, View>& ends, int n,
                                    typename L::Mask which) {
   using Float = typename L::Float;
   using Mask = typename L::Mask;
@@ -80,24 +80,25 @@ template <class L>
 struct Hidden<L, true> {};
 
 /// Takes rays out of the mask on whose segment the factor of channel n may change.
-template <class L>
-SCOLOPAX_LANES_RARE void dropWhereFactorChanges(const ChannelView& channel, const SegmentEnds<L>& ends, int n,
-                                                typename L::Mask* straight) {
+template <class L, class View>
+SCOLOPAX_LANES_RARE void dropWhereFactorChanges(const ChannelView& channel, const SegmentEnds<L, View>& ends,
+                                                int n, typename L::Mask* straight) {
   const OpticalCurveView& curve = channel.factor.optical;
-  const CurvePoint<L> g = pointOn<L>(curve, ends.factorFrom[n]), h = pointOn<L>(curve, ends.factorTo[n]);
+  const CurvePoint<L> g = pointOn<L>(curve, ends.factorPositionFrom[n]),
+                      h = pointOn<L>(curve, ends.factorPositionTo[n]);
   *straight = *straight & (g.piece == h.piece) &
               (opticalAt<Detail::extinction, L>(curve, g, L::everywhere()).opacity ==
                opticalAt<Detail::extinction, L>(curve, h, L::everywhere()).opacity);
 }
 
 /// Multiplies an opacity of channel n by its factor at a place in [0,1] of a segment.
-template <class L>
-SCOLOPAX_LANES_RARE void multiplyByFactor(const ChannelView& channel, const SegmentEnds<L>& ends, int n,
+template <class L, class View>
+SCOLOPAX_LANES_RARE void multiplyByFactor(const ChannelView& channel, const SegmentEnds<L, View>& ends, int n,
                                           const typename L::Float& place, const typename L::Mask& which,
                                           typename L::Float* opacity) {
   using Float = typename L::Float;
   using Mask = typename L::Mask;
-  const Float from = ends.factorFrom[n], to = ends.factorTo[n];
+  const Float from = ends.factorPositionFrom[n], to = ends.factorPositionTo[n];
   const Mask known = from == from, other = to == to;
   const Float g = select(known, from, to), h = select(other, to, from);
   const OpticalCurveView& curve = channel.factor.optical;
@@ -108,7 +109,7 @@ SCOLOPAX_LANES_RARE void multiplyByFactor(const ChannelView& channel, const Segm
 
 /// What channel n is at a place in [0,1] of a segment; of other rays anything.
 template <Detail kDetail, class L, class View>
-SCOLOPAX_LANES Optical<L> opticalOn(const View& scene, const SegmentEnds<L>& ends, int n,
+SCOLOPAX_LANES Optical<L> opticalOn(const View& scene, const SegmentEnds<L, View>& ends, int n,
                                     typename L::Float place, typename L::Mask which) {
   using Mask = typename L::Mask;
   const ChannelView& channel = scene.channels[n];
@@ -138,7 +139,7 @@ SCOLOPAX_LANES void add(typename L::Float opacity, const typename L::Vec& color,
 /// each channel.
 template <Detail kDetail, class L, class View>
 SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Segment<L>& segment,
-                                         const SegmentEnds<L>& ends, typename L::Mask which,
+                                         const SegmentEnds<L, View>& ends, typename L::Mask which,
                                          Hidden<L, false>& hidden) {
   using Float = typename L::Float;
   using Int = typename L::Int;
@@ -191,7 +192,7 @@ SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Se
 /// seen. One channel alone needs no comparisons.
 template <Detail kDetail, class L, class Blend, class Visit, class View>
 SCOLOPAX_LANES typename L::Float visitParts(const View& scene, const Blend& blend, const Segment<L>& segment,
-                                            const SegmentEnds<L>& ends,
+                                            const SegmentEnds<L, View>& ends,
                                             [[maybe_unused]] Hidden<L, Blend::kSums>& hidden, Visit&& visit) {
   using Float = typename L::Float;
   Float extinction(0.0f);

@@ -14,16 +14,15 @@ inline constexpr int kMaxSegments = 1 << 20;
 /// Where a segment's ends lie on the curves of its channels, and |gradient| on those of its factor, of
 /// channels that have one; NaN where there is no finite value. What variables index is in objects like this
 /// and nothing else is: a device keeps such objects in memory, all of them.
-template <class L>
+template <class L, class View>
 struct SegmentEnds {
   CurvePoint<L> from[kMaxVisibleChannels], to[kMaxVisibleChannels];
-  typename L::Float factorFrom[kMaxVisibleChannels], factorTo[kMaxVisibleChannels];
+  typename L::Float factorPositionFrom[View::kFactors], factorPositionTo[View::kFactors];
 
   /// The next segment of channel n begins where this one ends.
-  template <class View>
   SCOLOPAX_LANES void passOn(const View& scene, int n) {
     from[n] = to[n];
-    if (scene.hasFactor(n)) factorFrom[n] = factorTo[n];
+    if (scene.hasFactor(n)) factorPositionFrom[n] = factorPositionTo[n];
   }
 };
 
@@ -68,8 +67,9 @@ template <class View>
 class CellSegments {
  public:
   /// Of channels by their bits.
-  SCOLOPAX_HD CellSegments(SegmentEnds<One>& ends, const View& scene, const Ray& ray, const Interval& inside,
-                           std::uint32_t channels, float offset, float step, SampleCost* cost)
+  SCOLOPAX_HD CellSegments(SegmentEnds<One, View>& ends, const View& scene, const Ray& ray,
+                           const Interval& inside, std::uint32_t channels, float offset, float step,
+                           SampleCost* cost)
       : ends_(ends),
         scene_(scene),
         ray_(ray),
@@ -97,8 +97,8 @@ class CellSegments {
       if (known_ >> n & 1)
         ends_.passOn(scene_, n);
       else
-        sample(n, segment.start, ends_.from, ends_.factorFrom);
-      sample(n, segment.end, ends_.to, ends_.factorTo);
+        sample(n, segment.start, ends_.from, ends_.factorPositionFrom);
+      sample(n, segment.end, ends_.to, ends_.factorPositionTo);
     }
     known_ = has_;
     return true;
@@ -112,14 +112,14 @@ class CellSegments {
     return minimum(inside_.enter + (float(segment) + offset_) * step_, inside_.exit);
   }
 
-  SCOLOPAX_HD void sample(int n, float t, CurvePoint<One>* points, float* factors) {
+  SCOLOPAX_HD void sample(int n, float t, CurvePoint<One>* points, float* factorPositions) {
     ++cost_->fetches;
     const ChannelView& channel = scene_.channels[n];
     const glm::vec3 point = ray_.origin + t * ray_.direction;
     const float stored = sampleStored(channel, scene_.dims, point);
     points[n] = pointOn<One>(channel.optical, stretchPosition(channel, stored));
     if (scene_.hasFactor(n)) [[unlikely]] {
-      findFactorPosition<One>(channel, scene_.dims, point, &factors[n]);
+      findFactorPosition<One>(channel, scene_.dims, point, &factorPositions[n]);
       cost_->fetches += gradientFetches(scene_.dims);
     }
   }
@@ -167,7 +167,7 @@ class CellSegments {
     }
   }
 
-  SegmentEnds<One>& ends_;
+  SegmentEnds<One, View>& ends_;
   const View& scene_;
   const Ray& ray_;
   Interval inside_;

@@ -20,7 +20,7 @@ SCOLOPAX_LANES typename L::Float marchTransmittance(const View& scene, const Ble
                                                     const RayOf<L>& ray, const IntervalOf<L>& inside,
                                                     std::uint32_t channels, typename L::Float offset,
                                                     CostOf<L>* cost) {
-  SegmentEnds<L> ends;
+  SegmentEnds<L, View> ends;
   Hidden<L, Blend::kSums> hidden;
   Segment<L> segment;
   typename L::Float depth(0.0f);

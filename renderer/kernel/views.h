@@ -121,6 +121,7 @@ struct SceneView {
   glm::mat3 gradientFromVoxel;  ///< its inverse transpose
   float smallestSpacing;        ///< world units
 
+  static constexpr int kFactors = kMaxVisibleChannels;  ///< channels that may have one: length of arrays
   /// Whether the opacity of channel n depends on the gradient.
   SCOLOPAX_HD bool hasFactor(int n) const { return channels[n].factor.curve.count != 0; }
 };
@@ -128,6 +129,7 @@ struct SceneView {
 /// A scene of curves alone: kernels of this view are compiled without what other scenes need. Only devices
 /// have such kernels, whose registers and local memory are taken for all that is compiled.
 struct PlainSceneView : SceneView {
+  static constexpr int kFactors = 1;  // none, but arrays must not be empty
   SCOLOPAX_HD static constexpr bool hasFactor(int) { return false; }
 };
 

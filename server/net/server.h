@@ -34,8 +34,8 @@ struct Options {
   /// Beyond: 503. Half of them at most may be strangers', who have shown no token yet.
   std::size_t maxConnections = 512;
   int workers = 4;  ///< threads for ordinary handlers and WebSocket events
-  int longRequests =
-      16;  ///< RouteKind::slow requests at once, and of quick routes a quarter as many; beyond: 503
+  /// Long requests at once; those of quick routes (TakesLong) may take a quarter of the slots. Beyond: 503.
+  int longRequests = 16;
 
   std::chrono::milliseconds headTimeout{5'000};   ///< from the first byte of a head to its end
   std::chrono::milliseconds idleTimeout{30'000};  ///< between the requests of a kept connection

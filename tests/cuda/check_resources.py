@@ -28,8 +28,9 @@ def marching_arrays(name):
     if "RayMarch" not in name:
         return 0
     point, part, color, number = 8, 20, 12, 4  # CurvePoint, PartOf, Vec, Float
+    factor = 0 if "PlainSceneView" in name else number
     sums = "BlendDensity" in name or "BlendComposite" in name
-    segment = 32 * (2 * (point + number) + (0 if sums else part))
+    segment = 32 * (2 * (point + factor) + (0 if sums else part))
     shading, shadows = re.search(r"LightFeaturesILb(\d)ELb(\d)E", name).groups()
     strata = 32 * (part + number + color) if "1" in shading + shadows else 0
     return segment + strata + (segment if shadows == "1" else 0)  # shadow rays have a segment too

@@ -277,6 +277,52 @@ TEST(CpuRenderer, TakesItsMemoryFromTheBudgetAndRefusesWhatIsNotThere) {
   EXPECT_EQ(memory->used(MemoryUse::grids), 0u);
 }
 
+TEST(CpuRenderer, TakesNoMoreMemoryAfterManyEditsAndNoneForAnEditThatIsRefused) {
+  const auto volume = orbitals();
+  Scene scene = orbitalScene(*volume);
+  scene.width = scene.height = 16;
+  scene.macrocell = 1;
+  const Histogram& values = volume->channels()[0].histogram;
+  const auto edit = [&](int i) {
+    scene.channels[0].opacity = {{0, 0}, {0.1 + 0.04 * (i % 20), 1}, {1, 0.2}};
+    GradientOpacity& factor = scene.channels[0].gradientOpacity.emplace();
+    factor.rangeHi = (values.maximum - values.minimum) * (1 + i % 3);
+  };
+  std::uint64_t most = 0;
+  {
+    const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(1) << 30);
+    const auto renderer = makeCpuRenderer(volume, 0, memory);
+    edit(0);
+    renderer->setScene(scene);
+    const std::uint64_t first = memory->used(MemoryUse::grids);
+    for (int i = 1; i <= 20; ++i) {
+      edit(i);
+      renderer->setScene(scene);
+      EXPECT_EQ(memory->used(MemoryUse::grids), first) << i;
+    }
+    most = first + memory->used(MemoryUse::films);
+  }
+  // As much as the scene needs; but while an edit is made, what it changes is there twice.
+  const auto memory = std::make_shared<MemoryBudget>(most * 21 / 20);
+  const auto renderer = makeCpuRenderer(volume, 0, memory);
+  edit(20);
+  renderer->setScene(scene);
+  renderer->renderSample(kNever);
+  const Image before = renderer->image();
+  const std::uint64_t used = memory->used(MemoryUse::grids);
+  edit(21);
+  try {
+    renderer->setScene(scene);
+    ADD_FAILURE() << "there is memory for both";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::busy);
+  }
+  EXPECT_EQ(memory->used(MemoryUse::grids), used);
+  EXPECT_TRUE(sameBits(before, renderer->image()));
+  renderer->renderSample(kNever);
+  EXPECT_EQ(renderer->samples(), 2u);
+}
+
 TEST(CpuRenderer, GivesTheMemoryOfALargerFilmBackWhenItIsStopped) {
   const auto volume = orbitals();
   Scene scene = orbitalScene(*volume);
