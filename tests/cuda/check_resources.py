@@ -8,19 +8,23 @@ from concurrent.futures import ThreadPoolExecutor
 
 ARCHITECTURES = ["sm_75", "sm_90"]
 # What the kernels need at present: whoever raises a limit says why. A block of 128 threads leaves 168 registers
-# where three are to fit. Without light most kernels stay within 128; where a tracker keeps a process per channel,
-# or channels are apart, the close look at thick cells needs more. With light, shading indexes vectors, strata
-# remember what they hold, and shadows march once more.
-LIMITS = {"registers": 128, "spill": 112, "stack": 96}
-LIMITS_APART = {"registers": 168, "spill": 144, "stack": 96}
-LIMITS_LIT = {"registers": 168, "spill": 416, "stack": 336}
+# where three are to fit. Kernels of plain scenes stay within 128 where no light falls, unless a tracker keeps a process
+# per channel or channels are apart: there the close look at thick cells needs more. With light, shading indexes
+# vectors, strata remember what they hold, and shadows march once more. Kernels of all scenes call what opacity by the
+# gradient needs, and save their registers around the calls: those of plain scenes are compiled apart so that they
+# need not.
+PLAIN = {"registers": 128, "spill": 136, "stack": 96}
+PLAIN_APART = {"registers": 168, "spill": 144, "stack": 96}
+PLAIN_LIT = {"registers": 168, "spill": 520, "stack": 416}
+ALL = {"registers": 168, "spill": 304, "stack": 160}
+ALL_LIT = {"registers": 168, "spill": 1280, "stack": 600}
 
 
 def limits_of(name):
-    if "LightFeaturesILb0ELb0E" not in name:
-        return LIMITS_LIT
-    tracks_apart = "RayMarch" not in name and re.search("NDda|SyncDda|BlendComposite", name)
-    return LIMITS_APART if tracks_apart else LIMITS
+    lit, plain = "LightFeaturesILb0ELb0E" not in name, "PlainSceneView" in name
+    if lit or not plain:
+        return (PLAIN_LIT if plain else ALL_LIT) if lit else ALL
+    return PLAIN_APART if "RayMarch" not in name and re.search("NDda|SyncDda|BlendComposite", name) else PLAIN
 
 
 def marching_arrays(name):
