@@ -25,8 +25,8 @@ SCOLOPAX_LANES_RARE void findPartWithFactor(const ChannelView& channel, const Se
   const CurvePoint<L>& to = ends.to[n];
   const Float g = ends.factorPositionFrom[n], h = ends.factorPositionTo[n];
   // An end has a value and a gradient, or counts for nothing.
-  const Mask known = (from.position == from.position) & (g == g);
-  const Mask other = (to.position == to.position) & (h == h), some = which & (known | other);
+  const Mask known = (from.position == from.position) & isFinite(g);
+  const Mask other = (to.position == to.position) & isFinite(h), some = which & (known | other);
   *part = noPart<L>();
   if (!any(some)) return;
   const PartOf<L> means = meansOfProduct<kDetail, L>(
@@ -99,7 +99,7 @@ SCOLOPAX_LANES_RARE void multiplyByFactor(const ChannelView& channel, const Segm
   using Float = typename L::Float;
   using Mask = typename L::Mask;
   const Float from = ends.factorPositionFrom[n], to = ends.factorPositionTo[n];
-  const Mask known = from == from, other = to == to;
+  const Mask known = isFinite(from), other = isFinite(to);
   const Float g = select(known, from, to), h = select(other, to, from);
   const OpticalCurveView& curve = channel.factor.optical;
   const CurvePoint<L> point = pointOn<L>(curve, g + place * (h - g));
