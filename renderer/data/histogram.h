@@ -15,7 +15,8 @@ struct Histogram {
   std::uint64_t finiteCount = 0;
   std::uint64_t nonFiniteCount = 0;  ///< NaN and infinities
   std::vector<std::uint64_t> bins;   ///< kBins, of equal widths over [minimum, maximum]
-  std::vector<double> quantiles;     ///< at i / (size - 1); of float voxels, a fixed subset of < 2^21
+  /// At i / (size - 1). Exact for integer voxels; from a fixed subset of fewer than 2^21 for float voxels.
+  std::vector<double> quantiles;
 
   /// The bin of a finite value.
   std::size_t binOf(double value) const {
