@@ -51,8 +51,7 @@ class Steepness {
       addSlopes(between, around, axis, &least[axis], &largest[axis], &value);
     glm::dvec3 steepest(0);
     for (int axis = 0; axis < 3; ++axis) {
-      if (least[axis] > largest[axis])
-        least[axis] = largest[axis] = 0;  // no finite slope, as along an axis of one voxel
+      if (least[axis] > largest[axis]) least[axis] = largest[axis] = 0;  // no slope: an axis of one voxel
       steepest[axis] = std::max(std::abs(least[axis]), std::abs(largest[axis]));
     }
     double length = 0;
@@ -104,7 +103,7 @@ class Steepness {
   }
 
   /// Adds the largest possible rounding error: of the two samples of every difference (as slackFor() in
-  /// macrocell_grid.cpp), of their positions, by the slope, and of the transform to world space.
+  /// macrocell_grid.cpp), of their positions (times the slope), and of the transform to world space.
   float roundedUp(double length, const glm::dvec3& steepest, double value) const {
     if (steepest == glm::dvec3(0)) return 0.0f;
     double slack = 0;

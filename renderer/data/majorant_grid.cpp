@@ -173,7 +173,7 @@ std::size_t MajorantGrid::rebuild(const Changes& changes, Totals& totals) const 
   std::vector<std::uint8_t> radii(blocks.count()), scratch(blocks.count()), stale(blocks.count());
   std::atomic<std::size_t> touched = 0;
   std::atomic<bool> other = changes.all;  // whether the set of empty blocks changes
-  // Blocks first: most of them have none of the values that an edit changes.
+  // Blocks first: most of them contain no value that an edit changes.
   forBlocks(blocks, [&](std::size_t block) {
     radii[block] = totals.radii[block] > 0 ? kernel::kMaxEmptyRadius : 0;
     if (!changes.meet(&macrocells_->blocks[block * columns])) return;

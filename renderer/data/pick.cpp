@@ -9,8 +9,8 @@ namespace scolopax {
 namespace {
 constexpr int kLeastSide = 2;
 constexpr std::size_t kMaxRays = std::size_t(kMaxPickPixels) * kLeastSide * kLeastSide;
-/// A pixel shows nothing if less than one in this many of its samples has a collision. One in sixteen is well
-/// below one half, so that what is faint but visible can be picked.
+/// A pixel shows nothing if fewer than one in this many of its samples have a collision. One in sixteen is
+/// well below one half, so that what is faint but visible can be picked.
 constexpr std::size_t kLeastShare = 16;
 }  // namespace
 
