@@ -9,13 +9,13 @@ namespace scolopax {
 
 enum class ErrorCode {
   badInput,     ///< a file or a value is not what its format allows
-  unsupported,  ///< valid, but not something this program does
+  unsupported,  ///< valid, but this program cannot handle it
   notFound,
-  tooLarge,  ///< beyond a stated limit or the memory there is
-  busy,      ///< beyond a limit at this time: others hold what is missing
+  tooLarge,  ///< beyond a stated limit or the available memory
+  busy,      ///< limit reached for now, as others hold the resource; retry later
   io,        ///< reading or writing failed
   device,    ///< a GPU or its driver failed
-  cancelled  ///< given up: nobody wants the result any more
+  cancelled  ///< abandoned: the result is no longer needed
 };
 
 /// `what()` is one line a user can act on: file or field, what was expected, what was found.

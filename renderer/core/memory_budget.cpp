@@ -58,9 +58,8 @@ void MemoryBudget::change(MemoryUse use, std::uint64_t from, std::uint64_t to) {
   if (to > from && (to > most || others > most - to))
     throw Error(to > most ? ErrorCode::tooLarge : ErrorCode::busy,
                 "memory for " + std::string(kMemoryUses[std::size_t(use)]) + ": expected at most " +
-                    mebibytes(most) +
-                    (others > 0 ? " with the " + mebibytes(others) + " that are taken" : "") + ", found " +
-                    mebibytes(to));
+                    mebibytes(most) + (others > 0 ? ", of which " + mebibytes(others) + " are in use" : "") +
+                    ", found " + mebibytes(to));
   used_[std::size_t(use)] += to;
   used_[std::size_t(use)] -= from;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One bound on the memory that requests make a server take: films, pictures, encodings, macrocells. What
-// takes much asks here first; what is refused says how much there is.
+// A limit on the memory that requests make a server allocate: films, pictures, encodings, macrocells. Large
+// allocations are charged here first; a refusal states the limit.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace scolopax {
 
-/// What memory is for.
+/// What memory is used for.
 enum class MemoryUse { films, grids, pictures, encodings };
 inline constexpr std::string_view kMemoryUses[] = {"films", "grids", "pictures", "encodings"};
 
@@ -24,16 +24,16 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
 
   explicit MemoryBudget(std::uint64_t limitBytes) : limit_(limitBytes) {}
 
-  /// Bytes that are taken as long as it lives. One that was made by default is of no budget and always
-  /// granted.
+  /// Bytes charged to a budget for the lifetime of the share. A default-constructed share belongs to no
+  /// budget and may take any size.
   class Share {
    public:
     Share() = default;
     Share(Share&& other) noexcept { *this = std::move(other); }
     Share& operator=(Share&& other) noexcept;
     ~Share();
-    /// Throws and stays as it was: Error(tooLarge) when there are never so many, Error(busy) when there are
-    /// not now.
+    /// Throws Error(tooLarge) if the budget never has so many bytes, Error(busy) if it does not have them
+    /// now; the share then keeps its size.
     void resize(std::uint64_t bytes);
     std::uint64_t bytes() const { return bytes_; }
 
@@ -44,9 +44,9 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
     MemoryUse use_ = MemoryUse::films;
     std::uint64_t bytes_ = 0;
   };
-  /// Throws as Share::resize. Without a budget every request is granted.
+  /// Throws like Share::resize. A null `budget` grants every request.
   static Share take(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use, std::uint64_t bytes = 0);
-  /// The same, for what several hold.
+  /// The same, for memory with several owners.
   static std::shared_ptr<Share> takeShared(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use,
                                            std::uint64_t bytes);
 
@@ -62,7 +62,7 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
   std::array<std::uint64_t, std::size(kMemoryUses)> used_{};
 };
 
-/// The value, shared; when nobody holds it any more, its memory goes back.
+/// Shared ownership of `value` and of the memory charged for it; the last owner releases both.
 template <class T>
 std::shared_ptr<const T> withShare(MemoryBudget::Share share, T value) {
   struct Held {

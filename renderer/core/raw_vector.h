@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A vector of numbers whose new elements are left as the memory is: for what is filled anyway, by many
-// threads.
+// A vector of numbers that leaves new elements uninitialised: for arrays that many threads fill afterwards.
 #pragma once
 #include <memory>
 #include <type_traits>
@@ -15,7 +14,7 @@ struct RawAllocator : std::allocator<T> {
   struct rebind {
     using other = RawAllocator<U>;
   };
-  /// Without a value: default-initialised, which for numbers does nothing.
+  /// Default-initialises the element, which does nothing for numbers.
   template <class U>
   void construct(U* at) noexcept(std::is_nothrow_default_constructible_v<U>) {
     ::new (static_cast<void*>(at)) U;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The voxel types that are kept as they are in memory and sampled as they are by the kernels.
+// The voxel types that are kept in memory and sampled by the kernels without conversion.
 #pragma once
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One future per key: what several ask for at the same time is built once, away from all of them.
+// One future per key: a value that several callers request at the same time is built once, on a thread of its
+// own.
 #pragma once
 #include <condition_variable>
 #include <exception>
@@ -15,16 +16,16 @@
 
 namespace scolopax {
 
-/// Every function may be called from any thread. Values are kept as long as somebody holds them.
+/// Every function may be called from any thread. A value is cached while any caller holds it.
 template <class Key, class Value, class Less = std::less<Key>>
 class SharedBuilds {
  public:
   using Result = std::shared_ptr<const Value>;
   using Make = std::function<Result(std::stop_token)>;
 
-  /// Waits for the value, which `make` builds on a thread of its own unless it is there or being built.
-  /// Throws what `make` throws, and Error(cancelled) once `stop` is requested. `make` is asked to stop when
-  /// nobody waits for its value any more.
+  /// Returns the value, and waits for it if necessary. Unless it exists or is being built, `make` builds it
+  /// on a thread of its own. Throws what `make` throws, and Error(cancelled) once `stop` is requested. `make`
+  /// is asked to stop when no caller waits for its value any more.
   Result get(const Key& key, const Make& make, const std::stop_token& stop) {
     if (stop.stop_requested()) throwCancelled();
     std::shared_ptr<Build> build;
@@ -49,10 +50,10 @@ class SharedBuilds {
 
  private:
   [[noreturn]] static void throwCancelled() {
-    throw Error(ErrorCode::cancelled, "nobody waits for what was to be built");
+    throw Error(ErrorCode::cancelled, "build cancelled: its result is no longer needed");
   }
 
-  /// Owned by its waiters only; when the last one leaves, the build is stopped.
+  /// Owned only by its waiters: when the last one leaves, the build is stopped.
   class Build {
    public:
     explicit Build(const Make& make)
@@ -86,7 +87,7 @@ class SharedBuilds {
     bool done_ = false;
     Result value_;
     std::exception_ptr failure_;
-    std::jthread thread_;  // asked to stop and waited for before the rest goes
+    std::jthread thread_;  // declared last: stopped and joined before the other members are destroyed
   };
   struct Entry {
     std::weak_ptr<Build> build;

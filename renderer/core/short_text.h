@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers in messages.
+// Numbers for messages.
 #pragma once
 #include <cstdio>
 #include <string>
 
 namespace scolopax {
 
-/// Six digits, as %g: std::to_string spells 1e308 out.
+/// Six significant digits, as %g; std::to_string would write out all digits of 1e308.
 inline std::string shortText(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%g", value);

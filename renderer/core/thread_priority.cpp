@@ -7,7 +7,7 @@ namespace scolopax {
 
 void lowerThreadPriority() {
 #ifdef __linux__
-  // Linux counts niceness by thread: 0 is the calling one.
+  // On Linux niceness is per thread; 0 means the calling thread.
   setpriority(PRIO_PROCESS, 0, 4);
 #endif
 }

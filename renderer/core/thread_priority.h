@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// For threads whose work may wait for that of others.
+// Lower priority for threads whose work may wait.
 #pragma once
 
 namespace scolopax {
 
-/// The calling thread gets about a third of a processor beside one of usual priority. Where the system has no
-/// such thing, nothing happens.
+/// Lowers the priority of the calling thread: beside a thread of normal priority it gets about a third of a
+/// processor. Does nothing on systems other than Linux.
 void lowerThreadPriority();
 
 }  // namespace scolopax

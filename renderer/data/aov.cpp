@@ -18,7 +18,7 @@ namespace {
 
 constexpr float kUndefined = std::numeric_limits<float>::quiet_NaN();
 
-/// Smallest and largest defined value; {0, 0} where there is none.
+/// Smallest and largest defined value; {0, 0} if there is none.
 std::pair<float, float> rangeOf(std::span<const float> values) {
   float lo = std::numeric_limits<float>::infinity(), hi = -lo;
   for (const float v : values)

@@ -27,7 +27,7 @@ std::shared_ptr<const BoundColumn> buildBoundColumn(const MacrocellGrid& macroce
     });
   };
   forCells([&](std::size_t cell) {
-    // Both factors are bounds, and rounding is monotone: so is the product in float.
+    // Both factors are bounds and rounding is monotone, so their product in float is a bound too.
     const float bound = ofValues.over(macrocells.intervals[cell * columns + std::size_t(channel)]) *
                         factors[gradients.cells[cell]];
     bounds[cell] = {bound, bound};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bounds of channels whose extinction depends on more than their value: a column of their own in the
-// macrocells, in which a cell has one level of the extinction. Kernels see no difference.
+// Bounds of channels whose extinction depends on more than their value. Each gets a column of its own in the
+// macrocells, which holds one level of the extinction per cell. Kernels treat it like any other column.
 #pragma once
 #include <memory>
 #include <span>
@@ -17,15 +17,15 @@ struct BoundColumn {
   std::vector<std::uint8_t> cells;  ///< per macrocell: the least level that is a bound
 };
 
-/// Bounds `channel` of the macrocells, which `ofValues` bounds where the factor is 1. The memory is of the
-/// budget, if there is one.
+/// Bounds the extinction of `channel` in every macrocell: its bound by value (`ofValues`, for a factor of 1)
+/// times the largest factor in the cell. The memory is charged to `memory`, if given.
 std::shared_ptr<const BoundColumn> buildBoundColumn(const MacrocellGrid& macrocells, int channel,
                                                     const kernel::BoundTable& ofValues,
                                                     const GradientCells& gradients,
                                                     const GradientFactor& factor,
                                                     const std::shared_ptr<MemoryBudget>& memory = nullptr);
 
-/// The macrocells with further columns, behind those of the volume's channels.
+/// The macrocells with `columns` appended to those of the volume's channels.
 std::shared_ptr<const MacrocellGrid> withColumns(const std::shared_ptr<const MacrocellGrid>& macrocells,
                                                  std::span<const std::shared_ptr<const BoundColumn>> columns,
                                                  const std::shared_ptr<MemoryBudget>& memory = nullptr);

@@ -26,7 +26,7 @@ glm::dvec3 normalizeSafely(const glm::dvec3& v) {
   return glm::normalize(v / largest);
 }
 
-/// Between `up` and the view, in radians: below, `up` says nothing.
+/// Least angle between `up` and the view, in radians; below it, `up` gives no direction.
 constexpr double kLeastAngle = 1e-6;
 
 Basis basisOf(const Camera& camera) {
@@ -34,8 +34,8 @@ Basis basisOf(const Camera& camera) {
   if (forward == glm::dvec3(0))
     throw Error(ErrorCode::badInput, "camera: eye and target must be different, finite points");
   glm::dvec3 right = glm::cross(forward, normalizeSafely(camera.up));
-  // Along the view, or zero: any direction across will do. A smaller cross product would be rounding, and not
-  // at right angles to the view.
+  // If `up` is zero or along the view, any direction across the view will do. A smaller cross product would
+  // be mostly rounding error, and not at right angles to the view.
   if (!(glm::length(right) > kLeastAngle)) {
     const glm::dvec3 across = std::abs(forward.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
     right = glm::cross(forward, across);
@@ -68,8 +68,8 @@ kernel::CameraRays makeCameraRays(const Camera& camera, const Grid& grid, int wi
   const glm::dmat4 voxelFromWorld = glm::inverse(grid.worldFromVoxel);
   const glm::dmat3 linear(voxelFromWorld);
   const double radius = 0.5 * grid.diagonal();
-  // All rays start on one plane across the view, moved forward to the box's bounding sphere when the eye is
-  // outside of it: numbers in the kernel are then no larger than the volume.
+  // All rays start on one plane across the view. If the eye is outside the box's bounding sphere, the plane
+  // is moved forward to the sphere, so that numbers in the kernel are no larger than the volume.
   const double ahead = glm::dot(centreOf(grid) - camera.eye, basis.forward) - radius * 1.000001;
   const double start = std::max(ahead, 0.0);
   const glm::dvec3 startPoint(voxelFromWorld * glm::dvec4(camera.eye + start * basis.forward, 1));
@@ -79,7 +79,7 @@ kernel::CameraRays makeCameraRays(const Camera& camera, const Grid& grid, int wi
   const double viewHeight = orthographic ? *camera.orthoHeight : 2.0 * std::tan(halfAngle);
   const glm::dvec3 right = linear * basis.right, up = linear * basis.up;
   const double spread = orthographic ? 1.0 : start;
-  // Film coordinates are scaled to the view's height, so that their size is near 1 in either kind of camera.
+  // Film coordinates are scaled to the view's height, so that they are near 1 for either kind of camera.
   kernel::CameraRays rays;
   rays.origin0 = glm::vec3(startPoint);
   rays.originX = glm::vec3(right * spread * viewHeight);
@@ -109,7 +109,7 @@ Camera framingCamera(const Grid& grid, double fovY, double aspect, std::span<con
   camera.eye = camera.target + direction;
   const Basis basis = basisOf(camera);
   const double tanY = std::tan(fovY * 0.5 * 3.14159265358979323846 / 180.0), tanX = tanY * aspect;
-  // The nearest eye from which every point lies inside the frame, and 5 % of margin.
+  // The nearest eye from which every point lies inside the frame, with a margin of 5 %.
   double distance = 0;
   for (const glm::dvec3& voxel : points) {
     const glm::dvec3 p = glm::dvec3(grid.worldFromVoxel * glm::dvec4(voxel, 1)) - camera.target;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Camera in world space, as the scene gives it, and the rays it makes in voxel space.
+// The camera in world space, as the scene gives it, and its rays in voxel space.
 #pragma once
 #include <glm/vec3.hpp>
 #include <optional>
@@ -14,19 +14,19 @@ namespace scolopax {
 struct Camera {
   glm::dvec3 eye{0, 0, 1};
   glm::dvec3 target{0};
-  glm::dvec3 up{0, 1, 0};  ///< within 1e-6 of the view's direction: z is taken, or y where z is near it
-  double fovY = 35;        ///< degrees, used without orthoHeight; in (0, 180)
-  std::optional<double> orthoHeight;  ///< full height of the view in world units: an orthographic camera
+  glm::dvec3 up{0, 1, 0};  ///< if parallel to the view within 1e-6: z is used, or y for a view near z
+  double fovY = 35;        ///< degrees, in (0, 180); unused with orthoHeight
+  std::optional<double> orthoHeight;  ///< full height of an orthographic view, world units
   bool operator==(const Camera&) const = default;
 };
 
-/// Rays in voxel coordinates, computed in double and shifted to just before the box, so that neither an
-/// offset of the world nor a far eye costs precision. Throws Error(badInput) for a camera without direction,
-/// or with a number that is not finite or out of range.
+/// Rays in voxel coordinates. They are computed in double and start just in front of the box, so that neither
+/// a large world offset nor a distant eye costs precision. Throws Error(badInput) if eye and target coincide,
+/// or if a number is not finite or out of range.
 kernel::CameraRays makeCameraRays(const Camera& camera, const Grid& grid, int width, int height);
 
-/// The default view, from a little above and to the side: all points of `seen`, in voxel coordinates, in the
-/// frame, or the whole box where there are none.
+/// The default view, from slightly above and to the side. It frames all points of `seen`, in voxel
+/// coordinates, or the whole box if there are none.
 Camera framingCamera(const Grid& grid, double fovY, double aspect, std::span<const glm::vec3> seen = {});
 
 }  // namespace scolopax

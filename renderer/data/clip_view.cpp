@@ -19,12 +19,12 @@ namespace {
 
 bool keepsRegion(std::uint32_t regions, int x, int y, int z) { return regions >> (x + 3 * y + 9 * z) & 1; }
 
-/// The box that crop's regions span, and whether they are all of it.
+/// The box that the kept regions of a crop span, and whether they fill it.
 struct Kept {
   glm::dvec3 low, high;
   bool whole;
 };
-/// Nothing when no region that is kept has any volume.
+/// None if no kept region has any volume.
 std::optional<Kept> keptBox(const Crop& crop, const glm::dvec3& low, const glm::dvec3& high) {
   const std::array<glm::dvec3, 4> at{low, glm::clamp(crop.low, low, high), glm::clamp(crop.high, low, high),
                                      high};
@@ -56,7 +56,7 @@ std::optional<Kept> keptBox(const Crop& crop, const glm::dvec3& low, const glm::
   return kept;
 }
 
-/// To voxel space, with a normal of length 1 there.
+/// Transforms a plane to voxel space, where its normal has length 1.
 kernel::ClipPlaneView viewOf(const ClipPlane& plane, const Grid& grid, std::uint32_t channels) {
   const glm::dvec3 unit =
       plane.normal / std::max({std::abs(plane.normal.x), std::abs(plane.normal.y), std::abs(plane.normal.z)});
@@ -65,7 +65,7 @@ kernel::ClipPlaneView viewOf(const ClipPlane& plane, const Grid& grid, std::uint
   const double length = glm::length(normal);
   normal /= length;
   offset /= length;
-  constexpr double kFarthest = 1e30;  // so far all of the volume is on one side
+  constexpr double kFarthest = 1e30;  // so far away that the whole volume is on one side
   return {glm::vec3(normal), float(std::clamp(offset, -kFarthest, kFarthest)), channels};
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a scene's clip planes and crop to what kernels need of them.
+// Converts a scene's clip planes and crop to the form that kernels use.
 #pragma once
 #include <optional>
 #include <span>
@@ -10,10 +10,12 @@
 
 namespace scolopax {
 
-/// Throws Error(badInput) for a plane or channel that cannot be, and for crop planes that are out of order.
+/// Throws Error(badInput) for too many planes, for a plane that is not finite or has a zero normal, for a
+/// channel that does not exist, and for crop planes that are not finite or out of order.
 void checkClipping(std::span<const ClipPlane> planes, const std::optional<Crop>& crop, std::size_t channels);
 
-/// What is left of the volume and of the given channels, by their order; nothing if nothing is.
+/// The part of the volume that remains, in voxel coordinates. Bit n of a plane's channels stands for
+/// visible[n], an index in the volume. None if nothing remains.
 std::optional<kernel::ClipView> clipView(std::span<const ClipPlane> planes, const std::optional<Crop>& crop,
                                          const Grid& grid, std::span<const int> visible);
 

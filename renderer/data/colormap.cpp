@@ -64,7 +64,7 @@ std::vector<ColorKnot> gray() {
   return fromSrgb8(colors);
 }
 
-/// OpenImageIO keeps the perceptual maps, as linear values.
+/// The perceptual maps come from OpenImageIO, as linear values.
 std::vector<ColorKnot> fromOpenImageIo(std::string_view name) {
   constexpr int kSteps = 256;
   OIIO::ImageBuf ramp(OIIO::ImageSpec(kSteps, 1, 1, OIIO::TypeDesc::FLOAT));
@@ -95,7 +95,8 @@ std::vector<ColorKnot> colormapKnots(std::string_view name) {
     if (map.name == name) return fromOpenImageIo(name);
     known += (known.empty() ? "" : ", ") + std::string(map.name);
   }
-  throw Error(ErrorCode::notFound, "colormap '" + std::string(name) + "' is not known; there are " + known);
+  throw Error(ErrorCode::notFound,
+              "colormap: expected one of " + known + ", found '" + std::string(name) + "'");
 }
 
 }  // namespace scolopax

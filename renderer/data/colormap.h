@@ -10,10 +10,10 @@
 
 namespace scolopax {
 
-/// Names and what they are, in the order of menus.
+/// Names and descriptions, in menu order.
 std::span<const NamedValue> colormaps();
 
-/// The knots of a named map; throws Error(notFound) naming the known ones.
+/// The knots of a named map. Throws Error(notFound), listing the known names.
 std::vector<ColorKnot> colormapKnots(std::string_view name);
 
 }  // namespace scolopax

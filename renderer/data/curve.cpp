@@ -14,9 +14,9 @@
 namespace scolopax {
 namespace {
 
-constexpr std::size_t kMaxKnots = 4096;  // indices, of both curves together, fit the buckets' 16 bits
+constexpr std::size_t kMaxKnots = 4096;  // indices of both curves' knots together fit the buckets' 16 bits
 
-/// Last knot at or before each bucket's start, or 0.
+/// For each bucket, the last knot at or before its start, or 0.
 template <class PositionOf>
 std::vector<std::uint16_t> bucketsOf(std::size_t knots, PositionOf&& positionOf) {
   std::vector<std::uint16_t> buckets;
@@ -29,7 +29,7 @@ std::vector<std::uint16_t> bucketsOf(std::size_t knots, PositionOf&& positionOf)
   return buckets;
 }
 
-/// Value of a curve to the left of p: it differs from that at p where a curve jumps.
+/// Limit of a curve at p from the left; it differs from the value at p where the curve jumps.
 template <class Value>
 Value valueBefore(const Curve<Value>& curve, float p) {
   const auto at = std::lower_bound(curve.positions.begin(), curve.positions.end(), p);
@@ -43,8 +43,8 @@ Value valueBefore(const Curve<Value>& curve, float p) {
 template <class Knot>
 void checkPositions(const std::vector<Knot>& knots, const char* what) {
   if (knots.empty() || knots.size() > kMaxKnots)
-    throw Error(ErrorCode::badInput, std::string(what) + ": from 1 to " + std::to_string(kMaxKnots) +
-                                         " points are possible, found " + std::to_string(knots.size()));
+    throw Error(ErrorCode::badInput, std::string(what) + ": expected 1 to " + std::to_string(kMaxKnots) +
+                                         " points, found " + std::to_string(knots.size()));
   double last = 0;
   for (const Knot& knot : knots) {
     if (!(knot.position >= last && knot.position <= 1))
@@ -55,7 +55,7 @@ void checkPositions(const std::vector<Knot>& knots, const char* what) {
   }
 }
 
-/// Knots of a checked list, by the value of each.
+/// The curve of a checked list of knots; `valueOf` gives the value of each.
 template <class Value, class Knot, class ValueOf>
 Curve<Value> curveOf(const std::vector<Knot>& knots, ValueOf&& valueOf) {
   Curve<Value> curve;
@@ -115,7 +115,7 @@ OpticalCurve makeOpticalCurve(const Curve<float>& opacity, const Curve<glm::vec3
     return curve;
   }
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  // Where the curve jumps up the position of the jump itself is opaque.
+  // If the curve jumps up there, the position of the jump itself has opacity.
   curve.first = first == curve.knots.begin()                    ? -kInfinity
                 : std::prev(first)->position == first->position ? std::nextafter(first->position, -kInfinity)
                                                                 : std::prev(first)->position;
@@ -124,8 +124,8 @@ OpticalCurve makeOpticalCurve(const Curve<float>& opacity, const Curve<glm::vec3
 }
 
 Placement::Placement(double lo, double hi, bool rising) {
-  // The origin is a float near the range, what rounding it loses goes to the offset: 280 to 310 K, or a
-  // spread of a few ulp, keep all the resolution that the voxels have.
+  // The origin is a float near the range, and its rounding error goes into the offset: a range of 280 to 310
+  // K, or of a few ulp, keeps the full resolution of the voxels.
   constexpr double kLimit = 0x1p126, kFarthest = 1e300;
   lo = std::clamp(lo, -kFarthest, kFarthest);
   hi = std::clamp(hi, -kFarthest, kFarthest);
@@ -136,7 +136,7 @@ Placement::Placement(double lo, double hi, bool rising) {
     offset = float((double(origin) - lo) * perUnit);
     return;
   }
-  // The origin is the last float at which the position may still be 1.
+  // The origin is the outermost float at which the position is still 1.
   const float infinity = std::numeric_limits<float>::infinity();
   if (rising && double(origin) < lo) origin = std::nextafter(origin, infinity);
   if (!rising && double(origin) > lo) origin = std::nextafter(origin, -infinity);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Piecewise-linear curves in the form that kernels evaluate, and where values lie on them.
+// Piecewise-linear curves in the form that kernels evaluate, and the mapping from values to positions on
+// them.
 #pragma once
 #include <glm/vec3.hpp>
 #include <vector>
@@ -20,24 +21,25 @@ struct Curve {
   }
 };
 
-/// Owner of both curves on the knots of both.
+/// Owner of the opacity and colour curves, both given at the knots of either.
 struct OpticalCurve {
   std::vector<kernel::OpticalKnot> knots;
   std::vector<std::uint16_t> buckets;
-  float first = 0, last = 1;  ///< no opacity at positions up to `first` and from `last` on
+  float first = 0, last = 1;  ///< opacity is 0 at positions <= first and >= last
   kernel::OpticalCurveView view() const {
     return {knots.data(), buckets.data(), int(knots.size()), first, last};
   }
 };
 
-/// Throws Error(badInput), naming the curve, for no knots or too many, positions that decrease or lie outside
-/// [0,1], and values of opacity outside [0,1].
+/// Throws Error(badInput), naming the curve, for no knots or more than 4096, positions that decrease or lie
+/// outside [0,1], and opacities outside [0,1].
 Curve<float> makeCurve(const std::vector<OpacityKnot>& knots, const char* name);
 Curve<glm::vec3> makeCurve(const std::vector<ColorKnot>& knots, const char* name);
 OpticalCurve makeOpticalCurve(const Curve<float>& opacity, const Curve<glm::vec3>& color);
 
-/// Where a value lies on curves over the range from lo to hi: at clamp((value - origin) * scale + offset, 0,
-/// 1). lo == hi is a step: of `rising`, 0 below and 1 from lo on; else 1 up to lo and 0 above.
+/// Maps a value to its position on curves over the range from lo to hi: clamp((value - origin) * scale +
+/// offset, 0, 1). If lo == hi, this is a step: with `rising`, 0 below lo and 1 from lo on; otherwise 1 up to
+/// lo and 0 above.
 struct Placement {
   float origin, scale, offset;
   Placement(double lo, double hi, bool rising);

@@ -7,11 +7,11 @@
 namespace scolopax {
 namespace {
 
-/// Optical depth of a typical structure of all channels together: the outside is clear to see, the inside
-/// still shows.
+/// Optical depth of a typical structure, all channels together: the outside is clearly visible, and the
+/// inside still shows through.
 constexpr double kStructureDepth = 6.0;
 
-/// Share of the voxels below the default range.
+/// Share of the voxels below the default range, for a single channel and for each of several.
 constexpr double kBelowOnly = 0.5, kBelowEach = 0.92;
 
 }  // namespace
@@ -27,7 +27,7 @@ ValueRange defaultRange(const Volume& volume, int channel) {
 }
 
 std::array<std::uint8_t, 3> defaultColor(int index) {
-  // Bright on black, far apart in hue, also for the two common kinds of colour blindness in the first four.
+  // Bright on black and far apart in hue; the first four also for the two common kinds of colour blindness.
   static constexpr std::array<std::uint8_t, 3> kColors[] = {
       {0xff, 0x5a, 0x3c}, {0x35, 0xc9, 0xff}, {0xff, 0xd1, 0x3b}, {0xc5, 0x7b, 0xff},
       {0x3d, 0xe0, 0x8a}, {0xff, 0x7a, 0xc6}, {0x4a, 0x7d, 0xff}, {0xff, 0x9d, 0x2e},

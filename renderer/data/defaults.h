@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a scene that says nothing looks like: chosen from the data alone, never from the user's edits, so
-// that one edit does not move another value.
+// The default appearance. It is chosen from the data alone, never from the user's edits, so that editing one
+// value does not change another.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -15,14 +15,14 @@ struct ValueRange {
   double lo, hi;  ///< data units, lo < hi
 };
 
-/// By percentile, never empty: of an only channel the upper half of its values, of several the top twelfth of
-/// each, so that what they mark shows instead of what they have in common.
+/// By percentile, never empty. A single channel shows the upper half of its values; each of several channels
+/// shows its top 8 %, so that what distinguishes them is visible rather than what they have in common.
 ValueRange defaultRange(const Volume& volume, int channel);
 
 /// sRGB bytes, distinct for neighbouring indices.
 std::array<std::uint8_t, 3> defaultColor(int index);
 
-/// Colour map of the only channel of a volume; several channels have one colour each.
+/// Colour map of a volume's only channel; with several channels, each has a single colour.
 inline constexpr std::string_view kDefaultColormap = "plasma";
 
 /// Density, per world unit, at which a linear ramp over the default range shows both the outside and some of

@@ -34,8 +34,8 @@ void Film::reset(int width, int height) {
     replicate_.resize(count);
     replicateSquares_.resize(count);
   } catch (const std::bad_alloc&) {
-    throw Error(ErrorCode::tooLarge,
-                "image: no memory for " + std::to_string(width) + "x" + std::to_string(height));
+    throw Error(ErrorCode::tooLarge, "image: not enough memory for " + std::to_string(width) + "x" +
+                                         std::to_string(height) + " pixels");
   }
 }
 
@@ -85,7 +85,7 @@ double Film::estimatedError() const {
   if (samples_ < 2) return std::numeric_limits<double>::quiet_NaN();
   const std::uint32_t replicates = samples_ / kernel::kReplicateSamples;
   const bool enough = replicates >= kEnoughReplicates;
-  // Parts of a pixel's sum that are independent of each other, and their number.
+  // Number of independent parts of a pixel's sum: complete replicates, or single samples.
   const double n = enough ? replicates : samples_;
   const auto add = [&](const tbb::blocked_range<std::size_t>& range, double sum) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
@@ -95,11 +95,12 @@ double Film::estimatedError() const {
     }
     return sum;
   };
-  // Squared, of the parts, over pixels and components; the same bits for any number of threads.
+  // Squared deviations of the parts, summed over pixels and components; the same bits for any number of
+  // threads.
   const double deviations = tbb::parallel_deterministic_reduce(
       tbb::blocked_range<std::size_t>(0, sum_.size(), 1 << 14), 0.0, add, std::plus<>());
   const double samplesPerPart = enough ? kernel::kReplicateSamples : 1;
-  // A replicate that has only begun counts for nothing: its samples are not yet spread as well.
+  // An incomplete replicate is not counted: its samples are not yet as evenly distributed.
   const double varianceOfMeans = deviations / (n - 1) / (samplesPerPart * samplesPerPart * n);
   return std::sqrt(varianceOfMeans / (4.0 * double(sum_.size())));
 }

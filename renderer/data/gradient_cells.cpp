@@ -39,7 +39,8 @@ class Steepness {
       for (int row = 0; row < 3; ++row) entries_[column] += std::abs(fromVoxel[column][row]);
   }
 
-  /// At samples between these voxel centres, and beyond the outer ones; 0 where none has a gradient.
+  /// Largest |gradient| at samples between these voxel centres, and beyond them where they are the outer
+  /// ones; 0 if no sample has a gradient.
   float most(const Voxels& between) const {
     const glm::ivec3 last = dims_ - 1;
     const Voxels around{glm::max(between.low - 1, 0), glm::min(between.high + 1, last)};
@@ -50,7 +51,7 @@ class Steepness {
       addSlopes(between, around, axis, &least[axis], &largest[axis], &value);
     glm::dvec3 steepest(0);
     for (int axis = 0; axis < 3; ++axis) {
-      if (least[axis] > largest[axis]) least[axis] = largest[axis] = 0;  // an axis of one voxel
+      if (least[axis] > largest[axis]) least[axis] = largest[axis] = 0;  // no slope: an axis of one voxel
       steepest[axis] = std::max(std::abs(least[axis]), std::abs(largest[axis]));
     }
     double length = 0;
@@ -71,7 +72,8 @@ class Steepness {
                 std::size_t(v.x)]);
   }
 
-  /// Slopes along an axis between neighbours that are finite.
+  /// Extends [least, largest] by the slopes along an axis between finite neighbours, and `value` by the
+  /// magnitudes of their values.
   void addSlopes(const Voxels& between, const Voxels& around, int axis, double* least, double* largest,
                  double* value) const {
     Voxels from = between;
@@ -88,7 +90,7 @@ class Steepness {
     });
   }
 
-  /// By central differences; 0 where one is not finite.
+  /// |gradient| at a voxel by central differences; 0 if it is not finite.
   double lengthAt(glm::ivec3 v) const {
     glm::dvec3 change;
     for (int axis = 0; axis < 3; ++axis) {
@@ -100,8 +102,8 @@ class Steepness {
     return std::isfinite(length) ? length : 0.0;
   }
 
-  /// Adds what rounding may: of each of the two samples of a difference as slackFor() of macrocell_grid.cpp,
-  /// of their places by the slope, and of the way to world space.
+  /// Adds the largest possible rounding error: of the two samples of every difference (as slackFor() in
+  /// macrocell_grid.cpp), of their positions (times the slope), and of the transform to world space.
   float roundedUp(double length, const glm::dvec3& steepest, double value) const {
     if (steepest == glm::dvec3(0)) return 0.0f;
     double slack = 0;
@@ -117,7 +119,7 @@ class Steepness {
   const StridedVoxels<T>& voxels_;
   glm::ivec3 dims_;
   glm::dmat3 fromVoxel_;
-  glm::dvec3 entries_{0};  // of the matrix's columns: sums of magnitudes
+  glm::dvec3 entries_{0};  // per column of the matrix: sum of magnitudes
 };
 
 }  // namespace

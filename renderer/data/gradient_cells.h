@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Per macrocell: an upper bound of |gradient| over all samples in the cell. Made from a Volume once for
+// Per macrocell: an upper bound of |gradient| over all samples in the cell. Built from a Volume once, for
 // channels whose opacity depends on the gradient; bound_columns reads it.
 #pragma once
 #include <stop_token>
@@ -15,12 +15,13 @@ struct GradientCells {
   std::size_t sizeBytes() const { return cells.size(); }
 };
 
-/// Measures one channel in macrocells of `size` voxels on an edge. What the kernels compute in float
-/// (kernel/gradient.h) is bounded, rounding included.
+/// Measures one channel in macrocells with edges of `size` voxels. The bounds hold for what the kernels
+/// compute in float (kernel/gradient.h), rounding included.
 ///
 /// Where no difference is one-sided, the gradient of the trilinear interpolant by central differences is the
-/// trilinear interpolation of the voxels' gradients, and no longer than the longest of them. At the border
-/// every difference is a mean of slopes between neighbours along its axis, which bounds each component.
+/// trilinear interpolation of the voxels' gradients, so it is no longer than the longest of them. At the
+/// border every difference is a mean of slopes between neighbouring voxels along its axis, so these slopes
+/// bound each component.
 /// Throws Error(cancelled) once `stop` is requested.
 GradientCells buildGradientCells(const Volume& volume, int channel, int size,
                                  const std::stop_token& stop = {});

@@ -10,7 +10,7 @@
 namespace scolopax {
 namespace {
 
-/// Of a gradient in data units per world unit: stored values per smallest spacing.
+/// Factor from data units per world unit to stored values per smallest spacing.
 double storedPerSpacing(const Channel& channel, const Grid& grid) {
   return grid.smallestSpacing() / std::abs(channel.slope);
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The curve by which the gradient's magnitude changes a channel's opacity, in the form the kernels evaluate.
+// The curve that scales a channel's opacity by the gradient's magnitude, in the form that the kernels
+// evaluate.
 #pragma once
 #include "renderer/data/curve.h"
 #include "renderer/data/volume.h"
@@ -8,14 +9,15 @@ namespace scolopax {
 
 class GradientFactor {
  public:
-  /// Throws Error(badInput) naming what is wrong: no knots, positions that decrease, values out of range.
+  /// Throws Error(badInput), naming the fault: no knots, positions that decrease, values out of range, a
+  /// range that is not finite.
   GradientFactor(const GradientOpacity& look, const Channel& channel, const Grid& grid);
-  /// Valid as long as this object.
+  /// Valid while this object lives.
   kernel::GradientFactorView view() const;
-  /// Largest factor that the kernels find where |gradient|, of stored values per smallest spacing, is at most
-  /// this.
+  /// Largest factor that the kernels can compute where |gradient|, in stored values per smallest spacing, is
+  /// at most `magnitude`.
   float largest(float magnitude) const;
-  /// Whether the factor is `value` whatever the gradient is.
+  /// Whether the factor is `value` for every finite gradient.
   bool isEverywhere(float value) const;
 
  private:

@@ -23,7 +23,7 @@ namespace {
 constexpr std::size_t kBins = GradientHistogram::kBins;
 static_assert(kBins == Histogram::kBins);
 
-/// Of a curve's opacity, less than this is rounding of the position.
+/// An opacity up to this may be rounding of the position, and counts as 0.
 constexpr float kLeastOpacity = 1e-6f;
 
 using Rows = tbb::blocked_range<std::size_t>;
@@ -38,8 +38,8 @@ class GradientRows {
   std::size_t length() const { return std::size_t(dims_.x); }
   const T& voxel(std::size_t row, std::size_t x) const { return voxels_[row * length() + x]; }
 
-  /// |gradient|^2 of a row's voxels, in stored values per smallest spacing: Volume keeps these below 2^124,
-  /// so that their squares are finite. Not finite where the value or a difference is not.
+  /// |gradient|^2 of a row's voxels, in stored values per smallest spacing. Volume keeps stored values below
+  /// 2^124, so that the squares are finite. Not finite where the value or a difference is not.
   void squares(std::size_t row, std::vector<double>& out) const {
     const int y = int(row % std::size_t(dims_.y)), z = int(row / std::size_t(dims_.y));
     const Neighbours alongY(y, dims_.y), alongZ(z, dims_.z);
@@ -64,7 +64,7 @@ class GradientRows {
  private:
   struct Neighbours {
     int low, high;
-    double share;  ///< of their difference in the slope per voxel
+    double share;  ///< factor from their difference to the slope per voxel
     Neighbours(int at, int size)
         : low(std::max(at - 1, 0)),
           high(std::min(at + 1, size - 1)),
@@ -80,7 +80,7 @@ class GradientRows {
   glm::dmat3 fromVoxel_;
 };
 
-/// Calls visit(row, squares) for some rows.
+/// Calls visit(row, squares) for the rows of a range.
 template <class T, class Visit>
 void forRows(const GradientRows<T>& rows, const Rows& range, const std::stop_token& stop, Visit&& visit) {
   std::vector<double> squares;
@@ -91,7 +91,7 @@ void forRows(const GradientRows<T>& rows, const Rows& range, const std::stop_tok
   }
 }
 
-/// Largest |gradient|^2 of all voxels that have one.
+/// Largest finite |gradient|^2 of all voxels.
 template <class T>
 double largestSquare(const GradientRows<T>& rows, const std::stop_token& stop) {
   return tbb::parallel_reduce(
@@ -183,11 +183,11 @@ GradientHistogram measureGradientHistogram(const Volume& volume, int channel, co
 std::shared_ptr<const GradientHistogram> sharedGradientHistogram(
     const std::shared_ptr<const Volume>& volume, int channel, const std::stop_token& stop,
     const std::shared_ptr<MemoryBudget>& memory) {
-  // A weak pointer tells a new volume at an old address from the old one.
+  // A weak pointer distinguishes a new volume at an old address from the old one.
   using Builds = SharedBuilds<std::weak_ptr<const Volume>, GradientHistogram,
                               std::owner_less<std::weak_ptr<const Volume>>>;
   static std::array<Builds, std::size_t(kMaxChannels)> builds;
-  // While it is measured every thread has counts of its own.
+  // While measuring, every thread has its own counts.
   constexpr std::size_t kBytes = kBins * kBins * sizeof(std::uint64_t) + kBins * sizeof(ValueInterval);
   const auto copies = std::size_t(tbb::this_task_arena::max_concurrency() + 1);
   return builds[std::size_t(channel)].get(
@@ -229,7 +229,7 @@ double gradientQuantile(const GradientHistogram& histogram, const Channel& chann
       return (double(i) + (rank - below) / count) / double(kBins) * histogram.maximum;
     below += count;
   }
-  return 0;  // there is no voxel
+  return 0;  // no voxel was counted
 }
 
 }  // namespace scolopax

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Joint histogram of a channel's values and gradient magnitudes: for the page's plot, and for the default
-// range of GradientOpacity. A pass over the volume, made when somebody first needs it.
+// Joint histogram of a channel's values and gradient magnitudes, for the page's plot and for the default
+// range of GradientOpacity. Takes two passes over the volume, made on first use.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -14,24 +14,24 @@
 
 namespace scolopax {
 
-/// Of the voxels themselves: nothing between their centres is looked at. The gradient is that of shading,
-/// central differences of one voxel, one-sided at the border, along an axis of one voxel 0, in world space.
+/// Counts voxels; nothing is interpolated between their centres. The gradient is that of shading, in world
+/// space: central differences of one voxel, one-sided at the border, 0 along an axis of one voxel.
 struct GradientHistogram {
   static constexpr std::size_t kBins = 256;  ///< of values and of |gradient|
 
   double maximum = 0;  ///< largest |gradient|, data units per world unit; 0 where there is none
   std::uint64_t finiteCount = 0;
-  std::uint64_t nonFiniteCount = 0;  ///< voxels whose value or one of whose differences is NaN or infinite
-  /// Per bin of values, which are those of the channel's Histogram, kBins of |gradient|, of equal widths over
-  /// [0, maximum].
+  std::uint64_t nonFiniteCount = 0;  ///< voxels whose value or a difference is NaN or infinite
+  /// kBins x kBins counts, |gradient| fastest. Value bins are those of the channel's Histogram; bins of
+  /// |gradient| have equal widths over [0, maximum].
   std::vector<std::uint64_t> counts;
-  /// Least and largest stored value in each bin of values; lo > hi where it has no voxels.
+  /// Least and largest stored value in each value bin; lo > hi if the bin is empty.
   std::vector<ValueInterval> stored;
 
   std::size_t sizeBytes() const {
     return counts.size() * sizeof(std::uint64_t) + stored.size() * sizeof(ValueInterval);
   }
-  /// Counts of |gradient|, whatever the value.
+  /// Counts per bin of |gradient|, summed over all values.
   std::vector<std::uint64_t> bins() const;
 };
 
@@ -39,17 +39,19 @@ struct GradientHistogram {
 GradientHistogram measureGradientHistogram(const Volume& volume, int channel,
                                            const std::stop_token& stop = {});
 
-/// The same, shared among all who ask for this channel while somebody holds it, and measured on threads of
-/// its own. Waits; throws Error(cancelled) once `stop` is requested. Measuring ends when nobody waits for it.
-/// Its memory is of `memory`, if that is given, which may refuse it: Error(busy, tooLarge).
+/// The same, measured on threads of its own and shared by all callers that request this channel while one of
+/// them holds the result. Waits for it; throws Error(cancelled) once `stop` is requested. Measuring stops
+/// when no caller waits any more. The memory is charged to `memory`, if given; throws Error(busy) or
+/// Error(tooLarge) if it refuses.
 std::shared_ptr<const GradientHistogram> sharedGradientHistogram(
     const std::shared_ptr<const Volume>& volume, int channel, const std::stop_token& stop = {},
     const std::shared_ptr<MemoryBudget>& memory = nullptr);
 
-/// |gradient| below which the fraction p in [0,1] lies of those voxels that have opacity under a channel's
-/// curve, by linear interpolation in its bin. Bins of values count whose least and largest value have
-/// opacity; if there are none, those in which any value has; if there are none, all. 0 only where all is
-/// flat. Throws Error(badInput) for a curve that cannot be rendered.
+/// |gradient| below which a fraction p in [0,1] of the visible voxels lies, interpolated linearly within its
+/// bin. A value bin counts as visible if both its least and its largest stored value have opacity under the
+/// channel's curve; if there is no such bin, if any value in it has; if there is none either, all bins count.
+/// For p > 0 the result is 0 only if all gradients are 0. Throws Error(badInput) for a curve that cannot be
+/// rendered.
 double gradientQuantile(const GradientHistogram& histogram, const Channel& channel,
                         const ChannelAppearance& look, double p);
 

@@ -40,7 +40,7 @@ void measureIntegers(std::span<const T> voxels, double slope, double intercept, 
   const auto valueAt = [&](std::size_t i) {
     return slope * double(int(i) + int(std::numeric_limits<T>::min())) + intercept;
   };
-  std::vector<std::size_t> used;  // indices in rising data value
+  std::vector<std::size_t> used;  // indices by increasing data value
   for (std::size_t i = 0; i < counts.size(); ++i)
     if (counts[i] > 0) used.push_back(i);
   if (slope < 0) std::reverse(used.begin(), used.end());

@@ -15,22 +15,24 @@ struct Histogram {
   std::uint64_t finiteCount = 0;
   std::uint64_t nonFiniteCount = 0;  ///< NaN and infinities
   std::vector<std::uint64_t> bins;   ///< kBins, of equal widths over [minimum, maximum]
-  std::vector<double> quantiles;     ///< at i / (size - 1), from a fixed subset of at most 2^20 voxels
+  /// At i / (size - 1). Exact for integer voxels; from a fixed subset of fewer than 2^21 for float voxels.
+  std::vector<double> quantiles;
 
   /// The bin of a finite value.
   std::size_t binOf(double value) const {
-    // Halves first: the width of the range of two huge values would overflow.
+    // Halved first: the difference of two huge values would overflow.
     const double width = 0.5 * maximum - 0.5 * minimum;
     if (!(width > 0)) return 0;
     const double at = (0.5 * value - 0.5 * minimum) / width * double(kBins);
     return std::min(std::size_t(std::max(at, 0.0)), kBins - 1);
   }
-  /// Data value below which the fraction p in [0,1] of the voxels lies, by linear interpolation.
+  /// Data value below which a fraction p in [0,1] of the finite voxels lies, by linear interpolation; 0 if
+  /// there are none.
   double quantile(double p) const;
 };
 
 class VoxelBuffer;
-/// Measures voxels, as data values slope * stored + intercept.
+/// Measures the voxels' data values, slope * stored + intercept.
 Histogram measureHistogram(const VoxelBuffer& voxels, double slope, double intercept);
 
 }  // namespace scolopax

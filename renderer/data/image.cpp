@@ -18,7 +18,7 @@ const std::array<float, 256>& codeThresholds() {
   return table;
 }
 
-/// First guess by 4096 equal steps of the linear value, then at most a few comparisons.
+/// First guess for each of 4096 equal steps of the linear value; a few comparisons at most remain.
 const std::array<std::uint8_t, 4097>& firstCodes() {
   static const auto table = [] {
     std::array<std::uint8_t, 4097> t{};

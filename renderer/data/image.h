@@ -14,7 +14,7 @@ struct Image {
   std::vector<glm::vec4> pixels;  ///< width x height, top row first; linear premultiplied RGBA
 };
 
-/// 8-bit sRGB, 3 bytes a pixel, composited over `background` (linear RGB); values are clipped only here.
+/// 8-bit sRGB, 3 bytes per pixel, composited over `background` (linear RGB); values are clipped only here.
 struct Image8 {
   int width = 0, height = 0;
   std::vector<std::uint8_t> rgb;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which instance of the kernels a scene asks for: the one place where launchers turn values into types.
+// Which instance of the kernels a scene needs: the one place where launchers turn run-time values into types.
 #pragma once
 #include <type_traits>
 
 #include "renderer/data/scene.h"
 
 namespace scolopax::kernel {
-// Only named: who compiles an integrator includes it, and no other.
+// Declared only: a file that compiles an integrator includes it, and no other.
 template <class Tracker>
 struct Analog;
 struct Superposed;
@@ -24,7 +24,8 @@ struct LightFeatures;
 
 namespace scolopax {
 
-/// Returns f(std::type_identity<Integrator>{}). The method is not `automatic`: a backend chooses first.
+/// Returns f(std::type_identity<Integrator>{}). A backend normally resolves Method::automatic first; here it
+/// counts as superposed.
 template <class F>
 auto visitIntegrator(const Scene& scene, F&& f) {
   switch (scene.method) {

@@ -7,8 +7,8 @@
 
 namespace scolopax {
 
-/// directional: `vector` is where the light travels TO; point: its position, without fall-off; headlight:
-/// shines from the eye, `vector` is not used.
+/// directional: `vector` is the direction in which the light travels, away from its source; point: `vector`
+/// is its position, without fall-off; headlight: shines from the eye, `vector` is not used.
 struct Light {
   LightType type = LightType::headlight;
   glm::dvec3 vector{0, 0, -1};

@@ -16,9 +16,9 @@
 namespace scolopax {
 namespace {
 
-/// Three nested interpolations round by at most 9 * 2^-24 of the largest value among their corners. An
-/// interval of one value, and an end at zero, are exact: equal corners give no difference to round, and
-/// rounding is monotone through zero.
+/// Three nested interpolations have a rounding error of at most 9 * 2^-24 times the largest magnitude of
+/// their corners. An interval of one value, and an end at zero, are exact: equal corners give no difference
+/// to round, and rounding is monotone through zero.
 float slackFor(float largest) { return largest * 0x1p-20f; }
 
 ValueInterval widen(ValueInterval v) {
@@ -41,7 +41,7 @@ void measure(const StridedVoxels<T>& voxels, glm::ivec3 dims, const MacrocellGri
     std::vector<T> least(rowLength), most(rowLength);
     for (int y = 0; y < grid.cells.y; ++y) {
       checkWanted(stop);
-      // All rows of voxels of a row of macrocells into one: a long loop that vectorises.
+      // Reduce all voxel rows of a row of macrocells to one: a long loop that vectorises.
       std::fill(least.begin(), least.end(), kMost);
       std::fill(most.begin(), most.end(), kLeast);
       for (int k = z * grid.size; k <= std::min((z + 1) * grid.size, dims.z - 1); ++k)

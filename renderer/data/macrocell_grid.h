@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Per macrocell and channel: the interval of stored values that any sample inside can take. Made from a
-// Volume once; majorant_grid and the kernels read it.
+// Per macrocell and channel: an interval that contains the stored value of every sample inside. Built once
+// from a Volume; majorant_grid and the kernels read it.
 #pragma once
 #include <glm/common.hpp>
 #include <stop_token>
@@ -11,26 +11,27 @@
 
 namespace scolopax {
 
-/// Stored values; lo > hi where no sample of the cell is finite.
+/// An interval of stored values; lo > hi if no sample of the cell is finite.
 struct ValueInterval {
   float lo, hi;
 };
 
-/// The stored values of a channel that intervals may begin and end at.
+/// The stored values of a channel at which intervals may begin and end.
 struct ValueLevels {
-  /// Increasing, at most kernel::kMaxLevels; NaN as the last stands for cells without a finite sample.
+  /// Increasing, at most kernel::kMaxLevels. If the last one is NaN, it stands for cells without a finite
+  /// sample.
   std::vector<float> values;
-  /// How far rounding in kernel/sample_volume.h may bring a sample beyond the ends of an interval. An
-  /// interval of one value, and an end at 0, are exact. 0 where the levels already allow for it.
+  /// How far rounding in kernel/sample_volume.h may carry a sample beyond an end of its interval; 0 if the
+  /// levels already allow for it. An interval of one value, and an end at 0, are exact.
   float slack = 0;
 
   /// The stored values of an interval of levels.
   ValueInterval decode(kernel::LevelInterval interval) const;
 };
 
-/// The blocks of kernel::kBlockEdge cells on an edge that a grid of cells is divided into.
+/// Divides a grid of cells into blocks with edges of kernel::kBlockEdge cells.
 struct CellBlocks {
-  glm::ivec3 cells, size;  ///< per axis: cells of the grid, and blocks
+  glm::ivec3 cells, size;  ///< per axis: number of cells, and of blocks
   explicit CellBlocks(glm::ivec3 cellsOfGrid)
       : cells(cellsOfGrid), size((cellsOfGrid + (kernel::kBlockEdge - 1)) / kernel::kBlockEdge) {}
   std::size_t count() const { return std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z); }
@@ -54,8 +55,8 @@ struct MacrocellGrid {
   int size = 0;                     ///< voxels per edge
   glm::ivec3 cells{0};              ///< per axis; cell (i,j,k) covers voxel coordinates [i, i+1] * size
   std::vector<ValueLevels> levels;  ///< per channel of the volume
-  std::vector<kernel::LevelInterval> intervals;  ///< per cell, x fastest, those of all channels
-  std::vector<kernel::LevelInterval> blocks;     ///< the same of blocks of cells (CellBlocks): what is in any
+  std::vector<kernel::LevelInterval> intervals;  ///< per cell, x fastest: one per channel
+  std::vector<kernel::LevelInterval> blocks;     ///< per block (CellBlocks): the union over its cells
 
   std::size_t cellCount() const { return std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z); }
   std::size_t sizeBytes() const { return (intervals.size() + blocks.size()) * sizeof(kernel::LevelInterval); }
@@ -64,19 +65,19 @@ struct MacrocellGrid {
   }
 };
 
-/// How many macrocells of `size` voxels on an edge there are per axis. They lie between voxel centres: their
-/// support is size + 1 voxels an edge.
+/// Number of macrocells, with edges of `size` voxels, along each axis. They lie between voxel centres, so
+/// that the support of one is size + 1 voxels per edge.
 glm::ivec3 macrocellsOf(glm::ivec3 dims, int size);
 
-/// Measures all channels. An interval covers the voxels whose interpolation reaches into the cell, from the
-/// last level at or below the least of them to the first at or above the largest. Every value is a level
-/// where a channel's intervals have no more than kMaxLevels ends; else one half of the levels divides the
-/// range evenly, so that no interval grows by more than 1/127 of it at an end, and the other half follows the
-/// values' density.
+/// Measures all channels. The interval of a cell covers the voxels that interpolation inside the cell reads,
+/// from the last level at or below the least of them to the first at or above the largest. If the intervals
+/// of a channel have at most kMaxLevels different ends, each of them is a level. Otherwise one half of the
+/// levels divides the range evenly, so that no interval grows at either end by more than 1/127 of the range,
+/// and the other half follows the density of the ends.
 /// Throws Error(cancelled) once `stop` is requested.
 MacrocellGrid buildMacrocells(const Volume& volume, int size, const std::stop_token& stop = {});
 
-/// Intervals of all channels in a grid of this size.
+/// Number of intervals, over all cells and channels, in a grid with cells of this size.
 std::size_t intervalCount(const Volume& volume, int size);
 
 }  // namespace scolopax

@@ -16,16 +16,17 @@ using kernel::kMaxLevels;
 using kernel::LevelInterval;
 using kernel::TotalCode;
 
-/// The intervals of one channel over which two tables may differ: those that reach `first` and begin no later
-/// than `last`.
+/// The intervals of one channel over which two tables may differ: those that reach level `first` and begin no
+/// later than level `last`.
 struct Change {
   int column, first, last;
   bool meets(LevelInterval v) const { return v.hi >= first && v.lo <= last; }
 };
 
-/// Adds where the tables differ; null: nothing can be seen of the channel.
+/// Appends the range of levels in which the tables differ; null is the table of a channel that is not
+/// visible.
 void addChange(const BoundTable* before, const BoundTable* after, std::vector<Change>& changes) {
-  // Levels and the gaps between them in turn: 2i is level i, 2i + 1 the gap above it.
+  // Levels and gaps alternate: 2i is level i, 2i + 1 the gap above it.
   int first = 2 * kMaxLevels, last = -1;
   for (int i = 0; i < 2 * kMaxLevels; ++i) {
     const float a = before ? before->largest[i % 2][i / 2] : 0.0f,
@@ -37,7 +38,7 @@ void addChange(const BoundTable* before, const BoundTable* after, std::vector<Ch
   if (last >= 0) changes.push_back({(before ? before : after)->column, (first + 1) / 2, last / 2});
 }
 
-/// Calls f(block) for all, from many threads.
+/// Calls f(block) for all blocks, from many threads.
 template <class F>
 void forBlocks(const CellBlocks& blocks, F&& f) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.count(), 256), [&](const auto& range) {
@@ -45,8 +46,9 @@ void forBlocks(const CellBlocks& blocks, F&& f) {
   });
 }
 
-/// From 0 for blocks that are not empty, and kMaxEmptyRadius for the others, to the distance of each to the
-/// nearest that is not empty: the largest of the distances along the axes, and so found axis by axis.
+/// In: 0 for blocks that are not empty, kMaxEmptyRadius for the others. Out: the distance of each block to
+/// the nearest that is not empty, at most kMaxEmptyRadius. The distance is the largest along any axis, so it
+/// is found axis by axis.
 void measureRadii(glm::ivec3 size, std::vector<std::uint8_t>& radii, std::vector<std::uint8_t>& scratch) {
   std::size_t stride = 1;
   for (int axis = 0; axis < 3; ++axis) {
@@ -68,7 +70,7 @@ void measureRadii(glm::ivec3 size, std::vector<std::uint8_t>& radii, std::vector
   }
 }
 
-/// `over` bounds a level, and two neighbouring levels and all between them.
+/// `over` must bound a single level, and two neighbouring levels with everything between them.
 template <class Over>
 BoundTable tableOfLevels(const ValueLevels& levels, int column, Over&& over) {
   BoundTable table{};
@@ -104,11 +106,11 @@ BoundTable boundsOfExtinction(const ValueLevels& levels, int column) {
                        [&](kernel::LevelInterval interval) { return levels.values[interval.hi]; });
 }
 
-/// What is worked out per macrocell.
+/// What is computed per macrocell.
 struct MajorantGrid::Totals {
-  std::vector<TotalCode> codes;       ///< and two more: processors gather pairs of them
+  std::vector<TotalCode> codes;       ///< per cell, and two more: gathers read them in pairs
   std::vector<std::uint8_t> radii;    ///< per block
-  std::vector<std::uint32_t> active;  ///< bits of the visible channels; empty unless they are kept apart
+  std::vector<std::uint32_t> active;  ///< per cell: bits of its active channels; empty unless apart
   glm::ivec3 filledLow{0}, filledHigh{0};
 
   Totals(std::size_t cells, std::size_t blocks, bool apart)
@@ -119,7 +121,7 @@ struct MajorantGrid::Totals {
   void measureFilled(glm::ivec3 blocks, glm::ivec3 cells);
 };
 
-/// What an edit changes of the totals.
+/// Which totals an edit changes.
 struct MajorantGrid::Changes {
   bool all;
   std::vector<Change> some;
@@ -137,7 +139,7 @@ MajorantGrid::MajorantGrid(std::shared_ptr<const MacrocellGrid> macrocells, std:
       sums_(sums) {
   apart = apart || macrocells_->levels.size() > kFewColumns;
   const Changes changes = before ? changesSince(*before, apart) : Changes{true, {}};
-  // There may be channels more or less that have no extinction anywhere.
+  // Channels without any extinction may have come or gone: that changes no total.
   if (!changes.all && changes.some.empty()) {
     totals_ = before->totals_;
     return;
@@ -151,7 +153,7 @@ MajorantGrid::MajorantGrid(std::shared_ptr<const MacrocellGrid> macrocells, std:
 
 MajorantGrid::Changes MajorantGrid::changesSince(const MajorantGrid& before, bool apart) const {
   const std::vector<BoundTable>&now = *tables_, &then = *before.tables_;
-  // Bits of channels count visible ones: where others are visible than before, all change.
+  // Bits number the visible channels: if other channels are visible than before, every cell changes.
   const bool renumbered =
       apart && !std::equal(now.begin(), now.end(), then.begin(), then.end(),
                            [](const BoundTable& a, const BoundTable& b) { return a.column == b.column; });
@@ -164,14 +166,14 @@ MajorantGrid::Changes MajorantGrid::changesSince(const MajorantGrid& before, boo
   return changes;
 }
 
-/// Brings the totals up to date; returns of how many cells.
+/// Updates the totals; returns the number of cells that were recomputed.
 std::size_t MajorantGrid::rebuild(const Changes& changes, Totals& totals) const {
   const CellBlocks blocks(macrocells_->cells);
   const std::size_t columns = macrocells_->levels.size();
   std::vector<std::uint8_t> radii(blocks.count()), scratch(blocks.count()), stale(blocks.count());
   std::atomic<std::size_t> touched = 0;
-  std::atomic<bool> other = changes.all;  // whether other blocks are empty than before
-  // Blocks first: most of them have none of the values that an edit changes.
+  std::atomic<bool> other = changes.all;  // whether the set of empty blocks changes
+  // Blocks first: most of them contain no value that an edit changes.
   forBlocks(blocks, [&](std::size_t block) {
     radii[block] = totals.radii[block] > 0 ? kernel::kMaxEmptyRadius : 0;
     if (!changes.meet(&macrocells_->blocks[block * columns])) return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Upper bounds of the extinction per macrocell. An edit makes new ones: of a channel's curve, it costs a new
-// table of that channel, the totals of those cells whose values it changes, and a copy of the others'.
+// Upper bounds of the extinction per macrocell. After an edit of a channel's curve, only that channel's table
+// and the totals of the cells whose bounds it changes are computed anew; the other totals are copied.
 #pragma once
 #include <memory>
 #include <vector>
@@ -11,25 +11,25 @@
 
 namespace scolopax {
 
-/// Bounds of the channel in `column` of the macrocells. For every sample x of a cell, in float: extinction(x)
-/// <= over(the cell's interval), which is the least upper bound over the interval's stored values.
+/// Bounds of the channel in `column` of the macrocells. Every sample x of a cell satisfies, in float,
+/// extinction(x) <= over(the cell's interval), the least upper bound over the interval's stored values.
 kernel::BoundTable buildBounds(const ValueLevels& levels, const TransferFunction& transfer, int column);
 
-/// Bounds of a channel whose column of the macrocells has levels of the extinction itself.
+/// Bounds of a channel whose column of the macrocells holds levels of the extinction itself.
 kernel::BoundTable boundsOfExtinction(const ValueLevels& levels, int column);
 
 class MajorantGrid {
  public:
-  /// Of the visible channels' tables, in the order of the channels, and the macrocells they belong to.
-  /// `sums`: the channels' extinctions add up; else the largest hides the others. `apart`: kernels need to
-  /// know of every cell which channels are active. What is as it was in `before`, if that is given, is not
-  /// worked out again, and shared where nothing is new. The memory is of the budget, if there is one.
+  /// `tables`: one per visible channel, in the order of the channels, each for a column of `macrocells`.
+  /// `sums`: the channels' extinctions add up; otherwise the largest hides the others. `apart`: kernels need
+  /// to know which channels are active in each cell. Totals that are as in `before`, if given, are not
+  /// recomputed, and all are shared with it if none has changed. The memory is charged to `memory`, if given.
   MajorantGrid(std::shared_ptr<const MacrocellGrid> macrocells, std::vector<kernel::BoundTable> tables,
                bool sums, bool apart, const MajorantGrid* before = nullptr,
                const std::shared_ptr<MemoryBudget>& memory = nullptr);
-  /// In how many cells the total was worked out.
+  /// Number of cells whose total was recomputed.
   std::size_t cellsRebuilt() const { return cellsRebuilt_; }
-  /// Valid while a copy of this lives.
+  /// Valid while this object or a copy of it lives.
   kernel::MajorantView view() const;
 
  private:
@@ -46,7 +46,7 @@ class MajorantGrid {
   std::shared_ptr<const Totals> totals_;
   std::size_t cellsRebuilt_ = 0;
 
-  /// Of so many channels all are looked at where one may be something, if that gives the same picture.
+  /// Up to this many columns, kernels test all channels wherever one may be active, unless `apart` is set.
   static constexpr std::size_t kFewColumns = 4;
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What measurements of volumes have in common: they end when nobody wants them, and run beside what renders.
+// What measurements of volumes have in common: they stop when nobody needs the result, and run beside
+// rendering at low priority.
 #pragma once
 #include <tbb/task_arena.h>
 
@@ -17,14 +18,14 @@ namespace scolopax {
 /// Throws Error(cancelled) once `stop` is requested.
 inline void checkWanted(const std::stop_token& stop) {
   if (stop.stop_requested())
-    throw Error(ErrorCode::cancelled, "what was to be measured is not wanted any more");
+    throw Error(ErrorCode::cancelled, "measurement cancelled: its result is no longer needed");
 }
 
-/// A SharedBuilds::Make that runs measure(stop) at low priority, on as many threads as this one may use.
-/// `bytes` of the budget are its while it runs, then result.sizeBytes().
+/// A SharedBuilds::Make that runs measure(stop) at low priority, on as many threads as the calling thread may
+/// use. It charges `bytes` to the budget while it runs, then result.sizeBytes().
 template <class Result, class Measure>
 auto measuring(const std::shared_ptr<MemoryBudget>& memory, std::size_t bytes, Measure measure) {
-  const int threads = tbb::this_task_arena::max_concurrency();  // as many as whoever asked first may have
+  const int threads = tbb::this_task_arena::max_concurrency();  // as many as the first requester may use
   return [=](const std::stop_token& abandoned) {
     lowerThreadPriority();
     auto share = MemoryBudget::take(memory, MemoryUse::grids, bytes);

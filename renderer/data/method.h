@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The lists that the schema's enums, --help, /capabilities and the page's menus are filled from.
+// The lists from which the schema's enums, --help, /capabilities and the page's menus are filled.
 #pragma once
 #include <cstddef>
 #include <span>
@@ -7,8 +7,8 @@
 
 namespace scolopax {
 
-/// One line per entry: C++ name, wire name, what it is. Adding a tracker or blend mode is a line here and a
-/// struct in renderer/kernel; the instantiations expand these lists.
+/// One line per entry: C++ name, wire name, description. To add a tracker or blend mode, add a line here and
+/// a struct in renderer/kernel; the instantiations expand these lists.
 #define SCOLOPAX_BLEND_MODES(X) /* Eq. 6-7; Eq. 8-9; Eq. 8 and 10; section 4.2 */                          \
   X(density, "density",                                                                                    \
     "all channels share the space: each is seen through the others, and where they overlap their colours " \

@@ -9,13 +9,13 @@ namespace scolopax {
 namespace {
 constexpr int kLeastSide = 2;
 constexpr std::size_t kMaxRays = std::size_t(kMaxPickPixels) * kLeastSide * kLeastSide;
-/// A pixel of which a smaller share of samples ends shows nothing. Well below one half: what is faint, but
-/// seen, can be picked.
+/// A pixel shows nothing if fewer than one in this many of its samples have a collision. One in sixteen is
+/// well below one half, so that what is faint but visible can be picked.
 constexpr std::size_t kLeastShare = 16;
 }  // namespace
 
 std::vector<glm::ivec2> pixelsToPick(const PixelArea& area) {
-  // As many columns and rows as there are, or in the proportion of the area.
+  // All columns and rows, or a lattice in the proportions of the area.
   const double proportion = double(area.width) / double(area.height);
   int columns = std::clamp(int(std::sqrt(kMaxPickPixels * proportion)), 1, area.width);
   const int rows = std::clamp(kMaxPickPixels / columns, 1, area.height);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is visible at a place of the picture: which pixels are looked at, and which of their samples tells
-// what is seen there. A backend takes the samples.
+// Picking: what is visible at a place of the picture. Chooses which pixels are sampled, and which sample
+// represents a pixel. A backend takes the samples.
 #pragma once
 #include <chrono>
 #include <cstddef>
@@ -14,25 +14,26 @@
 
 namespace scolopax {
 
-/// Pixels of a picture, at least one; none outside of it.
+/// A rectangle of at least one pixel, inside the picture.
 struct PixelArea {
   int left = 0, top = 0, width = 1, height = 1;
 };
 
-/// Pixels that one pick looks at, at most.
+/// Most pixels that one pick samples.
 inline constexpr int kMaxPickPixels = 1024;
 
-/// Those of the area that are looked at, in reading order: all, or a regular lattice of them.
+/// The pixels of the area that are sampled, in reading order: all, or a regular lattice of them if there are
+/// more than kMaxPickPixels.
 std::vector<glm::ivec2> pixelsToPick(const PixelArea& area);
 
-/// Samples lie in a square in each pixel: side of it, 8 for up to 64 pixels, 4 for up to 256, and 2. So there
-/// are never more than 4096.
+/// Side of the square of samples in each pixel: 8 for up to 64 pixels, 4 for up to 256, 2 for more. So one
+/// pick never takes more than 4096 samples.
 int pickSamplesSide(std::size_t pixels);
 inline constexpr int kMaxPickSamplesSide = 8;
 
-/// The sample of a pixel that tells what is visible there: of those that end in the channel in which most
-/// end (of equal ones the first), the one of median depth (the nearer of two). None where fewer than one in
-/// sixteen meets anything.
+/// The sample that represents a pixel: among those that end in the channel in which most end (the first of
+/// equals), the one of median depth (the nearer of two). None if fewer than one sample in sixteen has a
+/// collision.
 std::optional<std::size_t> visibleSample(std::span<const kernel::FirstCollision> samples);
 
 /// What is visible at a pixel.
@@ -43,15 +44,15 @@ struct Picked {
   double depth;      ///< world units from the eye, along the view direction
 };
 
-/// A pick on its way.
+/// A pick in progress.
 class Picking {
  public:
   virtual ~Picking() = default;
-  /// Goes on until all samples are taken; false when the budget, which is looked at every few of them,
-  /// was used up before.
+  /// Continues until all samples are taken and returns true, or returns false if the budget is used up first.
+  /// The budget is checked every few samples.
   virtual bool run(std::chrono::nanoseconds budget) = 0;
-  /// What is visible at pixelsToPick(), in their order, without those that show nothing; once run() has
-  /// returned true.
+  /// What is visible at pixelsToPick(), in their order, without pixels that show nothing. Call it after run()
+  /// has returned true.
   virtual const std::vector<Picked>& found() const = 0;
 };
 

@@ -17,20 +17,20 @@ namespace {
 
 static_assert(kMaxChannels <= kernel::kMaxVisibleChannels);
 
-/// Whether the same voxels have the same extinction: what bounds depend on.
+/// Whether two appearances give the same voxels the same extinction, on which the bounds depend.
 bool sameExtinction(const ChannelAppearance& a, const ChannelAppearance& b) {
   return a.rangeLo == b.rangeLo && a.rangeHi == b.rangeHi && a.gamma == b.gamma && a.density == b.density &&
          a.opacity == b.opacity && a.gradientOpacity == b.gradientOpacity;
 }
 
-/// Whether both scenes make the same film: everything but the background, which is added to the finished
-/// image.
+/// Whether both scenes make the same film. They may differ only in the background, which is added to the
+/// finished image.
 bool samePicture(Scene a, const Scene& b) {
   a.background = b.background;
   return a == b;
 }
 
-/// Whether the bound of all channels together is the sum of theirs.
+/// Whether the bound of all channels together is the sum of their bounds.
 bool sumsExtinction(BlendMode blend) { return blend != BlendMode::max && blend != BlendMode::mix; }
 
 [[noreturn]] void fail(const std::string& what) { throw Error(ErrorCode::badInput, what); }
@@ -53,7 +53,7 @@ void checkScene(const Scene& scene, const Volume& volume) {
          std::to_string(scene.channels.size()));
   checkImageSize(scene);
   if (scene.lights.size() > std::size_t(kernel::kMaxLights))
-    fail("lights: at most " + std::to_string(kernel::kMaxLights) + " are possible, found " +
+    fail("lights: expected at most " + std::to_string(kernel::kMaxLights) + ", found " +
          std::to_string(scene.lights.size()));
   for (const Light& light : scene.lights) checkLight(light);
   checkClipping(scene.clip, scene.crop, volume.channels().size());
@@ -68,15 +68,15 @@ static_assert(int(LightType::directional) == int(kernel::LightKind::directional)
               int(LightType::point) == int(kernel::LightKind::point) &&
               int(LightType::headlight) == int(kernel::LightKind::headlight));
 
-/// Whether lights and shadows make any difference to what a channel shows.
+/// Whether lights or shadows change what a channel looks like.
 bool respondsToLight(const Scene& scene, const ChannelAppearance& channel) {
   const Material& m = channel.material;
   return channel.visible &&
          ((scene.shadows && m.ambient != 1) || (scene.shading && (m.diffuse > 0 || m.specular > 0)));
 }
 
-/// A point light so far away that it is the same direction for the whole box, moved to where the squares of
-/// its distance are floats.
+/// Moves a very distant point light nearer, so that the squares of its distance fit in a float. It is so far
+/// away that its direction is the same for the whole box.
 glm::dvec3 withinReach(const glm::dvec3& voxel, const Grid& grid) {
   constexpr double kFarthest = 1e12;
   const glm::dvec3 centre = glm::dvec3(grid.dims - 1) * 0.5, way = voxel - centre;
@@ -84,7 +84,8 @@ glm::dvec3 withinReach(const glm::dvec3& voxel, const Grid& grid) {
   return distance > kFarthest ? centre + way * (kFarthest / distance) : voxel;
 }
 
-/// Lights to voxel space: those that shine, if there is anything that shows it.
+/// Sets the view's matrices, and its lights in voxel space: those that shine, if any channel responds to
+/// light.
 void placeLights(const Scene& scene, const Grid& grid, kernel::SceneView* view) {
   const double smallest = grid.smallestSpacing();
   view->worldFromVoxel = glm::mat3(glm::dmat3(grid.worldFromVoxel) / smallest);
@@ -97,7 +98,7 @@ void placeLights(const Scene& scene, const Grid& grid, kernel::SceneView* view) 
   const std::vector<Light> headlight(1);
   const glm::dmat4 voxelFromWorld = glm::inverse(grid.worldFromVoxel);
   for (const Light& light : scene.lights.empty() ? headlight : scene.lights) {
-    // One without intensity has no part in shading nor in the share of light that is in shadow.
+    // A light without intensity affects neither the shading nor the share of light in shadow.
     if (light.color * light.intensity == glm::dvec3(0)) continue;
     kernel::LightView& v = view->lights[view->lightCount++];
     v.kind = kernel::LightKind(light.type);
@@ -114,13 +115,14 @@ float stratumOf(Method method) { return method == Method::hybrid ? 1.0f / 8.0f :
 
 void checkImageSize(const Scene& scene) {
   if (scene.width < 1 || scene.height < 1 || scene.width > kMaxImageSide || scene.height > kMaxImageSide)
-    throw Error(ErrorCode::badInput, "image: width and height must be from 1 to " +
+    throw Error(ErrorCode::badInput, "image: expected width and height from 1 to " +
                                          std::to_string(kMaxImageSide) + ", found " +
                                          std::to_string(scene.width) + "x" + std::to_string(scene.height));
 }
 
 namespace {
-/// Whether the bounds of a channel depend on its gradients; as factorOf() and visible(), of any appearance.
+/// Whether the bounds of a channel depend on its gradients. The same decision as factorOf() and visible()
+/// make, for any appearance.
 bool needsGradients(const Channel& channel, const ChannelAppearance& appearance) {
   if (!appearance.visible || !(appearance.density > 0) || !appearance.gradientOpacity) return false;
   const auto& factor = appearance.gradientOpacity->factor;
@@ -148,7 +150,7 @@ bool RenderPlan::ChannelPlan::visible(const ChannelAppearance& appearance) const
   return appearance.visible && !transfer.invisible() && !(factor && factor->isEverywhere(0));
 }
 
-/// None where it makes no difference.
+/// None if the factor makes no difference.
 std::optional<GradientFactor> RenderPlan::factorOf(const Channel& channel,
                                                    const ChannelAppearance& appearance) const {
   if (!appearance.gradientOpacity) return std::nullopt;
@@ -188,7 +190,7 @@ void RenderPlan::planChannels(const RenderPlan* before, const std::shared_ptr<Me
   }
 }
 
-/// Bounds of the visible channels: by value, or by a column behind those of the channels.
+/// Bounds of the visible channels, by value or by an appended column.
 std::vector<kernel::BoundTable> RenderPlan::boundTables() const {
   std::vector<kernel::BoundTable> tables;
   int column = int(macrocells_->levels.size());
@@ -199,9 +201,9 @@ std::vector<kernel::BoundTable> RenderPlan::boundTables() const {
   return tables;
 }
 
-/// Whether packets need to know every ray's channels: where channels hide each other, where clipping differs
-/// between channels or regions, where voxels are not finite, and where an extinction depends on more than a
-/// value, so that it may be 0 at both ends of a segment and not between them.
+/// Whether packets need the active channels of every ray: if channels hide each other, if clipping differs
+/// between channels or regions, if voxels are not finite, or if an extinction depends on more than a value
+/// and so may be 0 at both ends of a segment but not between them.
 bool RenderPlan::needsApart(const kernel::ClipView& clip) const {
   const auto& all = volume_->channels();
   return (!sumsExtinction(scene_.blend) && all.size() > 1) || clip.parts || !channels_.columns.empty() ||

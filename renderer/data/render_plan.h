@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From scene to what a kernel needs and nothing else: only channels that can be seen, only what changed
-// rebuilt. A plan never changes: who renders, picks or uploads from one holds it.
+// From a scene to exactly what a kernel needs: only visible channels, and only what changed is rebuilt. A
+// plan never changes: whoever renders, picks or uploads from one holds it.
 #pragma once
 #include <memory>
 #include <optional>
@@ -14,30 +14,31 @@
 
 namespace scolopax {
 
-/// Share of a ray's light for which a method that has a step works out lighting once.
+/// Share of a ray's light for which a method with a step computes lighting once.
 float stratumOf(Method method);
-/// Throws Error(badInput) when a side is not in 1..kMaxImageSide.
+/// Throws Error(badInput) if a side is not in 1..kMaxImageSide.
 void checkImageSize(const Scene& scene);
-/// Throws Error(badInput) for a light whose numbers cannot be worked with.
+/// Throws Error(badInput) for a light whose direction is zero, whose position or direction has no finite
+/// length, or whose colour or intensity is negative or not finite.
 void checkLight(const Light& light);
-/// Throws Error(badInput) where a plan of the scene would be refused for anything but its camera and curves.
+/// Throws Error(badInput) if RenderPlan would refuse the scene for anything but its camera and curves.
 void checkScene(const Scene& scene, const Volume& volume);
 
 class RenderPlan {
  public:
-  /// Throws Error(badInput) and, once `stop` is requested, Error(cancelled). What the scene leaves as it was
-  /// in `before`, if that is given, is shared with it: of the same volume. Macrocells and what is kept of
-  /// each are of the budget of memory.
+  /// `before`, if given, is a plan of the same volume; what the scene leaves unchanged is shared with it. The
+  /// memory of macrocells and of what is kept per macrocell is charged to `memory`, if given. Throws
+  /// Error(badInput) and, once `stop` is requested, Error(cancelled).
   RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene, const RenderPlan* before = nullptr,
              const std::shared_ptr<MemoryBudget>& memory = nullptr, const std::stop_token& stop = {});
   RenderPlan(const RenderPlan&) = delete;
   RenderPlan& operator=(const RenderPlan&) = delete;
 
-  /// Whether a plan of this scene after this one takes longer than a few milliseconds.
+  /// Whether building the next plan, of `scene`, would take longer than a few milliseconds.
   bool nextTakesLong(const Scene& scene) const;
-  /// Whether a film of this plan is one of that scene.
+  /// Whether `scene` gives the same film as this plan.
   bool makesSamePicture(const Scene& scene) const;
-  /// What had to be done that was not shared.
+  /// What had to be rebuilt because it could not be shared.
   const RebuildStats& rebuilt() const { return rebuilt_; }
   const Scene& scene() const { return scene_; }
   const Grid& grid() const { return volume_->grid(); }
@@ -50,7 +51,7 @@ class RenderPlan {
   struct ChannelPlan {
     TransferFunction transfer;
     std::optional<GradientFactor> factor;
-    // None as long as the channel has not been visible with these curves.
+    // Empty until the channel is first visible with these curves.
     std::optional<kernel::BoundTable> bounds;   // by value alone
     std::shared_ptr<const BoundColumn> column;  // with the factor, if there is one
     bool visible(const ChannelAppearance& appearance) const;
@@ -60,7 +61,7 @@ class RenderPlan {
     std::vector<std::optional<ChannelPlan>> plans;
     std::vector<int> visible;
     std::vector<std::shared_ptr<const BoundColumn>> columns;
-    std::vector<std::shared_ptr<const GradientCells>> gradients;  // per channel, once they were needed
+    std::vector<std::shared_ptr<const GradientCells>> gradients;  // per channel, once needed
   };
   void planChannels(const RenderPlan* before, const std::shared_ptr<MemoryBudget>& memory,
                     const std::stop_token& stop);
@@ -74,8 +75,8 @@ class RenderPlan {
   RebuildStats rebuilt_;
   std::shared_ptr<const MacrocellGrid> macrocells_;
   Channels channels_;
-  std::shared_ptr<const MacrocellGrid> bounded_;  // macrocells with the columns of channels
-  std::optional<MajorantGrid> majorants_;         // always, once it is made
+  std::shared_ptr<const MacrocellGrid> bounded_;  // macrocells with channels_.columns appended
+  std::optional<MajorantGrid> majorants_;         // set by the constructor
   std::vector<kernel::ChannelView> channelViews_;
   kernel::SceneView view_{};
 };

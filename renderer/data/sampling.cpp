@@ -17,7 +17,7 @@ constexpr Polynomial kPolynomials[] = {
     {4, 1, {1, 1, 3, 3}}, {4, 4, {1, 3, 5, 13}}, {5, 2, {1, 1, 5, 5, 17}}, {5, 4, {1, 1, 5, 5, 5}}};
 static_assert(std::size(kPolynomials) + 1 == kSobolDimensions);
 
-/// What bit k of the index adds to each coordinate.
+/// What bit k of the index contributes to each coordinate, by exclusive or.
 using Columns = std::array<std::array<std::uint32_t, 32>, kSobolDimensions>;
 constexpr Columns kColumns = [] {
   Columns columns{};
@@ -39,8 +39,8 @@ constexpr Columns kColumns = [] {
   return columns;
 }();
 
-/// The sequence's dimensions of a block's words, the best ones where most depends on them: the place in the
-/// pixel, then the first collision.
+/// The dimensions of the sequence for the words of each block. The best ones go where most depends on them:
+/// to the position in the pixel, then to the first collision.
 constexpr int kDimensions[kernel::kLowDiscrepancyBlocks][3] = {{0, 1, 8}, {2, 3, 4}, {5, 6, 7}};
 
 }  // namespace

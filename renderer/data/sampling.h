@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the samples of all pixels of a pass have in common. Launchers ask for it once a pass.
+// What the samples of all pixels of a pass have in common; launchers compute it once per pass.
 #pragma once
 #include <cstdint>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What to render, with every value resolved. Made by the server from the wire's scene and by
-// data/defaults; read by the render plan and by the reference.
+// What to render, with every value resolved. Made by the server from the wire's scene and data/defaults; read
+// by the render plan and by the reference.
 #pragma once
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -27,8 +27,8 @@ struct ColorKnot {
 
 /// Opacity by the magnitude of the gradient: |gradient| (data units per world unit) -> clamp((|gradient| -
 /// lo) / (hi - lo), 0, 1) -> a factor of the opacity, linear between knots and constant outside the first and
-/// last. Equal positions and ends are as in ChannelAppearance. The gradient is that of shading; where one of
-/// its differences is not finite the factor is 0.
+/// last. Equal positions and equal range ends are treated as in ChannelAppearance. The gradient is that of
+/// shading; where one of its differences is not finite, the factor is 0.
 struct GradientOpacity {
   double rangeLo = 0, rangeHi = 1;                  ///< data units per world unit
   std::vector<OpacityKnot> factor{{0, 0}, {1, 1}};  ///< values in [0,1]
@@ -37,7 +37,8 @@ struct GradientOpacity {
 
 /// How one channel looks. Scalar s (data units) -> clamp((s - lo) / (hi - lo), 0, 1)^gamma -> both curves,
 /// linear between knots and constant outside the first and last. Positions do not decrease; of two equal
-/// ones the later holds from there on. lo > hi reverses; lo == hi is a step: 0 below, 1 at lo and above.
+/// ones, the later knot applies from there on. lo > hi reverses the range; lo == hi is a step: 0 below lo, 1
+/// at lo and above.
 struct ChannelAppearance {
   bool visible = true;
   double rangeLo = 0, rangeHi = 1;  ///< data units
@@ -61,10 +62,10 @@ struct Scene {
   std::optional<Crop> crop;
   std::vector<Light> lights;  ///< at most kernel::kMaxLights; none means one headlight
   Method method = Method::superposed;
-  int macrocell = 4;  ///< voxels per macrocell edge
-  double step = 0.5;  ///< of raymarch and hybrid, in smallest spacings; > 0
-  /// RMSE that `automatic` keeps bias below half of; others do without. A step of 8-bit pictures unless one
-  /// is asked for.
+  int macrocell = 4;  ///< voxels per macrocell edge, 1 to 64
+  double step = 0.5;  ///< of raymarch and hybrid, in smallest spacings; 0.01 to 100
+  /// Target RMSE: `automatic` keeps the bias below half of it; other methods do not use it. The default is
+  /// about one step of an 8-bit picture.
   double targetError = 4e-3;
   Sampling sampling = Sampling::lowDiscrepancy;
   std::uint32_t seed = 0;

@@ -8,7 +8,7 @@ namespace scolopax {
 namespace {
 
 struct Key {
-  std::weak_ptr<const Volume> volume;  ///< tells a new volume at an old address from the old one
+  std::weak_ptr<const Volume> volume;  ///< distinguishes a new volume at an old address
   int size, channel;
 };
 struct KeyLess {
@@ -29,7 +29,7 @@ std::shared_ptr<const MacrocellGrid> sharedMacrocells(const std::shared_ptr<cons
                                                       const std::stop_token& stop,
                                                       const std::shared_ptr<MemoryBudget>& memory) {
   static SharedBuilds<Key, MacrocellGrid, KeyLess> builds;
-  // While one channel is measured, the ends of its intervals are floats.
+  // While a channel is measured, the ends of its intervals are floats.
   const std::size_t bytes = intervalCount(*volume, size) * sizeof(kernel::LevelInterval) +
                             cellCount(*volume, size) * sizeof(ValueInterval);
   return builds.get({volume, size, 0},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Macrocells, and what is known of gradients in them, that all renderers of a volume share, measured off
-// their threads.
+// Macrocells, and bounds of the gradients in them, shared by all renderers of a volume and measured on
+// threads of their own.
 #pragma once
 #include <memory>
 #include <stop_token>
@@ -11,9 +11,10 @@
 
 namespace scolopax {
 
-/// buildMacrocells, shared among all who ask for this volume and size while somebody holds the grid. Waits
-/// while it is measured; throws Error(cancelled) once `stop` is requested. Measuring ends when nobody waits
-/// for it. The grid's memory is of `memory`, if that is given.
+/// buildMacrocells, shared by all callers that request this volume and size while one of them holds the grid.
+/// Waits while it is measured; throws Error(cancelled) once `stop` is requested. Measuring stops when no
+/// caller waits any more. The grid's memory is charged to `memory`, if given; throws Error(busy) or
+/// Error(tooLarge) if it refuses.
 std::shared_ptr<const MacrocellGrid> sharedMacrocells(const std::shared_ptr<const Volume>& volume, int size,
                                                       const std::stop_token& stop = {},
                                                       const std::shared_ptr<MemoryBudget>& memory = nullptr);

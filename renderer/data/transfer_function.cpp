@@ -26,7 +26,7 @@ TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearan
   if (!(a.weight >= 0) || !(m.ambient >= 0) || !(m.diffuse >= 0) || !(m.specular >= 0) || !(m.shininess > 0))
     throw Error(ErrorCode::badInput, "channel '" + channel.name +
                                          "': weight and material must not be negative, shininess above 0");
-  // Range in stored values. Its ends may differ by less than slope and intercept can tell.
+  // The range in stored values. Ends that differ may become equal there by rounding.
   const double lo = (a.rangeLo - channel.intercept) / channel.slope;
   const double hi = (a.rangeHi - channel.intercept) / channel.slope;
   placement_ = Placement(lo, hi, (channel.slope > 0) == (a.rangeLo <= a.rangeHi));

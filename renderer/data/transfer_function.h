@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A channel's curves in the form the kernels evaluate, made from its appearance at every edit of it.
+// A channel's curves in the form that the kernels evaluate, rebuilt from its appearance at every edit.
 #pragma once
 #include "renderer/data/curve.h"
 #include "renderer/data/macrocell_grid.h"
@@ -10,9 +10,9 @@ namespace scolopax {
 
 class TransferFunction {
  public:
-  /// Throws Error(badInput) naming what is wrong: no knots, positions that decrease, values out of range.
+  /// Throws Error(badInput), naming the fault: no knots, positions that decrease, values out of range.
   TransferFunction(const Channel& channel, const ChannelAppearance& appearance);
-  /// Voxels are the channel's. Valid as long as this object.
+  /// With the voxels of `channel`. Valid while this object and the voxels live.
   kernel::ChannelView view(const Channel& channel) const;
   /// Least upper bound, in float, of the kernels' extinction over an interval of stored values.
   float majorant(ValueInterval interval) const;

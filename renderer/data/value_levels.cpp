@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kMost = kernel::kMaxLevels;
 
-/// All different ends, sorted; nothing when there are more than `most`.
+/// All different ends, sorted; none if there are more than `most`.
 std::optional<std::vector<float>> fewEnds(std::span<const ValueInterval> intervals, std::size_t most) {
   std::vector<float> found;
   float last = std::numeric_limits<float>::quiet_NaN();
@@ -68,12 +68,12 @@ std::vector<float> chooseLevels(std::span<const ValueInterval> intervals) {
     most = std::max(most, v.hi);
     ++finite;
   }
-  const bool some = finite < intervals.size();  // without a finite sample
+  const bool some = finite < intervals.size();  // whether some cells have no finite sample
   if (auto few = fewEnds(intervals, kMost - some)) {
     if (some) few->push_back(kNone);
     return *few;
   }
-  // A sample of the ends is enough for levels that follow their density.
+  // A subset of the ends is enough to estimate their density.
   constexpr std::size_t kSample = 1 << 15;
   const std::size_t stride = finite / kSample + 1;
   std::vector<float> ends;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which values of a channel the intervals of its macrocells may begin and end at.
+// Chooses the values at which the intervals of a channel's macrocells may begin and end.
 #pragma once
 #include <span>
 
@@ -7,11 +7,12 @@
 
 namespace scolopax {
 
-/// Levels from the ends of intervals, as declared for buildMacrocells; the least and the largest are among
-/// them.
+/// Levels from the ends of intervals, as described for buildMacrocells; the least and the largest end are
+/// always among them.
 std::vector<float> chooseLevels(std::span<const ValueInterval> intervals);
 
-/// The smallest interval of levels around an interval that lies between the first and the last.
+/// The smallest interval of levels that contains `interval`, which must lie between the first and the last
+/// level; the level of NaN if lo > hi.
 kernel::LevelInterval encode(const ValueLevels& levels, ValueInterval interval);
 
 }  // namespace scolopax

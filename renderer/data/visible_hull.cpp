@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kMostCells = 64;
 
-/// First and end of what can be seen in a row of cells along x; first >= end where nothing can.
+/// The visible range [first, end) of a row of cells along x; first >= end if there is none.
 struct Stretch {
   int first, end;
 };
@@ -36,7 +36,7 @@ std::vector<Stretch> visibleRows(const MacrocellGrid& cells, const std::vector<k
   return rows;
 }
 
-/// Voxel coordinates of the face before cell i along an axis; the outer ones are those of the box.
+/// Voxel coordinate, along an axis, of the face before cell i; the outer faces are those of the box.
 float faceAt(int i, int cells, int size, int dims) {
   return i == 0 ? -0.5f : i == cells ? float(dims) - 0.5f : float(i * size);
 }
@@ -60,7 +60,7 @@ std::vector<glm::vec3> visibleHull(const Volume& volume, const MacrocellGrid& ce
   if (tables.empty()) return {};
   const std::vector<Stretch> rows = visibleRows(cells, tables);
   const glm::ivec3 count = cells.cells, dims = volume.grid().dims;
-  // On every line of cells' edges along x, the outermost corners of the rows that meet there.
+  // For every line of cell edges along x, the outermost corners of the rows that meet there.
   std::vector<glm::vec3> points;
   for (int z = 0; z <= count.z; ++z)
     for (int y = 0; y <= count.y; ++y) {

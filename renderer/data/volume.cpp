@@ -33,17 +33,18 @@ void checkGrid(const Grid& grid) {
   if (!isFinite(grid.worldFromVoxel))
     throw Error(ErrorCode::badInput,
                 "volume: the affine from voxels to world has a value that is not finite");
-  // Singular relative to the lengths of its columns: a scale of 1e-9 is as good as 1.
+  // Singular relative to the lengths of its columns, so that a scale of 1e-9 is as good as 1.
   const glm::dvec3 spacing = grid.spacing();
   const double product = spacing.x * spacing.y * spacing.z;
   if (!(product > 0) || !(std::abs(glm::determinant(glm::dmat3(grid.worldFromVoxel))) > 1e-6 * product))
     throw Error(ErrorCode::badInput, "volume: the affine from voxels to world is singular");
 }
 
-/// Kernels interpolate in float. What float does badly is moved from the voxels to slope and intercept,
-/// exactly: a power of two, so that differences of huge values stay finite and spreads of tiny ones above the
-/// denormals (only denormals beside huge values are rounded); and the least value of a spread that is narrow
-/// for its distance from zero, so that what lies between two voxels has the resolution of the spread.
+/// Kernels interpolate in float. What float represents badly is moved, exactly, from the voxels to slope and
+/// intercept. A power of two goes to the slope, so that differences of huge values stay finite and spreads of
+/// tiny ones stay above the denormals (only denormals beside huge values are rounded). The least value goes
+/// to the intercept if the spread is narrow for its distance from zero, so that interpolation between two
+/// voxels has the resolution of the spread.
 void normalise(VoxelBuffer& buffer, Channel& channel) {
   if (buffer.type() != ScalarType::f32) return;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -56,7 +57,7 @@ void normalise(VoxelBuffer& buffer, Channel& channel) {
   }
   const float largest = std::max(std::abs(least), std::abs(most));
   if (!(least <= most) || largest == 0) return;
-  // Below 2^124 the kernels' differences are finite; 1 is as good as any size for the tiny.
+  // Below 2^124 the kernels' differences are finite; tiny values are scaled to about 1.
   const int shift = largest >= 0x1p124f    ? 123 - std::ilogb(largest)
                     : largest <= 0x1p-100f ? -std::ilogb(largest)
                                            : 0;
@@ -66,14 +67,14 @@ void normalise(VoxelBuffer& buffer, Channel& channel) {
     least = std::ldexp(least, shift);
     most = std::ldexp(most, shift);
   }
-  // Within a factor of two, differences of floats are exact.
+  // Within a factor of two of each other, floats have exact differences.
   if (least < most && most - least <= std::abs(least) * 0x1p-8f) {
     for (float& v : voxels) v -= least;
     channel.intercept += channel.slope * double(least);
   }
 }
 
-/// The buffers' channels side by side; each is freed as soon as it is copied.
+/// Interleaves the channels of the buffers; each is freed as soon as it is copied.
 VoxelBuffer interleave(std::span<VoxelBuffer* const> planes) {
   if (planes.size() == 1) return std::move(*planes[0]);
   const std::size_t stride = planes.size(), count = planes[0]->count();
@@ -134,16 +135,16 @@ VoxelBuffer::VoxelBuffer(ScalarType type, std::size_t count) : type_(type), coun
     bytes_ = std::make_unique_for_overwrite<std::byte[]>(count * scolopax::sizeBytes(type) + kVoxelPadding);
     std::fill_n(bytes_.get() + count * scolopax::sizeBytes(type), kVoxelPadding, std::byte(0));
   } catch (const std::bad_alloc&) {
-    throw Error(ErrorCode::tooLarge,
-                "no memory for " + std::to_string(count) + " voxels of type " + std::string(nameOf(type)));
+    throw Error(ErrorCode::tooLarge, "not enough memory for " + std::to_string(count) + " voxels of type " +
+                                         std::string(nameOf(type)));
   }
 }
 
 Volume::Volume(Grid grid, std::vector<ChannelSource> sources) : grid_(grid) {
   checkGrid(grid_);
   if (sources.empty() || sources.size() > std::size_t(kMaxChannels))
-    throw Error(ErrorCode::badInput, "volume: from 1 to " + std::to_string(kMaxChannels) +
-                                         " channels are possible, found " + std::to_string(sources.size()));
+    throw Error(ErrorCode::badInput, "volume: expected 1 to " + std::to_string(kMaxChannels) +
+                                         " channels, found " + std::to_string(sources.size()));
   for (std::size_t i = 0; i < sources.size(); ++i) {
     ChannelSource& source = sources[i];
     Channel channel;
@@ -158,7 +159,7 @@ Volume::Volume(Grid grid, std::vector<ChannelSource> sources) : grid_(grid) {
     if (!std::isfinite(channel.slope) || channel.slope == 0 || !std::isfinite(channel.intercept))
       throw Error(ErrorCode::badInput, "volume: channel '" + channel.name +
                                            "' needs a finite slope that is not 0 and a finite intercept");
-    // So that sums and differences of data values are finite too.
+    // Keeps sums and differences of data values finite too.
     const double largestStored = source.voxels.type() == ScalarType::f32 ? 0x1p128 : 0x1p16;
     if (!(std::abs(channel.slope) * largestStored + std::abs(channel.intercept) < 0x1p1000))
       throw Error(ErrorCode::badInput,

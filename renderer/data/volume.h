@@ -25,7 +25,7 @@ struct Grid {
   /// Lengths of one voxel step along each axis, world units.
   glm::dvec3 spacing() const;
   double smallestSpacing() const;
-  /// Takes changes per voxel step to gradients in world space, per smallest spacing.
+  /// Converts changes per voxel step to gradients in world space, per smallest spacing.
   glm::dmat3 gradientFromVoxel() const;
   /// Length of the box's longest diagonal, world units.
   double diagonal() const;
@@ -41,7 +41,7 @@ inline constexpr std::size_t kVoxelPadding = 16;
 class VoxelBuffer {
  public:
   VoxelBuffer() = default;
-  /// Throws Error(tooLarge) when the memory cannot be had.
+  /// Throws Error(tooLarge) if the memory cannot be allocated.
   VoxelBuffer(ScalarType type, std::size_t count);
   ScalarType type() const { return type_; }
   std::size_t count() const { return count_; }
@@ -64,7 +64,7 @@ class VoxelBuffer {
   std::unique_ptr<std::byte[]> bytes_;
 };
 
-/// Some type's voxels of one channel; voxel i lies i * stride after the first.
+/// The voxels of one channel as type T; voxel i lies i * stride elements after the first.
 template <class T>
 struct StridedVoxels {
   const T* first;
@@ -73,8 +73,9 @@ struct StridedVoxels {
   std::size_t size() const { return count; }
 };
 
-/// One channel's voxels in a volume, where channels of one type lie interleaved: a fetch of several channels,
-/// or of one that a tracker draws, finds them side by side (tests/bench/layout.cpp has the numbers). Borrows.
+/// One channel's voxels in a volume. Channels of one type are interleaved, so that a fetch of several
+/// channels, or of one that a tracker draws at random, finds them side by side (measured by
+/// tests/bench/layout.cpp). Borrows.
 class VoxelView {
  public:
   VoxelView() = default;
@@ -124,15 +125,16 @@ struct Channel {
 
 class Volume {
  public:
-  /// Measures every channel. Throws Error(badInput) when a channel's size is not the grid's, there is no
-  /// channel or more than kMaxChannels, or the grid is singular or not finite.
+  /// Measures every channel. Throws Error(badInput) if a channel's size is not the grid's, its slope is 0,
+  /// its slope or intercept is not finite or too large, there is no channel or more than kMaxChannels, or the
+  /// grid is empty, singular or not finite.
   Volume(Grid grid, std::vector<ChannelSource> channels);
   const Grid& grid() const { return grid_; }
   std::span<const Channel> channels() const { return channels_; }
 
  private:
   Grid grid_;
-  std::vector<VoxelBuffer> buffers_;  // one for each type of voxels
+  std::vector<VoxelBuffer> buffers_;  // one per voxel type
   std::vector<Channel> channels_;
 };
 

@@ -36,7 +36,7 @@ double laguerre(int k, int a, double x) {
   return current;
 }
 
-/// States whose lobes interleave inside one box, of similar size where they stand next to each other.
+/// States whose lobes interleave inside one box; neighbours in the list are of similar size.
 constexpr struct {
   int n, l, m;
 } kDemoStates[kMaxOrbitals] = {{4, 3, 0}, {4, 3, 3}, {3, 2, 1}, {3, 2, 0}, {4, 3, 1}, {2, 1, 0},
@@ -49,7 +49,7 @@ HydrogenOrbital::HydrogenOrbital(int n, int l, int m) : n_(n), l_(l), m_(std::ab
     throw Error(ErrorCode::badInput,
                 "orbital: expected 1 <= n <= 10, 0 <= l < n, |m| <= l, found n=" + std::to_string(n) +
                     " l=" + std::to_string(l) + " m=" + std::to_string(m));
-  // The (2r/n)^l of the radial part is joined with the angles to a solid harmonic: its (2/n)^l stays here.
+  // The r^l of the radial part's (2r/n)^l moves into the solid harmonic below; its (2/n)^l stays here.
   const double radial = power(2.0 / n, 3 + 2 * l) * factorial(n - l - 1) / (2 * n * factorial(n + l));
   const double angular = (2 * l + 1) / (4 * kPi) * factorial(l - m_) / factorial(l + m_);
   norm_ = radial * angular;
@@ -71,7 +71,7 @@ double HydrogenOrbital::density(const glm::dvec3& p) const {
 
 glm::dvec3 HydrogenOrbital::gradient(const glm::dvec3& p) const {
   const double rho2 = p.x * p.x + p.y * p.y, r2 = rho2 + p.z * p.z, r = std::sqrt(r2);
-  // The sum S(z, r^2) and its partial derivatives; powers of 0 below are never negative.
+  // The sum S(z, r^2) and its partial derivatives; no negative power of 0 occurs.
   double sum = 0, sumZ = 0, sumR2 = 0;
   for (int k = 0; k < int(angular_.size()); ++k) {
     const double a = angular_[std::size_t(k)];
@@ -107,10 +107,11 @@ HydrogenOrbital demoOrbital(int i) {
 
 GeneratedVolume generateOrbitals(int size, int channels) {
   if (size < 2 || size > 1024)
-    throw Error(ErrorCode::badInput, "orbitals: size must be from 2 to 1024, found " + std::to_string(size));
+    throw Error(ErrorCode::badInput,
+                "orbitals: expected a size from 2 to 1024, found " + std::to_string(size));
   if (channels < 1 || channels > kMaxOrbitals)
-    throw Error(ErrorCode::badInput, "orbitals: channels must be from 1 to " + std::to_string(kMaxOrbitals) +
-                                         ", found " + std::to_string(channels));
+    throw Error(ErrorCode::badInput, "orbitals: expected 1 to " + std::to_string(kMaxOrbitals) +
+                                         " channels, found " + std::to_string(channels));
   const double spacing = 2 * kOrbitalBoxHalfEdge / size;
   const double first = 0.5 * spacing - kOrbitalBoxHalfEdge;  // the box ends half a voxel beyond the centres
   GeneratedVolume result;

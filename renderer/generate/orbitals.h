@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hydrogen probability densities |psi_nlm|^2: the demo data set, and a volume whose exact value and
-// gradient tests know at every point.
+// Hydrogen probability densities |psi_nlm|^2: the demo data set, and a test volume whose exact value and
+// gradient are known at every point.
 #pragma once
 #include <glm/vec3.hpp>
 #include <string>
@@ -23,10 +23,10 @@ class HydrogenOrbital {
 
   /// Probability density at `p` (a0), in a0^-3.
   double density(const glm::dvec3& p) const;
-  /// Its gradient, in a0^-4. At the origin an s state (l = 0) has a cusp: 0, the mean over all directions, is
-  /// returned there.
+  /// Its gradient, in a0^-4. An s state (l = 0) has a cusp at the origin; there the result is 0, the mean
+  /// over all directions.
   glm::dvec3 gradient(const glm::dvec3& p) const;
-  /// Spectroscopic name, as "3d m=1".
+  /// Spectroscopic name, such as "3d m=1".
   std::string name() const;
 
  private:
@@ -47,8 +47,9 @@ inline constexpr double kOrbitalBoxHalfEdge = 36;
 /// The state in channel i of generateOrbitals; 0 <= i < kMaxOrbitals.
 HydrogenOrbital demoOrbital(int i);
 
-/// `channels` (1..kMaxOrbitals) states on size^3 voxels (2..1024) of u16 that fill a cube centred at 0. Per
-/// channel the largest voxel is stored as 65535, and the slope brings stored values to densities in a0^-3.
+/// `channels` states (1..kMaxOrbitals) on size^3 voxels (size 2..1024) of u16 that fill a cube centred at 0.
+/// In each channel the largest voxel is stored as 65535, and the slope converts stored values to densities in
+/// a0^-3. Throws Error(badInput) for other arguments.
 GeneratedVolume generateOrbitals(int size = 128, int channels = 4);
 
 }  // namespace scolopax

@@ -19,10 +19,11 @@ namespace scolopax::io {
 namespace fs = std::filesystem;
 namespace {
 
-/// Deflate makes at most 258 bytes of 2 bits.
+/// Deflate expands 2 bits to at most 258 bytes.
 constexpr std::uint64_t kDeflateRatio = 1032;
 
-/// An open descriptor of a regular file and its size. O_NONBLOCK: a pipe without a writer must not hang.
+/// Opens a regular file; returns its descriptor and size. O_NONBLOCK, as opening a pipe without a writer must
+/// not hang.
 std::pair<int, std::uint64_t> openRegular(const fs::path& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
   if (fd < 0) {
@@ -80,7 +81,7 @@ fs::path resolveDataFile(const fs::path& header, std::string_view field, std::st
 
 struct ByteStream::State {
   fs::path path;
-  int fd = -1;            ///< plain files; not through zlib, which would unpack what only looks like gzip
+  int fd = -1;            ///< plain files; not read by zlib, which would unpack what only looks like gzip
   gzFile file = nullptr;  ///< gzip; owns its own descriptor
   std::uint64_t position = 0;
   std::uint64_t largestSize = 0;
@@ -99,7 +100,7 @@ ByteStream::ByteStream(const fs::path& path, Encoding encoding, std::uint64_t of
   const std::uint64_t left = fileSize - std::min(offset, fileSize);
   state_->largestSize = left;
   if (left > 0 && ::lseek(fd, off_t(offset), SEEK_SET) < 0) {
-    throw Error(ErrorCode::io, shown(path) + ": cannot go to byte " + std::to_string(offset));
+    throw Error(ErrorCode::io, shown(path) + ": cannot seek to byte " + std::to_string(offset));
   }
   if (encoding == Encoding::plain) return;
 

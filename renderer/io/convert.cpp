@@ -55,7 +55,7 @@ VoxelBuffer widened(const VoxelBuffer& stored, To (*convert)(From)) {
   return result;
 }
 
-/// To float, with the largest relative rounding error and the number of values that became infinite.
+/// Converts to float; `loss` tells the largest relative rounding error and how many values became infinite.
 template <class From>
 VoxelBuffer rounded(const VoxelBuffer& stored, std::string& loss) {
   using Wide = std::conditional_t<sizeof(From) == 8, long double, double>;  // holds any From exactly
@@ -78,11 +78,12 @@ VoxelBuffer rounded(const VoxelBuffer& stored, std::string& loss) {
   char text[64];
   std::snprintf(text, sizeof text, "largest relative rounding error %.2g", double(largest));
   loss = largest > 0 ? text : "no rounding";
-  if (infinite > 0) loss += ", " + std::to_string(infinite) + " values beyond its range became infinite";
+  if (infinite > 0)
+    loss += ", " + std::to_string(infinite) + " values beyond the range of float32 became infinite";
   return result;
 }
 
-/// i16 or u16 where every value fits, else float.
+/// To i16 or u16 if every value fits, otherwise to float.
 template <class From>
 VoxelBuffer narrowed(const VoxelBuffer& stored, std::string& loss) {
   const std::size_t count = stored.sizeBytes() / sizeof(From);
@@ -214,7 +215,7 @@ void checkMemory(const std::string& file, const VoxelLayout& layout, std::uint64
   }
   const std::uint64_t needed = saturatingProduct(count, bytesPerVoxel);
   if (needed <= memoryLimitBytes) return;
-  throw Error(ErrorCode::tooLarge, file + ": " + layout.description() + " take " + asText(needed) +
+  throw Error(ErrorCode::tooLarge, file + ": " + layout.description() + " needs " + asText(needed) +
                                        " of memory, the limit is " + asText(memoryLimitBytes));
 }
 
@@ -222,7 +223,7 @@ void checkFileHolds(const ByteStream& stream, const VoxelLayout& layout, std::ui
   const std::uint64_t needed = saturatingSum(offset, layout.sizeBytes());
   if (needed <= stream.largestSize()) return;
   throw Error(ErrorCode::badInput, shown(stream.path()) + ": " + layout.description() + " at byte " +
-                                       std::to_string(offset) + " need " + asText(needed) +
+                                       std::to_string(offset) + " needs " + asText(needed) +
                                        ", the file holds " + (stream.compressed() ? "at most " : "") +
                                        asText(stream.largestSize()));
 }
@@ -270,7 +271,7 @@ std::vector<ChannelSource> readChannels(ByteStream& stream, std::uint64_t offset
   const auto count = std::size_t(layout.voxelCount());
   const auto channels = std::size_t(layout.channels);
   const std::size_t elementBytes = sizeBytes(layout.type);
-  std::set<std::string> said;  // channels of one file tend to have the same to say
+  std::set<std::string> said;  // channels of one file tend to give the same warnings
   const Warn warnOnce = [&](const std::string& text) {
     if (warn && said.insert(text).second) warn(text);
   };

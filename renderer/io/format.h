@@ -14,10 +14,10 @@
 
 namespace scolopax::io {
 
-/// Called with one line for what was changed on the way in (a widened or narrowed type, a skipped field).
+/// Called with one line for each thing that loading changed (a widened or narrowed type, a skipped field).
 using Warn = std::function<void(const std::string&)>;
 
-/// What one file (with the files its header names) holds: channels on one grid.
+/// What one file holds, with the files that its header names: channels on one grid.
 struct LoadedFile {
   Grid grid;
   std::vector<ChannelSource> channels;
@@ -27,14 +27,14 @@ struct LoadedFile {
 struct Format {
   std::string_view name;        ///< "NIfTI"
   std::string_view extensions;  ///< for --help: ".nii, .nii.gz, .hdr + .img"
-  /// True when this loader is the one for the file: by its name, and where names are shared, its first bytes.
+  /// Whether this loader is the one for the file, judged by its name.
   bool (*matches)(const std::filesystem::path& path);
   /// Throws Error with one line: file, field, expected, found. Sizes are checked against `memoryLimitBytes`
-  /// and against the file before memory is taken.
+  /// and against the file before memory is allocated.
   LoadedFile (*load)(const std::filesystem::path& path, std::uint64_t memoryLimitBytes, const Warn& warn);
 };
 
-/// Every format, in the order in which they are asked.
+/// Every format, in the order in which they are tried.
 std::span<const Format> formats();
 
 /// Loads one file with the first format that matches; throws Error(unsupported) naming the known ones.
@@ -48,12 +48,12 @@ struct LoadedDataset {
   std::shared_ptr<const Volume> volume;
 };
 
-/// Loads the files and groups those whose grids agree (sameGrid), keeping the order of first appearance. A
-/// file whose header is among them is loaded with that alone.
+/// Loads the files and groups those whose grids agree (sameGrid), in the order of first appearance. A data
+/// file whose header is also among the files is loaded only through that header.
 std::vector<LoadedDataset> loadDatasets(std::span<const std::filesystem::path> paths,
                                         std::uint64_t memoryLimitBytes, const Warn& warn);
 
-/// Half of what the machine has: what the program takes when nobody says otherwise.
+/// The default limit: half of the machine's memory, or 4 GiB if that is unknown.
 std::uint64_t defaultMemoryLimitBytes();
 
 // One loader per format; each in its own .cpp.
@@ -66,7 +66,8 @@ LoadedFile loadTiff(const std::filesystem::path& path, std::uint64_t memoryLimit
 bool matchesRaw(const std::filesystem::path& path);
 LoadedFile loadRaw(const std::filesystem::path& path, std::uint64_t memoryLimitBytes, const Warn& warn);
 
-/// Writes an attached, raw-encoded NRRD (LPS space) with the channels as the slowest axis; one type for all.
+/// Writes an attached, raw-encoded NRRD (LPS space) with the channels as the slowest axis; all must have one
+/// type.
 void writeNrrd(const std::filesystem::path& path, const Grid& grid, std::span<const ChannelSource> channels);
 
 }  // namespace scolopax::io

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The list of formats, and from files to data sets.
+// The list of formats, and the way from files to data sets.
 #include <unistd.h>
 
 #include <algorithm>
@@ -46,7 +46,7 @@ bool isAmong(const std::vector<fs::path>& files, const fs::path& path) {
                              [&](const fs::path& file) { return fs::equivalent(file, path, ignored); });
 }
 
-/// Files of one grid while they are gathered.
+/// Files on one grid, while they are gathered.
 struct Group {
   Grid grid;
   std::vector<ChannelSource> channels;
@@ -70,7 +70,7 @@ LoadedFile loadFile(const fs::path& path, std::uint64_t memoryLimitBytes, const 
 
 std::vector<LoadedDataset> loadDatasets(std::span<const fs::path> paths, std::uint64_t memoryLimitBytes,
                                         const Warn& warn) {
-  // Headers first: they tell which of the other files are theirs.
+  // Headers first: they tell which of the other files belong to them.
   std::vector<LoadedFile> files(paths.size());
   std::vector<fs::path> dataFiles;
   std::uint64_t left = memoryLimitBytes;
@@ -113,7 +113,7 @@ std::vector<LoadedDataset> loadDatasets(std::span<const fs::path> paths, std::ui
     try {
       auto volume = std::make_shared<const Volume>(group.grid, std::move(group.channels));
       datasets.push_back({std::move(id), std::move(title), std::move(group.files), std::move(volume)});
-    } catch (const Error& error) {  // which knows of grids and voxels, not of files
+    } catch (const Error& error) {  // whose message does not name the file
       throw Error(error.code(), shown(group.files.front()) + ": " + error.what());
     }
   }

@@ -16,7 +16,7 @@ namespace scolopax::io {
 namespace fs = std::filesystem;
 namespace {
 
-/// A picture on its way out: 8-bit sRGB, or the float pixels as they are.
+/// A picture ready to be written: 8-bit sRGB, or the float pixels as they are.
 struct Encoding {
   OIIO::ImageSpec spec;
   Image8 bytes;  ///< empty for float formats
@@ -43,7 +43,7 @@ Encoding prepare(const Image& image, glm::vec3 background, const std::string& ex
     encoding.spec = OIIO::ImageSpec(image.width, image.height, 4, OIIO::TypeFloat);
     encoding.spec.attribute("oiio:ColorSpace", "Linear");
     encoding.spec.attribute("compression", "zip");
-    // Else OpenImageIO writes the time of writing, and equal pictures would not be equal bytes.
+    // Otherwise OpenImageIO stores the current time, and equal pictures would not be equal bytes.
     encoding.spec.attribute("DateTime", "1970:01:01 00:00:00");
   } else {
     encoding.bytes = toSrgb8(image, background);
@@ -57,7 +57,7 @@ Encoding prepare(const Image& image, glm::vec3 background, const std::string& ex
   return encoding;
 }
 
-/// The bytes of the file, made in memory: OpenImageIO's own files do not tell of every failure to write.
+/// The bytes of the file, made in memory, because OpenImageIO does not report every failure to write a file.
 std::vector<unsigned char> encode(const Image& image, glm::vec3 background, const std::string& extension) {
   const Encoding encoding = prepare(image, background, extension);
   const std::string name = "image." + extension;
@@ -126,8 +126,9 @@ Image readImage(const fs::path& path) {
   }
   const auto stored = std::size_t(spec.nchannels);
   std::vector<float> values(std::size_t(count) * stored);
-  input->geterror();  // what opening recorded are mere warnings
-  // Row by row where it can be: OpenImageIO does not tell of damage in several deflated strips read at once.
+  input->geterror();  // discards what opening recorded: only warnings
+  // Row by row if possible: OpenImageIO does not report damage in several deflated strips that it reads at
+  // once.
   bool whole = true;
   if (spec.tile_width != 0)
     whole = input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeFloat, values.data());

@@ -11,17 +11,19 @@
 namespace scolopax::io {
 
 /// Writes by extension: .exr and .tif as float32 linear premultiplied RGBA; .png and .jpg as 8-bit sRGB over
-/// `background`. The file is there whole or not at all. Throws Error(unsupported) for another extension,
-/// Error(io) when it cannot be written.
+/// `background`. The file is written whole or not at all (writeFile). Throws Error(unsupported) for another
+/// extension, Error(io) if it cannot be written.
 void writeImage(const std::filesystem::path& path, const Image& image, glm::vec3 background);
 
-/// Throws Error(unsupported) when writeImage knows no format of that extension.
+/// Throws Error(unsupported) if writeImage has no format for the extension.
 void checkImageName(const std::filesystem::path& path);
 
-/// Whether writeImage keeps the values under this name as they are.
+/// Whether writeImage stores float values unchanged under this name.
 bool isFloatFormat(const std::filesystem::path& path);
 
 /// Reads any picture OpenImageIO knows, as linear premultiplied RGBA (8- and 16-bit files are taken as sRGB).
+/// Throws Error(badInput) for a file that is not a picture or is damaged, Error(tooLarge) for more than 2^28
+/// pixels, a side beyond 65536 or too many channels, and as requireRegularFile.
 Image readImage(const std::filesystem::path& path);
 
 /// The bytes of a picture in memory: format "png" (8-bit sRGB RGB) or "exr" (float32 linear premultiplied

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// NIfTI-1 and NIfTI-2 (nifti.nimh.nih.gov), single files and .hdr + .img pairs, packed or not. Read by hand:
-// every size is checked before memory is taken, which libnifti2 does not do.
+// NIfTI-1 and NIfTI-2 (nifti.nimh.nih.gov), single files and .hdr + .img pairs, packed or not. Parsed by
+// hand, because libnifti2 does not check every size before it allocates memory.
 #include <array>
 #include <bit>
 #include <cmath>
@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kNifti1Bytes = 348, kNifti2Bytes = 540;
 
-/// What is used of a header, in the wider types of version 2.
+/// The header fields that are used, in the wider types of version 2.
 struct NiftiHeader {
   std::string file;  ///< for messages
   bool bigEndian = false, pair = false;
@@ -49,7 +49,7 @@ class HeaderBytes {
     if (bigEndian_) std::reverse(value.begin(), value.end());
     return std::bit_cast<T>(value);
   }
-  /// `count` numbers of type T as the numbers of `to`.
+  /// Copies N numbers of type T, from `position` on, to `to`.
   template <class T, class To, std::size_t N>
   void copy(std::size_t position, std::array<To, N>& to) const {
     for (std::size_t i = 0; i < N; ++i) to[i] = static_cast<To>(at<T>(position + i * sizeof(T)));
@@ -182,7 +182,7 @@ VoxelType voxelType(const NiftiHeader& header) {
   return voxel;
 }
 
-/// Dims, with the time steps behind the first left out and the 5th dimension as channels.
+/// The layout of the first time step, with the 5th dimension as channels; later time steps are skipped.
 VoxelLayout voxelLayout(const NiftiHeader& header, const Warn& warn) {
   const std::int64_t used = header.dim[0];
   if (used < 1 || used > 7) throw badField(header, "dim[0]", "1 to 7", std::to_string(used));
@@ -215,7 +215,7 @@ VoxelLayout voxelLayout(const NiftiHeader& header, const Warn& warn) {
   layout.channels = int(channels);
   layout.interleaved = voxel.samples > 1;
   if (times > 1) {
-    // Also for RGB: the first time step is the first volume.
+    // Without a vector dimension, also for RGB, the first time step is the first volume and needs no gaps.
     layout.gapBytes = vectorLength > 1 ? saturatingProduct(layout.voxelCount() * sizeBytes(layout.type),
                                                            std::uint64_t(times - 1))
                                        : 0;
@@ -250,7 +250,7 @@ glm::dmat4 affineFromQuaternion(const NiftiHeader& header, glm::dvec3 spacing) {
   auto [b, c, d, x, y, z] = header.quaternion;
   const double square = b * b + c * c + d * d;
   const double a = square < 1 ? std::sqrt(1 - square) : 0;
-  if (square > 1) {  // rounded beyond a half turn
+  if (square > 1) {  // a half turn, exceeded by rounding
     const double length = std::sqrt(square);
     b /= length, c /= length, d /= length;
   }
@@ -264,7 +264,7 @@ glm::dmat4 affineFromQuaternion(const NiftiHeader& header, glm::dvec3 spacing) {
   return m;
 }
 
-/// World is RAS millimetres: sform, else qform, else pixdim.
+/// World space is RAS in millimetres: by sform, else qform, else pixdim.
 glm::dmat4 worldFromVoxel(const NiftiHeader& header, const Warn& warn) {
   const auto say = [&](const std::string& text) {
     if (warn) warn(header.file + ": " + text);
@@ -296,7 +296,7 @@ glm::dmat4 worldFromVoxel(const NiftiHeader& header, const Warn& warn) {
   return m;
 }
 
-/// The file with `ending` (".img") in place of the path's, or its packed form.
+/// The file with `ending` (".img") in place of the path's, or its packed form. Throws Error(notFound).
 fs::path sibling(const fs::path& path, const char* ending) {
   fs::path base = path;
   if (hasEnding(base, ".gz")) base.replace_extension();
@@ -348,7 +348,7 @@ LoadedFile loadNifti(const fs::path& path, std::uint64_t memoryLimitBytes, const
     for (std::size_t i = 0; i < 3; ++i) loaded.channels[i].name = stem + kColors[i];
     return loaded;
   }
-  // Slope 0 means that there is none.
+  // Slope 0 means no scaling.
   const bool scaled = std::isfinite(header.slope) && header.slope != 0;
   for (std::size_t i = 0; i < loaded.channels.size(); ++i) {
     ChannelSource& channel = loaded.channels[i];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// NRRD (teem.sourceforge.net/nrrd/format.html), attached and detached, raw and gzip. Read by hand: the header
-// is simple text, and teem takes memory by what it says before looking at the data.
+// NRRD (teem.sourceforge.net/nrrd/format.html), attached and detached, raw and gzip. Parsed by hand: the
+// header is simple text, and teem allocates the memory that the header claims before looking at the data.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -72,7 +72,7 @@ StoredType storedType(const NrrdHeader& header) {
 struct Axis {
   std::int64_t size = 1;
   bool spatial = true;
-  std::string kind;  ///< lower case; "" when the header says nothing
+  std::string kind;  ///< lower case; "" if the header gives none
   double spacing = 1;
   std::optional<glm::dvec3> direction;
 };
@@ -95,7 +95,7 @@ glm::dvec3 parseVector(const NrrdHeader& header, std::string_view field, std::st
   return vector;
 }
 
-/// "(1,0,0) none (0, 1, 0)" in its parts: spaces inside the brackets do not separate.
+/// Splits "(1,0,0) none (0, 1, 0)" into its parts: spaces inside the brackets do not separate.
 std::vector<std::string> splitVectors(std::string_view text) {
   std::vector<std::string> parts;
   bool inside = false, open = false;
@@ -120,7 +120,7 @@ std::vector<Axis> readAxes(const NrrdHeader& header, const Warn& warn) {
     throw header.bad("dimension", "1 to 16", header.require("dimension"));
   }
   std::vector<Axis> axes(static_cast<std::size_t>(*dimension));
-  // The field's words, one an axis.
+  // Calls take(axis, word) with the field's words, one per axis.
   const auto perAxis = [&](const char* field, std::string_view text, const auto& words, auto&& take) {
     if (words.size() != axes.size()) throw header.bad(field, std::to_string(axes.size()) + " entries", text);
     for (std::size_t i = 0; i < axes.size(); ++i) take(axes[i], words[i]);
@@ -159,7 +159,7 @@ std::vector<Axis> readAxes(const NrrdHeader& header, const Warn& warn) {
   return axes;
 }
 
-/// Signs that bring the header's space to RAS; nothing is known of other spaces, which stay as they are.
+/// Signs that convert the header's space to RAS. Spaces without anatomical directions stay as they are.
 glm::dvec3 rasSigns(const NrrdHeader& header) {
   if (const auto dimension = header.find("space dimension"); dimension && *dimension != "3") {
     throw header.unsupported("space dimension", "3", *dimension);
@@ -174,7 +174,7 @@ glm::dvec3 rasSigns(const NrrdHeader& header) {
   throw header.unsupported("space", "a space of three dimensions", *space);
 }
 
-/// Dims, channels and grid from the axes: up to three spatial ones and at most one other at either end.
+/// Dims, channels and grid from the axes: one to three spatial ones and at most one other, first or last.
 struct Arrangement {
   VoxelLayout layout;
   Grid grid;
@@ -238,7 +238,7 @@ Arrangement arrange(const NrrdHeader& header, const Warn& warn) {
   return result;
 }
 
-/// What the data file's name says of several files, which are not read.
+/// Throws Error(unsupported) if the data file's name stands for several files.
 void refuseManyFiles(const NrrdHeader& header, std::string_view name) {
   const auto words = splitWords(name);
   const bool pattern = words.size() >= 4 && words[0].find('%') != std::string_view::npos;
@@ -256,7 +256,7 @@ std::int64_t skipField(const NrrdHeader& header, const char* field, std::int64_t
   return *value;
 }
 
-/// The byte behind `lines` line ends, counted from `offset`.
+/// The position after `lines` line ends, counted from `offset`.
 std::uint64_t offsetBehindLines(const NrrdHeader& header, const fs::path& data, std::uint64_t offset,
                                 std::int64_t lines) {
   if (lines == 0) return offset;
@@ -280,7 +280,7 @@ double pairNumber(const NrrdHeader& header, const std::string& key, double other
   return *value;
 }
 
-/// Names, units and scales from the key/value pairs of writeNrrd.
+/// Sets names, units and scales from the key/value pairs that writeNrrd writes.
 void describeChannels(const NrrdHeader& header, const std::string& stem,
                       std::vector<ChannelSource>& channels) {
   const auto textOf = [&](const std::string& key) {

@@ -50,7 +50,7 @@ Error NrrdHeader::unsupported(std::string_view field, const std::string& expecte
 
 void NrrdHeader::addLine(std::string_view line) {
   if (line.starts_with('#')) return;
-  // Whichever comes first: "field: value" or "key:=value".
+  // The first colon decides: "field: value" or "key:=value".
   const auto colon = line.find(':');
   if (colon != std::string_view::npos && line.substr(colon).starts_with(":=")) {
     pairs[unescaped(line.substr(0, colon))] = unescaped(line.substr(colon + 2));

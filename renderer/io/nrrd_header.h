@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The text header of an NRRD file as fields and key/value pairs; nrrd.cpp makes sense of them.
+// The text header of an NRRD file as fields and key/value pairs, which nrrd.cpp interprets.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -14,7 +14,7 @@ namespace scolopax::io {
 
 class NrrdHeader {
  public:
-  /// Reads at most 1 MiB. Throws Error(badInput) for what is not an NRRD header or has a field twice.
+  /// Reads at most 1 MiB. Throws Error(badInput) if it is not an NRRD header or has a field twice.
   explicit NrrdHeader(const std::filesystem::path& path);
 
   /// A field's value without surrounding blanks, by its name in lower case.
@@ -27,7 +27,7 @@ class NrrdHeader {
 
   std::string file;                             ///< for messages
   std::map<std::string, std::string> pairs;     ///< key/value pairs, unescaped
-  std::optional<std::uint64_t> attachedOffset;  ///< where the data start when an empty line ends the header
+  std::optional<std::uint64_t> attachedOffset;  ///< where the data start, if an empty line ends the header
 
  private:
   void addLine(std::string_view line);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// NRRD out (teem.sourceforge.net/nrrd/format.html): what nrrd.cpp reads back exactly, names included.
+// Writes NRRD (teem.sourceforge.net/nrrd/format.html) that nrrd.cpp reads back exactly, names included.
 #include <charconv>
 #include <sstream>
 
@@ -17,7 +17,7 @@ std::string exactText(double value) {
   return {text, std::to_chars(text, text + sizeof text, value).ptr};
 }
 
-/// Values of key/value pairs end at the line's end; the format escapes two characters.
+/// A key/value pair ends with its line, so the format escapes line ends and backslashes.
 std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {

@@ -26,7 +26,7 @@ fs::path folderOf(const fs::path& path) {
 
 bool folderIsWritable(const fs::path& path) { return access(folderOf(path).c_str(), W_OK | X_OK) == 0; }
 
-/// Writes all of it to an open file and closes that. Returns the number of the error, 0 for none.
+/// Writes all parts to an open file and closes it. Returns the error number, 0 for none.
 int writeAndClose(int file, std::span<const std::string_view> parts) {
   int error = 0;
   for (std::string_view bytes : parts) {
@@ -38,7 +38,7 @@ int writeAndClose(int file, std::span<const std::string_view> parts) {
         error = errno;
     }
   }
-  if (close(file) != 0 && error == 0) error = errno;  // network file systems tell only now
+  if (close(file) != 0 && error == 0) error = errno;  // network file systems may report errors only now
   return error;
 }
 
@@ -61,7 +61,7 @@ void writeFile(const fs::path& path, std::string_view bytes) { writeFile(path, s
 void writeFile(const fs::path& path, std::span<const std::string_view> parts) {
   checkWritable(path);
   std::error_code ignored;
-  // Beside the file itself, not beside a link to it, which stays.
+  // If the path is a link, replace the file it points to, not the link.
   const fs::path target = fs::is_symlink(path, ignored) ? fs::weakly_canonical(path, ignored) : path;
   struct stat old;
   const bool exists = stat(target.c_str(), &old) == 0;

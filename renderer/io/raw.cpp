@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Headerless voxels: files whose name says everything (name_XxYxZ_type.raw) and those that an Inviwo or
-// Voreen sidecar describes (.dat: "Key: value" lines, .ivf: XML).
+// Headerless voxels: files described by their name (name_XxYxZ_type.raw) or by an Inviwo or Voreen sidecar
+// (.dat: "Key: value" lines, .ivf: XML).
 #include <algorithm>
 #include <array>
 #include <glm/gtc/matrix_transform.hpp>
@@ -24,7 +24,7 @@ struct RawDescription {
   VoxelLayout layout;
   glm::dvec3 spacing{1};
   std::uint64_t byteOffset = 0;
-  bool mayHoldMore = false;  ///< true: the sidecar gives an offset, so bytes behind the voxels are normal
+  bool mayHoldMore = false;  ///< the sidecar gives an offset, so bytes after the voxels are allowed
 };
 
 Error badField(const fs::path& file, std::string_view field, const std::string& expected,

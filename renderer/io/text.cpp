@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view kBlank = " \t\r\n\v\f";
 
-/// Bytes of the UTF-8 character that starts the text; 0 when it is not one.
+/// Length in bytes of the UTF-8 character at the start of the text; 0 if it is not valid.
 std::size_t utf8Length(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned lead = byte(0);

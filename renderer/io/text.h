@@ -16,7 +16,7 @@ std::string lowerCase(std::string_view text);
 /// The words between spaces, tabs and line ends.
 std::vector<std::string_view> splitWords(std::string_view text);
 
-/// The whole text as a decimal number; nothing when anything else is in it or it does not fit.
+/// The whole text as a decimal number; none if it contains anything else or does not fit.
 std::optional<std::int64_t> parseInteger(std::string_view text);
 /// Also "nan" and "inf" in any case.
 std::optional<double> parseNumber(std::string_view text);
@@ -28,9 +28,9 @@ std::string inQuotes(std::string_view text);
 /// A path for a message: as it was given, clean.
 std::string shown(const std::filesystem::path& path);
 
-/// The file's name in lower case ends with `ending` (".nii.gz").
+/// Whether the file's name, in lower case, ends with `ending` (".nii.gz").
 bool hasEnding(const std::filesystem::path& path, std::string_view ending);
-/// The file's name without the ending (".nii.gz", ".nrrd", ".raw"), clean: what a channel is called.
+/// The file's name without the ending (".nii.gz", ".nrrd", ".raw"), clean: the default name of a channel.
 std::string stemOf(const std::filesystem::path& path);
 
 }  // namespace scolopax::io

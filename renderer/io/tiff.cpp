@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// TIFF stacks, a page a slice, and ImageJ's hyperstacks (pages in the order channel, z, time), decoded by
+// TIFF stacks, one page per slice, and ImageJ's hyperstacks (pages in the order channel, z, time), decoded by
 // OpenImageIO.
 #include <OpenImageIO/imageio.h>
 
@@ -23,10 +23,10 @@ namespace {
 struct Stack {
   std::int64_t channels = 1, slices = 1, times = 1;
   glm::dvec3 spacing{1};
-  std::int64_t pages() const { return channels * slices; }  ///< that are read: the first time step
+  std::int64_t pages() const { return channels * slices; }  ///< number to read: the first time step
 };
 
-/// One page as OpenImageIO sees it, its numbers as they are stored.
+/// Opens one page with OpenImageIO, for its numbers as they are stored.
 std::unique_ptr<OIIO::ImageInput> openPage(TiffPages& pages, std::size_t page) {
   pages.select(page);
   OIIO::ImageSpec options, spec;
@@ -41,7 +41,7 @@ std::unique_ptr<OIIO::ImageInput> openPage(TiffPages& pages, std::size_t page) {
 }
 
 StoredType storedType(const std::string& file, const OIIO::ImageSpec& spec) {
-  // Other depths come out of OpenImageIO rescaled to the next larger type.
+  // OpenImageIO rescales other depths to the next larger type.
   const int bits = spec.get_int_attribute("oiio:BitsPerSample", int(spec.format.size()) * 8);
   if (bits == int(spec.format.size()) * 8) {
     switch (spec.format.basetype) {
@@ -72,7 +72,7 @@ StoredType storedType(const std::string& file, const OIIO::ImageSpec& spec) {
                   std::to_string(bits) + " bits as " + spec.format.c_str());
 }
 
-/// The lines "key=value" of ImageJ's ImageDescription, or nothing when it is not ImageJ's.
+/// The lines "key=value" of ImageJ's ImageDescription; none if it is not ImageJ's.
 std::optional<std::map<std::string, std::string>> imageJFields(std::string_view description) {
   if (!description.starts_with("ImageJ=")) return std::nullopt;
   std::map<std::string, std::string> fields;
@@ -115,7 +115,7 @@ Stack describeStack(const std::string& file, const OIIO::ImageSpec& spec, std::i
   stack.slices = count(
       "slices", std::max<std::int64_t>(1, images / std::int64_t(std::min<std::uint64_t>(rest, 1u << 30))));
   const std::uint64_t told = saturatingProduct(rest, std::uint64_t(stack.slices));
-  // One page for all images: ImageJ's way beyond 4 GB, the others lie behind the first.
+  // A single page for all images: ImageJ's way beyond 4 GB, where the other images follow the first.
   if (told != std::uint64_t(images) || (images != pageCount && pageCount != 1)) {
     throw Error(ErrorCode::badInput,
                 file + ": ImageDescription: expected channels x slices x frames = images = pages, found " +
@@ -132,7 +132,7 @@ Stack describeStack(const std::string& file, const OIIO::ImageSpec& spec, std::i
   return stack;
 }
 
-/// How many bytes one byte of the file can become at most.
+/// The most bytes that one byte of the file can expand to.
 std::uint64_t largestRatio(const OIIO::ImageSpec& spec) {
   const std::string compression = spec.get_string_attribute("compression", "none");
   if (compression == "none") return 1;
@@ -141,8 +141,8 @@ std::uint64_t largestRatio(const OIIO::ImageSpec& spec) {
   return 1 << 15;
 }
 
-/// Row by row, or tile by tile: OpenImageIO unpacks several deflated strips or tiles at once by itself, and
-/// then does not tell when they are damaged.
+/// Reads row by row, or tile by tile: when OpenImageIO unpacks several deflated strips or tiles at once, it
+/// does not report damage. Returns false on failure.
 bool readPixels(OIIO::ImageInput& input, std::vector<std::byte>& page) {
   const OIIO::ImageSpec spec = input.spec();
   const std::size_t pixelBytes = spec.pixel_bytes(true), rowBytes = pixelBytes * std::size_t(spec.width);
@@ -171,7 +171,7 @@ bool readPixels(OIIO::ImageInput& input, std::vector<std::byte>& page) {
   return true;
 }
 
-/// Reads the pages in order, each into `page`: `samples` interleaved numbers a pixel, host byte order.
+/// Reads the pages in order, each into `page`: `samples` interleaved numbers per pixel, in host byte order.
 class PageReader {
  public:
   PageReader(const fs::path& path, TiffPages& pages, const OIIO::ImageSpec& first, StoredType type,
@@ -199,9 +199,9 @@ class PageReader {
     };
     if (text(spec) != text(first_) || spec.depth > 1) {
       throw Error(ErrorCode::unsupported,
-                  where + ": expected " + text(first_) + " as the first, found " + text(spec));
+                  where + ": expected " + text(first_) + " as on page 1, found " + text(spec));
     }
-    input->geterror();  // what opening recorded are mere warnings
+    input->geterror();  // discards what opening recorded: only warnings
     if (!readPixels(*input, page) || input->has_error()) {
       throw Error(ErrorCode::badInput, where + ": cannot be decoded: " + cleanText(input->geterror()));
     }
@@ -239,11 +239,11 @@ LoadedFile loadTiff(const fs::path& path, std::uint64_t memoryLimitBytes, const 
                                             std::to_string(samples) + " samples");
   }
   layout.channels = int(stack.channels * samples);
-  layout.interleaved = true;  // all are gathered before any is converted
+  layout.interleaved = true;  // all channels are read before any is converted
   checkMemory(file, layout, memoryLimitBytes);
   const std::uint64_t holds = saturatingProduct(pages.fileSize(), largestRatio(first));
   if (layout.sizeBytes() > holds) {
-    throw Error(ErrorCode::badInput, file + ": " + layout.description() + " need " +
+    throw Error(ErrorCode::badInput, file + ": " + layout.description() + " needs " +
                                          std::to_string(layout.sizeBytes()) +
                                          " bytes, the file holds at most " + std::to_string(holds));
   }

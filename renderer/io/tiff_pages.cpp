@@ -55,7 +55,7 @@ TiffPages::TiffPages(const std::filesystem::path& path) : IOProxy(path.string(),
     const Page page = readPage(at, directoryBytes);
     const std::size_t offsetBytes = bigTiff_ ? 8 : 4;
     if (page.next == 0 || page.next + offsetBytes > fileSize_ || directoryBytes > fileSize_) {
-      refuse(where + "expected a directory within the file, found it ends beyond");
+      refuse(where + "expected a directory within the file, found one that ends beyond it");
     }
     pages_.push_back(page);
     at = number(page.next, offsetBytes);

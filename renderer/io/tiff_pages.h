@@ -13,8 +13,8 @@ namespace scolopax::io {
 
 class TiffPages : public OIIO::Filesystem::IOProxy {
  public:
-  /// Walks the chain: classic or BigTIFF, either byte order. Throws Error(badInput) for another file, and for
-  /// a chain that loops or leaves the file.
+  /// Walks the chain: classic or BigTIFF, either byte order. Throws Error(badInput) for a file that is not
+  /// TIFF, and for a chain that loops or leaves the file.
   explicit TiffPages(const std::filesystem::path& path);
   ~TiffPages() override;
   TiffPages(const TiffPages&) = delete;
@@ -38,12 +38,12 @@ class TiffPages : public OIIO::Filesystem::IOProxy {
  private:
   struct Page {
     std::uint64_t start = 0;  ///< of its directory
-    std::uint64_t next = 0;   ///< where the next page's offset stands
+    std::uint64_t next = 0;   ///< position of the next page's offset
     std::uint64_t strip = 0;
-    std::uint64_t photometricAt = 0;  ///< where the value stands; 0 when the tag is absent
+    std::uint64_t photometricAt = 0;  ///< position of the value; 0 if the tag is absent
     unsigned photometric = 1;
   };
-  /// Bytes that read differently from the file's.
+  /// Bytes that reads return in place of the file's.
   struct Patch {
     std::uint64_t at = 0;
     std::size_t size = 0;

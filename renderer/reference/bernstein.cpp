@@ -40,7 +40,8 @@ double Bernstein::operator()(double u) const {
   return b[0];
 }
 
-/// De Casteljau's algorithm: its first values are one half's coefficients, its last the other's.
+/// De Casteljau's algorithm: the first value of each level is a coefficient of the left part, the last value
+/// one of the right part.
 void Bernstein::splitAt(double u, Bernstein& left, Bernstein& right) const {
   left.degree_ = right.degree_ = degree_;
   Row b = b_;
@@ -71,8 +72,8 @@ void Bernstein::appendSignChanges(double noise, std::vector<double>& roots, doub
   appendSignChanges(noise, narrowest, 0, 1, roots);
 }
 
-/// Of a polynomial that is the part [begin, end] of another. No fewer changes of sign among coefficients than
-/// in the polynomial: where there is none, there is no root.
+/// For a polynomial that is the part [begin, end] of another. Its coefficients change sign at least as often
+/// as its values: if they do not, there is no root.
 void Bernstein::appendSignChanges(double noise, double narrowest, double begin, double end,
                                   std::vector<double>& roots) const {
   bool positive = false, negative = false;
@@ -89,7 +90,7 @@ void Bernstein::appendSignChanges(double noise, double narrowest, double begin, 
   Bernstein left, right;
   splitAt(0.5, left, right);
   left.appendSignChanges(noise, narrowest, begin, middle, roots);
-  if (std::abs(right.b_[0]) <= noise) roots.push_back(middle);  // on which neither half sees a change
+  if (std::abs(right.b_[0]) <= noise) roots.push_back(middle);  // neither half sees this change
   right.appendSignChanges(noise, narrowest, middle, end, roots);
 }
 

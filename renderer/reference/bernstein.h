@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Polynomials on [0,1] by their Bernstein coefficients, between whose smallest and largest all values lie;
+// Polynomials on [0,1] by their Bernstein coefficients, the smallest and largest of which bound all values;
 // and where they change sign.
 #pragma once
 #include <algorithm>
@@ -12,8 +12,8 @@ namespace scolopax::reference {
 class Bernstein {
  public:
   static constexpr std::size_t kMaxDegree = 12;
-  static constexpr double kNarrowest = 0x1p-44;  ///< bracket of a root
-  /// One coefficient more than the degree. One: a constant; two: the values at 0 and 1.
+  static constexpr double kNarrowest = 0x1p-44;  ///< width of a root's bracket
+  /// Takes degree + 1 coefficients: one is a constant, two are the values at 0 and 1.
   explicit Bernstein(std::span<const double> coefficients);
   Bernstein() : Bernstein(std::array{0.0}) {}
 
@@ -23,12 +23,12 @@ class Bernstein {
   /// Bounds over [0,1].
   double lower() const { return *std::min_element(b_.begin(), b_.begin() + degree_ + 1); }
   double upper() const { return *std::max_element(b_.begin(), b_.begin() + degree_ + 1); }
-  /// The same polynomial as seen from [begin, end], stretched to [0,1].
+  /// The part on [begin, end], reparametrised to [0,1].
   Bernstein between(double begin, double end) const;
   /// With respect to u.
   Bernstein derivative() const;
-  /// Appends every u in (0,1) where the sign changes, to within `narrowest`. Coefficients up to `noise` count
-  /// as 0; double roots that rounding makes or hides, and no others, may come in excess or not at all.
+  /// Appends every u in (0,1) where the sign changes, to within `narrowest`. Coefficients of magnitude up to
+  /// `noise` count as 0. Only double roots that rounding creates or hides may be reported wrongly or missed.
   void appendSignChanges(double noise, std::vector<double>& roots, double narrowest = kNarrowest) const;
 
   Bernstein operator*(const Bernstein& other) const;

@@ -8,8 +8,8 @@
 namespace scolopax::reference {
 namespace {
 
-/// Exact where a and b are equal and at both ends: the outer half voxels lie at u = 1, where a huge neighbour
-/// must not wipe out b. (std::lerp is too, and several times slower.)
+/// Exact at both ends, and where a and b are equal. The outer half voxels lie at u = 1, where a huge
+/// neighbour must not wipe out b. (std::lerp is exact there too, but several times slower.)
 double lerp(double a, double b, double u) { return u == 1 ? b : a + u * (b - a); }
 
 double trilinear(const std::array<double, 8>& c, double x, double y, double z) {
@@ -21,12 +21,14 @@ double trilinear(const std::array<double, 8>& c, double x, double y, double z) {
 }  // namespace
 
 CellScalar::CellScalar(const std::array<double, 8>& c, const glm::dvec3& p, const glm::dvec3& q) {
-  // Coefficient i is the mean of the multilinear form over all ways to take i of the axes at the end point.
+  // Coefficient i is the mean of the trilinear form over all choices of i axes at the end point and the
+  // others at the begin point.
   b_[0] = trilinear(c, p.x, p.y, p.z);
   b_[1] = (trilinear(c, q.x, p.y, p.z) + trilinear(c, p.x, q.y, p.z) + trilinear(c, p.x, p.y, q.z)) / 3;
   b_[2] = (trilinear(c, p.x, q.y, q.z) + trilinear(c, q.x, p.y, q.z) + trilinear(c, q.x, q.y, p.z)) / 3;
   b_[3] = trilinear(c, q.x, q.y, q.z);
-  // Rounding in the means must not carry a value out of what the corners span, and so across a step.
+  // Rounding in the means must not carry a value out of the range of the corners, and so across a step of a
+  // curve.
   const auto [least, most] = std::minmax_element(c.begin(), c.end());
   for (double& b : b_) b = std::clamp(b, *least, *most);
 }
@@ -65,7 +67,7 @@ void CellScalar::appendCrossings(double value, std::vector<double>& crossings) c
   }
 }
 
-/// Newton's method inside a bracket that bisection shrinks, to the last bit.
+/// Newton's method inside a bracket that bisection narrows, to the last bit.
 double CellScalar::crossingBetween(double begin, double end, double value) const {
   const bool rising = (*this)(end) > value;
   double u = 0.5 * (begin + end);

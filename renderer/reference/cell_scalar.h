@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scalar along a straight line inside one cell of eight voxels: a cubic, and where it takes a value.
+// The scalar along a straight line inside one cell of eight voxels: a cubic, and the points where it takes a
+// given value.
 #pragma once
 #include <array>
 #include <glm/vec3.hpp>

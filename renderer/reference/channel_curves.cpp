@@ -13,7 +13,8 @@ namespace {
 double valueOf(const OpacityKnot& knot) { return knot.value; }
 glm::dvec3 valueOf(const ColorKnot& knot) { return knot.color; }
 
-/// Value between neighbouring knots a and b of a curve, where `next` is the first knot behind `position`.
+/// Value of a curve at `position`, interpolated between neighbouring knots; `next` is the first knot after
+/// it.
 template <class Knot>
 auto between(const std::vector<Knot>& knots, typename std::vector<Knot>::const_iterator next,
              double position) {
@@ -23,7 +24,7 @@ auto between(const std::vector<Knot>& knots, typename std::vector<Knot>::const_i
   return valueOf(a) + (valueOf(b) - valueOf(a)) * ((position - a.position) / (b.position - a.position));
 }
 
-/// Limits of a curve when a position is approached from above (its value there) and from below.
+/// Limits of a curve as a position is approached from above (the value there) and from below.
 template <class Knot>
 auto limitFromAbove(const std::vector<Knot>& knots, double position) {
   return between(knots,

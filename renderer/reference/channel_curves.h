@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a scalar to extinction and colour, in double, for the reference integrator; and the scalars at
-// which the way there has a kink or a jump, so that the integrator can cut a ray there.
+// The mapping from a scalar to extinction and colour, in double, for the reference integrator; and the
+// scalars at which it has a kink or a jump, so that the integrator can cut a ray there.
 #pragma once
 #include <glm/vec3.hpp>
 #include <span>
@@ -10,7 +10,7 @@
 
 namespace scolopax::reference {
 
-/// What one channel is at one point.
+/// Extinction and colour of one channel at one point.
 struct ChannelSample {
   double extinction;  ///< per world unit
   glm::dvec3 color;   ///< linear RGB
@@ -26,14 +26,14 @@ class ChannelCurves {
   std::span<const double> breakpoints() const { return breakpoints_; }
   /// Position in [0,1] of a data value in the channel's range, after gamma.
   double position(double scalar) const;
-  /// Index of the piece between two neighbouring knots that holds at `position`.
+  /// Index of the piece, between two neighbouring knots, that contains `position`.
   std::size_t pieceAt(double position) const;
-  /// Piece `piece` at `position`, which is clamped to the piece's ends: a position off by a rounding error
-  /// does not fall to the other side of a jump.
+  /// Evaluates piece `piece` at `position`, clamped to the piece's ends, so that a rounding error does not
+  /// carry a position to the other side of a jump.
   ChannelSample sample(std::size_t piece, double position) const;
-  /// False when no scalar whatever has an extinction above 0.
+  /// False if no scalar has an extinction above 0.
   bool visible() const { return visible_; }
-  /// False when no scalar from `lo` to `hi` has.
+  /// False if no scalar from `lo` to `hi` has an extinction above 0.
   bool visibleBetween(double lo, double hi) const;
   /// Largest component of any colour.
   double brightest() const { return brightest_; }

@@ -21,7 +21,7 @@ Clipping::Clipping(const Scene& scene, const Grid& grid) : dims_(grid.dims), cro
   const glm::dvec3 zero(grid.worldFromVoxel[3]);
   for (const ClipPlane& plane : scene.clip) {
     const glm::dvec3 n = plane.normal;
-    const double largest = std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});  // squares may vanish
+    const double largest = std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});  // squares may underflow
     const glm::dvec3 normal = n / largest * worldFromVoxel;
     const double length = glm::length(normal);
     if (!(length > 0) || !std::isfinite(length))
@@ -34,7 +34,7 @@ void Clipping::cut(RayCells& ray) const {
   if (ray.cuts.empty()) return;
   const double begin = ray.cuts.front(), end = ray.cuts.back();
   const auto cutAt = [&](double side, double slope) {
-    const double t = -side / slope;  // of a ray along the plane not a number or infinite
+    const double t = -side / slope;  // NaN or infinite for a ray along the plane
     if (t > begin && t < end) ray.cuts.push_back(t);
   };
   for (const Plane& plane : planes_)

@@ -37,8 +37,8 @@ GaussRule<N>::GaussRule() {
     node[i] = 0.5 * (x[i] + 1);
     weight[i] = 1 / ((1 - x[i] * x[i]) * derivative * derivative);
   }
-  // Lagrange polynomials in the Legendre basis, l_j = weight_j sum_k (2k+1) P_k(x_j) P_k, and the integral of
-  // P_k from -1 to x is (P_{k+1}(x) - P_{k-1}(x)) / (2k+1), for k = 0 it is x + 1.
+  // The Lagrange polynomials in the Legendre basis are l_j = weight_j sum_k (2k+1) P_k(x_j) P_k. The integral
+  // of P_k from -1 to x is (P_{k+1}(x) - P_{k-1}(x)) / (2k+1); for k = 0 it is x + 1.
   for (std::size_t i = 0; i < N; ++i)
     for (std::size_t j = 0; j < N; ++j) {
       double sum = x[i] + 1;

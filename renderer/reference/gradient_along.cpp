@@ -12,7 +12,7 @@
 namespace scolopax::reference {
 namespace {
 
-/// The scalar from `begin` to `end`, inside the outer voxel centres.
+/// The scalar from `begin` to `end`, inside the outer voxel centres; none if a voxel is not finite.
 std::optional<Bernstein> scalarAlong(const ScalarField& field, const glm::dvec3& begin,
                                      const glm::dvec3& end) {
   const glm::dvec3 last = glm::max(glm::dvec3(field.dims()) - 2.0, 0.0);
@@ -47,7 +47,7 @@ std::optional<GradientAlong> gradientAlong(const ScalarField& field, const glm::
   for (int axis = 0; axis < 3; ++axis) {
     const std::size_t a = std::size_t(axis);
     distance[a] = Bernstein(std::array{1.0});
-    if (field.dims()[axis] == 1) continue;  // no change
+    if (field.dims()[axis] == 1) continue;  // no change along a single layer
     const auto stepped = [&](const glm::dvec3& point, double by) {
       glm::dvec3 p = glm::clamp(point, glm::dvec3(0), last);
       p[axis] = std::clamp(p[axis] + by, 0.0, last[axis]);
@@ -59,7 +59,7 @@ std::optional<GradientAlong> gradientAlong(const ScalarField& field, const glm::
     change[a] = *after - *before;
     const double first = stepped(begin, 1)[axis] - stepped(begin, -1)[axis];
     const double second = stepped(end, 1)[axis] - stepped(end, -1)[axis];
-    if (std::abs(first - second) < 1e-12)  // but for rounding
+    if (std::abs(first - second) < 1e-12)  // equal within rounding
       change[a] = change[a] * (1 / first);
     else
       distance[a] = Bernstein(std::array{first, second});

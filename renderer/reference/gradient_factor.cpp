@@ -7,8 +7,8 @@
 namespace scolopax::reference {
 namespace {
 
-constexpr double kNoise = 1e-13;           // of polynomials: rounding relative to the longest vectors in them
-constexpr double kNearExtremum = 0x1p-24;  // a kink this far from a cut costs its square
+constexpr double kNoise = 1e-13;           // rounding of polynomials, relative to the longest vectors in them
+constexpr double kNearExtremum = 0x1p-24;  // a kink this far from a cut causes an error of its square
 
 ChannelCurves curveOf(const GradientOpacity& opacity) {
   ChannelAppearance appearance;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opacity by the magnitude of the gradient, in double: the factor along a ray's way through one cell, and
-// where it has a kink or a jump, so that the integrator can cut the ray there.
+// Opacity by the magnitude of the gradient, in double: the factor along the part of a ray inside one cell,
+// and where it has a kink or a jump, so that the integrator can cut the ray there.
 #pragma once
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
@@ -18,11 +18,11 @@ class FactorAlong {
   /// `curve` is kept by reference. `gradient` is in data units per world unit.
   FactorAlong(const ChannelCurves& curve, const GradientAlong& gradient)
       : curve_(&curve), gradient_(gradient) {}
-  /// Appends every u in (0,1) at which |gradient| takes a value where the curve has a knot, and where it is
-  /// least or largest, because it has a kink where it is zero. Between two of them the factor is smooth.
+  /// Appends every u in (0,1) at which |gradient| takes a value where the curve has a knot, or is smallest or
+  /// largest: at zero it has a kink. Between two of them the factor is smooth.
   void appendCuts(std::vector<double>& cuts) const;
-  /// From now on the factor is taken from the piece of the curve that holds at u: a point off by a rounding
-  /// error does not fall to the other side of a jump.
+  /// From now on, evaluates the piece of the curve that applies at u, so that a rounding error does not carry
+  /// a point to the other side of a jump.
   void choosePieceAt(double u);
   double operator()(double u) const;
 
@@ -35,13 +35,13 @@ class FactorAlong {
 
 class GradientFactor {
  public:
-  /// `worldFromGradient` takes changes per voxel step to changes per world unit. Throws Error(badInput) for a
-  /// range that is not finite, or an empty or descending curve.
+  /// `worldFromGradient` converts changes per voxel step to changes per world unit. Throws Error(badInput)
+  /// for a range that is not finite, or an empty or descending curve.
   GradientFactor(const GradientOpacity& opacity, const glm::dmat3& worldFromGradient);
-  /// False when the factor of every gradient is 0.
+  /// False if the factor is 0 for every gradient.
   bool visible() const { return curve_.visible(); }
-  /// From `begin` to `end` as in gradientAlong. None where the factor is 0 throughout, as it is where a
-  /// difference is not finite. Valid as long as this object stays where it is.
+  /// The factor from `begin` to `end`, as in gradientAlong. None if it is 0 throughout, as where a difference
+  /// is not finite. Valid while this object lives and is not moved.
   std::optional<FactorAlong> along(const ScalarField& field, const glm::dvec3& begin,
                                    const glm::dvec3& end) const;
 

@@ -17,20 +17,20 @@
 namespace scolopax::reference {
 namespace {
 
-constexpr double kShadowError = 0.02;  // of the tolerance, in what arrives from a light
+constexpr double kShadowError = 0.02;  // share of the tolerance, for the light that arrives
 
-/// What blending makes of the channels at a point.
+/// The channels at a point, blended.
 struct Blended {
   double extinction = 0;                     // per world unit
-  std::array<double, kMaxChannels> share{};  // of each channel's radiance in extinction x radiance
+  std::array<double, kMaxChannels> share{};  // weight of each channel's radiance in extinction x radiance
 };
 
 /// The blend modes: one case each.
 Blended blended(BlendMode mode, const Stretch& stretch, const ChannelSample* samples) {
   Blended result;
   const std::size_t count = stretch.channels.size();
-  // Of equal channels the first, also where only rounding tells them apart: channels of one field over
-  // different ranges would otherwise take turns at every point, and no bisection would end.
+  // Of equal channels the first counts, even if rounding makes them differ. Otherwise channels of one field
+  // over different ranges would take turns at every point, and bisection would not end.
   std::size_t largest = 0;
   for (std::size_t n = 1; n < count; ++n)
     if (samples[n].extinction * (1 - kEqualExtinction) > samples[largest].extinction) largest = n;
@@ -83,7 +83,7 @@ Integrator::Integrator(const Volume& volume, const Scene& scene, double toleranc
   if (scene.channels.size() != volume.channels().size())
     throw Error(ErrorCode::badInput, "reference: the scene has " + std::to_string(scene.channels.size()) +
                                          " channels, the volume " + std::to_string(volume.channels().size()));
-  // Edges of shadows need a floor that bisection reaches soon when every point costs a ray.
+  // Edges of shadows need a floor that bisection reaches soon, because every point costs a ray.
   floor_ = lighting_.any() ? 1e-2 : 1e-9;
   opaqueDepth_ = lighting_.any() ? 5 - std::log(tolerance) : 27.7;
   const glm::dvec3 spacing = volume.grid().spacing();
@@ -127,7 +127,7 @@ RayResult Integrator::trace(const glm::dvec3& originWorld, const glm::dvec3& dir
   return {glm::dvec4(all.color, -std::expm1(-all.opticalDepth)), all.error};
 }
 
-/// At the cells' faces and at planes of clipping.
+/// Cuts a ray at the faces of cells and at clip and crop planes.
 RayCells Integrator::cutAtAll(const glm::dvec3& originVoxel, const glm::dvec3& directionWorld,
                               double length) const {
   RayCells cells = cutAtCells(originVoxel, voxelFromWorld_ * directionWorld, dims_, length);
@@ -135,7 +135,7 @@ RayCells Integrator::cutAtAll(const glm::dvec3& originVoxel, const glm::dvec3& d
   return cells;
 }
 
-/// What the given channels make of a ray.
+/// Integrates the given channels along a ray.
 Integrator::Path Integrator::follow(const Ray& ray, Channels channels) const {
   const RayCells cells =
       cutAtAll(voxelFromWorld_ * ray.origin, ray.direction, std::numeric_limits<double>::infinity());
@@ -146,7 +146,8 @@ Integrator::Path Integrator::follow(const Ray& ray, Channels channels) const {
                       if (lighting_.any()) {
                         const std::vector<double> cuts = lightCuts_.of(stretch, begin, end, ray.direction);
                         for (std::size_t k = 0; k + 1 < cuts.size(); ++k) {
-                          // A step away from the cuts, and every point once: it may cost rays.
+                          // Evaluates a step away from the cuts, and every point only once, because it may
+                          // cost rays.
                           const double step = 1e-9 * (cuts[k + 1] - cuts[k]);
                           std::unordered_map<double, Medium> known;
                           const auto inside = [&](double u) {
@@ -162,14 +163,14 @@ Integrator::Path Integrator::follow(const Ray& ray, Channels channels) const {
                       }
                       return path.opticalDepth <= opaqueDepth_;
                     });
-  if (path.opticalDepth > opaqueDepth_)  // what is hidden
+  if (path.opticalDepth > opaqueDepth_)  // what lies behind adds at most this
     path.error += std::exp(-path.opticalDepth) * std::max(1.0, brightest_);
   if (lighting_.shadows())
     path.error -= kShadowError * tolerance_ * brightest_ * std::expm1(-path.opticalDepth);
   return path;
 }
 
-/// Adds the part [begin, end] of a stretch.
+/// Adds the part [begin, end] of a stretch to the path, bisected until its error is small enough.
 void Integrator::integrate(const Rule& rule, const MediumAt& mediumAt, double stretchLength, double begin,
                            double end, Path& path) const {
   if (path.opticalDepth > opaqueDepth_) return;
@@ -182,7 +183,7 @@ void Integrator::integrate(const Rule& rule, const MediumAt& mediumAt, double st
       (piece.error <= tolerance_ * alpha ||
        piece.error * std::exp(-path.opticalDepth) <= tolerance_ * floor_))
     return path.add(piece.light, piece.error);
-  if (middle <= begin || middle >= end) {  // no number in between: what is left is a surface
+  if (middle <= begin || middle >= end) {  // no number in between: the rest is a surface
     piece.light.color = piece.light.meanColor * alpha;
     return path.add(piece.light, alpha * piece.meanError);
   }
@@ -219,12 +220,13 @@ Medium Integrator::mediumAt(const Ray& ray, Channels channels, const Stretch& st
   return medium;
 }
 
-/// Of the given channels between a point and a light.
+/// Transmittance of the given channels between a point and a light.
 double Integrator::transmittance(const glm::dvec3& pointVoxel, const glm::dvec3& direction, double distance,
                                  Channels channels) const {
   if (!(distance > 0)) return 1;
   const RayCells cells = cutAtAll(pointVoxel, direction, distance);
-  // Of kShadowError the darkness takes a third, and the cells of the way, or all of its depth, another each.
+  // A third of kShadowError each: for cutting off the darkness, for the absolute errors of all cells on the
+  // way, and for the relative error of the whole depth.
   const double dark = -std::log(kShadowError / 3 * tolerance_);
   const double allowed = kShadowError / 3 * tolerance_ / double(std::max<std::size_t>(cells.cuts.size(), 1));
   double depth = 0;
@@ -236,7 +238,7 @@ double Integrator::transmittance(const glm::dvec3& pointVoxel, const glm::dvec3&
   return depth <= dark ? std::exp(-depth) : 0.0;
 }
 
-/// Of a part of a stretch.
+/// Optical depth of a part of a stretch.
 double Integrator::opticalDepth(const Stretch& stretch, double begin, double end, double allowed) const {
   const auto rule = [&]<int N>(const GaussRule<N>& gauss) {
     ChannelSample samples[kMaxChannels];
@@ -253,9 +255,10 @@ double Integrator::opticalDepth(const Stretch& stretch, double begin, double end
   const double coarse = rule(two);
   const auto bent = [](const ChannelInCell& channel) { return channel.channel->bent; };
   if (std::none_of(stretch.channels.begin(), stretch.channels.end(), bent))
-    return coarse;  // of a cubic: exact
+    return coarse;  // exact for a cubic
   const double fine = rule(four), middle = 0.5 * (begin + end), error = std::abs(fine - coarse);
-  // A relative error counts depth x exp(-depth) times, which is less than 1.
+  // In the transmittance, a relative error of the depth is multiplied by depth x exp(-depth), which is less
+  // than 1.
   if (error <= allowed || error <= kShadowError / 3 * tolerance_ * fine || middle <= begin || middle >= end)
     return fine;
   return opticalDepth(stretch, begin, middle, allowed / 2) + opticalDepth(stretch, middle, end, allowed / 2);

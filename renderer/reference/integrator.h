@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The double-precision answer for one ray: what "error" means for every other method. Slow and obvious,
-// and shares no code with the kernels.
+// The double-precision answer for one ray, against which the error of every other method is measured. Slow
+// and obvious, and shares no code with the kernels.
 #pragma once
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
@@ -19,27 +19,28 @@ namespace scolopax::reference {
 
 struct RayResult {
   glm::dvec4 rgba{0};  ///< linear, premultiplied; alpha = 1 - transmittance
-  /// Estimated bound of the absolute error of each component: by how much rules differ in the pieces of the
-  /// ray, and what is cut off behind thick matter and in deep shadow. Missed can be shadows, and gaps of
-  /// light, narrower than a fifth of a piece, which is at most a voxel's.
+  /// Estimated bound of the absolute error of each component: by how much the rules differ in the pieces of
+  /// the ray, and what is cut off behind thick matter and in deep shadow. Shadows and gaps of light that are
+  /// narrower than a fifth of a piece may be missed; a piece lies inside one cell.
   double error = 0;
 };
 
 /// Light along rays: C = integral of T sigma L dt, T = exp(-integral of sigma dt), over t >= 0 inside the
-/// volume's box, where the blend mode says what extinction sigma and radiance L are. Density: the sum, and
-/// the mean weighted by extinction. Max: the largest, and its channel's. Mix: the largest, and sum w_n
-/// sigma_n L_n over it. Composite: every channel alone, colours added, transmittances multiplied.
+/// volume's box. The blend mode defines extinction sigma and radiance L. Density: the sum of the extinctions,
+/// and the mean of the radiances weighted by extinction. Max: the largest extinction, and the radiance of its
+/// channel. Mix: the largest extinction, and sum w_n sigma_n L_n divided by it. Composite: every channel
+/// alone, colours added, transmittances multiplied.
 ///
-/// The ray is cut at every plane through voxel centres, inside each cell where a channel's scalar, there a
-/// cubic of t, takes a value at which its curves have a knot, where opacity by the gradient has a kink or a
-/// jump (FactorAlong), and, in max and mix, where the largest extinction passes from one channel to another.
-/// Without light, no feature is narrower than the pieces that are left, and each is bisected until two Gauss
-/// rules agree.
+/// The ray is cut at every plane through voxel centres. Inside each cell, where a channel's scalar is a cubic
+/// of t, it is cut where the scalar takes a value at which the channel's curves have a knot, where opacity by
+/// the gradient has a kink or a jump (FactorAlong), and, in max and mix, where the largest extinction passes
+/// from one channel to another. Without light, no feature is narrower than the resulting pieces, and each is
+/// bisected until two Gauss rules agree.
 ///
-/// With shading it is cut as well where a normal flips, n.l or n.h passes zero or a fade saturates, and
-/// wherever a highlight would be narrower than a piece (LightCuts). Edges of shadows are left to bisection,
-/// by rules that see a jump wherever in a piece it lies (roughPiece). A point may cost a ray to every light:
-/// the tolerance is looser.
+/// With shading, the ray is also cut where a normal flips, where n.l or n.h passes zero, where a fade
+/// saturates, and wherever a highlight would be narrower than a piece (LightCuts). Edges of shadows are left
+/// to bisection, with rules that detect a jump anywhere in a piece (roughPiece). With light the tolerance is
+/// looser, because a point may cost a ray to every light.
 class Integrator {
  public:
   static constexpr double kTolerance = 1e-7, kToleranceLit = 1e-4;
@@ -47,8 +48,9 @@ class Integrator {
   /// Keeps a reference to `volume`. Throws Error(badInput) for a scene that does not fit it.
   Integrator(const Volume& volume, const Scene& scene)
       : Integrator(volume, scene, scene.shading || scene.shadows ? kToleranceLit : kTolerance) {}
-  /// A piece may err, absolutely and however bright the light, by `tolerance` times the alpha that it adds;
-  /// or, so that bisection ends at jumps, by a hundredth of `tolerance` with light, 1e-9 of it without.
+  /// The absolute error of a piece may be, however bright the light, `tolerance` times the alpha that the
+  /// piece adds; or, so that bisection ends at jumps, 1e-2 times `tolerance` with light and 1e-9 times
+  /// without.
   Integrator(const Volume& volume, const Scene& scene, double tolerance);
 
   /// `direction` need not have length 1. Throws Error(badInput) when it is 0 or anything is not finite.
@@ -74,9 +76,9 @@ class Integrator {
   glm::ivec3 dims_;
   BlendMode blend_;
   double tolerance_;
-  double floor_;          // of the tolerance: absolute error that a piece may always have
-  double brightest_ = 0;  // no radiance is larger
-  double opaqueDepth_;    // what lies behind this optical depth is not looked at
+  double floor_;          // absolute error that a piece may always have, as a share of the tolerance
+  double brightest_ = 0;  // upper bound of the radiance
+  double opaqueDepth_;    // the ray ends at this optical depth
   glm::dmat3 worldFromVoxel_, voxelFromWorld_;
   double smallestSpacing_;
   glm::dvec3 voxelZero_;  // world position of voxel (0,0,0)
@@ -86,7 +88,7 @@ class Integrator {
   std::vector<ActiveChannel> channels_;
 };
 
-/// One ray without keeping an Integrator.
+/// Traces one ray without keeping an Integrator.
 RayResult traceReference(const Volume& volume, const Scene& scene, const glm::dvec3& originWorld,
                          const glm::dvec3& directionWorld);
 

@@ -11,10 +11,10 @@
 namespace scolopax::reference {
 namespace {
 
-constexpr double kNoise = 1e-13;        // of polynomials: rounding relative to the longest vectors in them
-constexpr double kNarrowest = 0x1p-20;  // part of a part, below which directions may turn as they like
-constexpr double kSame = 1e-11;         // between cuts, below which they are one
-constexpr double kMostTurn = 0.5;       // radians in half a piece
+constexpr double kNoise = 1e-13;        // rounding of polynomials, relative to the longest vectors in them
+constexpr double kNarrowest = 0x1p-20;  // share of the part, below which directions may turn at will
+constexpr double kSame = 1e-11;         // distance of cuts, below which they are one
+constexpr double kMostTurn = 0.5;       // of directions in half a piece, radians
 constexpr double kSmoothPower = 8;      // max(x, 0) to this power is smooth enough for the rules
 
 double angleBetween(const glm::dvec3& a, const glm::dvec3& b) {
@@ -32,7 +32,7 @@ glm::dvec3 unit(const glm::dvec3& v) {
 struct LightCuts::Line {
   glm::dvec3 begin, end, toViewer;
   glm::dvec3 point(double w) const { return begin + w * (end - begin); }
-  /// From the line to a point.
+  /// Vector from the line to a point.
   BernsteinVector to(const glm::dvec3& p) const {
     const auto linear = [](double a, double b) { return Bernstein(std::array{a, b}); };
     return {linear(p.x - begin.x, p.x - end.x), linear(p.y - begin.y, p.y - end.y),
@@ -87,7 +87,7 @@ std::vector<double> LightCuts::of(const Stretch& stretch, double begin, double e
     }
   std::sort(cuts.begin(), cuts.end());
   std::vector<double> refined{0};
-  for (const double cut : cuts)  // of which some come twice, but for rounding
+  for (const double cut : cuts)  // some come twice, within rounding
     if (cut == 1 || (cut > refined.back() + kSame && cut < 1 - kSame))
       refine(line, shaded, refined.back(), cut, refined);
   for (double& w : refined) w = begin + w * (end - begin);
@@ -95,12 +95,13 @@ std::vector<double> LightCuts::of(const Stretch& stretch, double begin, double e
   return refined;
 }
 
-/// Where the normal flips, n.l and n.h pass zero, and the fade saturates.
+/// Appends the points where the normal flips, where n.l and n.h pass zero, and where the fade saturates.
 void LightCuts::appendKinks(const Line& line, const Shaded& shaded, std::vector<double>& cuts) const {
   const BernsteinVector& normal = shaded.gradient.scaled;
   const Material& material = shaded.channel.material;
   const bool diffuse = material.diffuse > 0;
-  const bool edge = material.specular > 0 && material.shininess < kSmoothPower;  // of a highlight
+  const bool edge =
+      material.specular > 0 && material.shininess < kSmoothPower;  // highlights have a kink at their edge
   const double noise = kNoise * shaded.longest;
 
   const Bernstein nv = normal.dot(line.toViewer);
@@ -115,11 +116,11 @@ void LightCuts::appendKinks(const Line& line, const Shaded& shaded, std::vector<
       const Bernstein nl = normal.dot(toLight);
       const double farthest = toLight.longest();
       if (diffuse) nl.appendSignChanges(noise * farthest, cuts);
-      // n.h = 0 where n.l = -n.v, l of length 1: squared, to be a polynomial.
+      // n.h = 0 where n.l = -n.v, with l of length 1: squared, this is a polynomial.
       if (edge)
         (nl * nl - nv * nv * toLight.dot(toLight))
             .appendSignChanges(noise * shaded.longest * farthest * farthest, cuts);
-    }  // a headlight shines along the view
+    }  // a headlight shines along the view: cut at n.v above
   }
   const Bernstein& scale = shaded.gradient.scale;
   const double steep = shaded.channel.range / smallestSpacing_;
@@ -128,7 +129,7 @@ void LightCuts::appendKinks(const Line& line, const Shaded& shaded, std::vector<
       .appendSignChanges(kNoise * std::max(shaded.longest * shaded.longest, most * most), cuts);
 }
 
-/// Appends `end`, and before it what must be cut in between.
+/// Appends `end`, after the cuts that are needed before it.
 void LightCuts::refine(const Line& line, const std::vector<Shaded>& shaded, double begin, double end,
                        std::vector<double>& cuts) const {
   const double middle = 0.5 * (begin + end);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where light makes a ray's radiance jump, bend or change fast, inside a part of the ray that is smooth
-// otherwise. The integrator cuts there, so that its rules never look across.
+// Where light makes a ray's radiance jump, bend or change fast, inside a part of the ray that is otherwise
+// smooth. The integrator cuts there, so that its rules never span such a point.
 #pragma once
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
@@ -14,13 +14,13 @@ namespace scolopax::reference {
 
 class LightCuts {
  public:
-  /// Highlights and fades below `faintest` are as good as none. World
-  /// coordinates are relative to voxel (0,0,0).
+  /// Highlights and fades below `faintest` are ignored. World coordinates are relative to voxel (0,0,0).
   LightCuts(Lighting lighting, const glm::dmat3& worldFromVoxel, double faintest);
 
-  /// Ascending from `begin` to `end`, a part of `stretch`. Between two of them no normal flips to the viewer,
-  /// no n.l or n.h passes zero, no fade saturates; and, but for pieces of a millionth of the part, normals
-  /// and directions to lights turn little, in a highlight little against its width.
+  /// Cuts from `begin` to `end`, a part of `stretch`, ascending. Between two of them no normal flips towards
+  /// the viewer, no n.l or n.h passes zero and no fade saturates. Except in pieces of a millionth of the
+  /// part, normals and directions to lights also turn little, and in a highlight little compared with its
+  /// width.
   std::vector<double> of(const Stretch& stretch, double begin, double end,
                          const glm::dvec3& rayDirection) const;
 

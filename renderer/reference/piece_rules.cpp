@@ -10,7 +10,7 @@
 namespace scolopax::reference {
 namespace {
 
-/// The interpolating rule on given nodes in [0,1]; members as in GaussRule.
+/// The interpolatory rule on given nodes in [0,1]; members as in GaussRule.
 template <int N>
 struct NodeRule {
   std::array<double, N> node, weight;
@@ -24,7 +24,7 @@ struct NodeRule {
   }
 
  private:
-  /// From 0 to `end` of the Lagrange polynomial of node j.
+  /// Integral from 0 to `end` of the Lagrange polynomial of node j.
   double integral(const GaussRule<8>& gauss, std::size_t j, double end) const {
     double sum = 0;
     for (std::size_t k = 0; k < 8; ++k) {
@@ -89,7 +89,7 @@ PieceEstimate roughPiece(const MediumAt& mediumAt, double length) {
   PieceEstimate estimate{lightOf(seven, m, length)};
   compare(estimate, lightOf(four, std::array{m[0], m[2], m[4], m[6]}, length));
   compare(estimate, lightOf(three, std::array{m[0], m[3], m[6]}, length));
-  // A jump at the worst place is 1.15 times the difference.
+  // A jump at the worst place causes an error of 1.15 times the difference.
   estimate.error *= 1.15;
   return estimate;
 }

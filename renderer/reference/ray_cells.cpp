@@ -18,12 +18,13 @@ constexpr double kDriftTolerance = 1e-12;
 RayCells cutAtCells(const glm::dvec3& origin, const glm::dvec3& direction, const glm::ivec3& dims,
                     double length) {
   const glm::dvec3 size(dims), centre = 0.5 * (size - 1.0);
-  // From the point nearest to the centre, so that a far eye is not felt in the differences below.
+  // Starts from the point nearest to the centre, so that a distant eye costs no precision in the differences
+  // below.
   const double nearest = glm::dot(centre - origin, direction) / glm::dot(direction, direction);
   RayCells ray{origin + nearest * direction, direction, {}};
   double begin = -nearest, end = length - nearest;
 
-  const double crossing = glm::length(size) / glm::length(direction);  // no longer inside than this
+  const double crossing = glm::length(size) / glm::length(direction);  // longest range of t inside the box
   for (int axis = 0; axis < 3; ++axis) {
     double& o = ray.origin[axis];
     double& d = ray.direction[axis];

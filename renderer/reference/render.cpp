@@ -54,7 +54,7 @@ std::uint64_t mixed(std::uint64_t z) {
   return z ^ (z >> 31);
 }
 
-/// Number `counter` in [0,1) of the sequence that `key` names.
+/// Number `counter`, in [0,1), of the sequence that `key` identifies.
 double uniform(std::uint64_t key, std::uint64_t counter) {
   return double(mixed(key + counter) >> 11) * 0x1p-53;
 }
@@ -85,7 +85,7 @@ ReferenceImage renderReference(const Volume& volume, const Scene& scene, int sam
       rayErrors[pixel] = ray.error;
       return;
     }
-    // Two independent points a stratum: the variance of their mean is a quarter of the squared difference.
+    // Two independent points per stratum: the variance of their mean is a quarter of the squared difference.
     glm::dvec4 sum(0), variance(0);
     for (int stratum = 0; stratum < n * n; ++stratum) {
       const int column = stratum % n, line = stratum / n;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A whole picture from the reference integrator, with the standard error that is left in it.
+// A whole picture from the reference integrator, with its remaining standard error.
 #pragma once
 #include <cstdint>
 #include <glm/vec4.hpp>
@@ -12,15 +12,14 @@ namespace scolopax::reference {
 
 struct ReferenceImage {
   Image image;
-  /// Of every component of every pixel: the noise that sampling the pixel's area leaves. 0 for the point
-  /// filter.
+  /// Per pixel and component: the noise left by sampling the pixel's area. 0 for the point filter.
   std::vector<glm::vec4> standardError;
   double maximumRayError = 0;  ///< largest RayResult::error of all rays
 };
 
 /// Box filter: every pixel is divided into samplesPerAxis^2 strata, and two rays go through random points of
-/// each; their differences give the standard error. Point filter: one ray through the pixel's centre.
-/// Throws Error(badInput) for a scene or a camera that does not work, or samplesPerAxis < 1.
+/// each; their differences give the standard error. Point filter: one ray through the pixel's centre. Throws
+/// Error(badInput) for an invalid scene or camera, or samplesPerAxis < 1.
 ReferenceImage renderReference(const Volume& volume, const Scene& scene, int samplesPerAxis,
                                std::uint64_t seed = 0);
 

@@ -33,7 +33,7 @@ double ScalarField::operator()(const glm::dvec3& point) const {
   const glm::dvec3 cell = glm::min(glm::floor(p), glm::max(glm::dvec3(dims_) - 2.0, 0.0));
   const auto c = corners(glm::ivec3(cell));
   if (!c) return std::numeric_limits<double>::quiet_NaN();
-  // Axis by axis, so that equal corners give their value to the last bit: no gradient from rounding.
+  // Axis by axis, so that equal corners give their value to the last bit, and rounding gives no gradient.
   std::array<double, 8> v = *c;
   for (std::size_t axis = 0, count = 4; axis < 3; ++axis, count /= 2) {
     const double w = p[int(axis)] - cell[int(axis)];

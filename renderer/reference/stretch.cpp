@@ -21,8 +21,9 @@ struct Difference {
 /// Values at w = 0, 1/3, 2/3 and 1.
 using FourValues = std::array<double, 4>;
 
-/// Points between which the difference d has no extremum, ascending from 0 to 1: exactly so where it is a
-/// cubic; where it is bent, sixteen equal steps as well. None when a cubic has one sign throughout.
+/// Points, ascending from 0 to 1, between which the difference d = a - b has no extremum. Exact where d is a
+/// cubic; where it is bent, the ends of sixteen equal steps are added. None if d is a cubic of one sign
+/// throughout.
 std::vector<double> bracketEnds(const FourValues& a, const FourValues& b, bool bent) {
   const double d0 = a[0] - b[0], d1 = a[1] - b[1], d2 = a[2] - b[2], d3 = a[3] - b[3];
   const double c1 = (-11 * d0 + 18 * d1 - 9 * d2 + 2 * d3) / 2,
@@ -63,7 +64,7 @@ void appendHandovers(const Stretch& stretch, double begin, double end, std::vect
   for (std::size_t i = 0; i < channels.size(); ++i)
     for (std::size_t j = i + 1; j < channels.size(); ++j) {
       const Difference difference{channels[i], channels[j], begin, end};
-      double last = 0, lastSign = 0;  // the last point at which the channels differ
+      double last = 0, lastSign = 0;  // the last point at which the channels differed
       const bool bent = channels[i].channel->bent || channels[j].channel->bent;
       for (const double w : bracketEnds(extinctions[i], extinctions[j], bent)) {
         const double d = difference(w);
@@ -97,8 +98,8 @@ void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, const Clippi
     const glm::dvec3 middle = ray.origin + 0.5 * (begin + end) * ray.direction;
     const glm::dvec3 cell =
         glm::clamp(glm::floor(middle), glm::dvec3(0), glm::max(glm::dvec3(dims) - 2.0, 0.0));
-    // There coordinates are 0 or 1 exactly, at the cut as well: what is equal is equal to the last bit, and
-    // max can tell which of two channels comes first.
+    // In the outer half voxels coordinates are exactly 0 or 1, also at the cuts. So what is equal is equal to
+    // the last bit, and max can tell which of two channels comes first.
     const glm::dvec3 between = middle - cell;
     const auto inCell = [&](double t) {
       glm::dvec3 p = glm::clamp(ray.origin + t * ray.direction - cell, glm::dvec3(0), glm::dvec3(1));

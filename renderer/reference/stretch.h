@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A ray's way through one cell, with everything that blending and light need there; and the parts of a ray
-// in which nothing has a kink or a jump.
+// The part of a ray inside one cell, with everything that blending and lighting need there; and the parts of
+// a ray in which nothing has a kink or a jump.
 #pragma once
 #include <functional>
 #include <glm/vec3.hpp>
@@ -18,19 +18,19 @@
 
 namespace scolopax::reference {
 
-/// A channel that can be seen.
+/// A visible channel.
 struct ActiveChannel {
   int number;  ///< in the volume
   ScalarField field;
   ChannelCurves curves;
   double weight;  ///< in blend mode mix
-  bool bent;      ///< by gamma or a factor: extinction is not a piecewise cubic along a ray
+  bool bent;      ///< by gamma or a factor: extinction along a ray is no piecewise cubic
   Material material;
   double range;                            ///< |hi - lo|, data units
   std::optional<GradientFactor> factor{};  ///< of the opacity
 };
 
-/// A channel along one cell, and the piece of its curves that holds.
+/// A channel along a stretch, and the piece of its curves that applies.
 struct ChannelInCell {
   const ActiveChannel* channel;
   CellScalar scalar;
@@ -47,16 +47,16 @@ struct ChannelInCell {
 struct Stretch {
   double length = 0;                    ///< world units
   glm::dvec3 begin{0}, end{0};          ///< voxel coordinates
-  std::vector<ChannelInCell> channels;  ///< those that are finite and not clipped or of factor 0 here
+  std::vector<ChannelInCell> channels;  ///< those that are finite, not clipped and not of factor 0 here
   glm::dvec3 point(double u) const { return begin + u * (end - begin); }
 };
 
-/// Relative difference below which extinctions count as equal: that of rounding.
+/// Relative difference below which extinctions count as equal: the size of rounding errors.
 inline constexpr double kEqualExtinction = 1e-12;
 
 /// Calls visit(stretch, begin, end) front to back for every part [begin, end] of u in which extinction and
 /// colour of all channels are smooth and, in max and mix, one and the same channel has the largest
-/// extinction; until visit returns false. The ray is cut at the planes of `clipping`.
+/// extinction; stops when visit returns false. `ray` must already be cut at the planes of `clipping`.
 void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, const Clipping& clipping, BlendMode blend,
                        std::span<const ActiveChannel> channels,
                        const std::function<bool(const Stretch&, double begin, double end)>& visit);

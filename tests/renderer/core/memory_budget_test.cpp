@@ -49,11 +49,10 @@ TEST(MemoryBudget, RefusesWithTheNumbersWhatIsTooLargeAndWhatOthersHold) {
             std::pair(ErrorCode::tooLarge,
                       std::string("memory for films: expected at most 100 MiB, found 101 MiB")));
   const auto held = MemoryBudget::take(budget, MemoryUse::pictures, 60 * kMiB);
-  EXPECT_EQ(
-      refusal(budget, 41),
-      std::pair(ErrorCode::busy,
-                std::string("memory for films: expected at most 100 MiB with the 60 MiB that are taken, "
-                            "found 41 MiB")));
+  EXPECT_EQ(refusal(budget, 41),
+            std::pair(ErrorCode::busy,
+                      std::string("memory for films: expected at most 100 MiB, of which 60 MiB are in use, "
+                                  "found 41 MiB")));
   EXPECT_EQ(refusal(budget, 40).first, ErrorCode::io);
 }
 

@@ -65,7 +65,7 @@ TEST(ConvertVoxels, SixtyFourBitsSayWhatRoundingCost) {
   EXPECT_THAT(exactText, HasSubstr("(no rounding)"));
   const auto [beyond, beyondText] = converted<double>(StoredType::f64, {1e300, -1e39, 1});
   EXPECT_TRUE(std::isinf(beyond.as<float>()[0]));
-  EXPECT_THAT(beyondText, HasSubstr("2 values beyond its range became infinite"));
+  EXPECT_THAT(beyondText, HasSubstr("2 values beyond the range of float32 became infinite"));
   const auto [lost, lostText] = converted<double>(StoredType::f64, {1e-300});
   EXPECT_EQ(lost.as<float>()[0], 0.0f);
   EXPECT_THAT(lostText, HasSubstr("largest relative rounding error 1)"));

@@ -66,7 +66,7 @@ TEST(LoadDatasets, TheMemoryLimitHoldsForAllFilesTogether) {
   const std::vector<std::filesystem::path> paths{cube(folder, "a", 4), cube(folder, "b", 4)};
   EXPECT_EQ(loadDatasets(paths, 128, {}).size(), 1u);
   EXPECT_THAT(errorOf([&] { loadDatasets(paths, 127, {}); }),
-              HasSubstr("take 64 bytes of memory, the limit is 63 bytes"));
+              HasSubstr("needs 64 bytes of memory, the limit is 63 bytes"));
 }
 
 TEST(LoadDatasets, AFileGivenWithItsHeaderIsLoadedOnceWhicheverComesFirst) {

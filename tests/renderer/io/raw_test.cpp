@@ -121,7 +121,7 @@ TEST(RawFiles, NamesAndSizesThatLieAreRefusedBeforeMemoryIsTaken) {
     EXPECT_NE(loadError(writeBytes(folder / name, gzipped(std::string(27, 'x')))), "") << name;
   }
   EXPECT_THAT(loadError(writeBytes(folder / "a_10x10x10_float64.raw", std::string(8000, '\0')), 11999),
-              HasSubstr("take 12000 bytes of memory, the limit is 11999"));
+              HasSubstr("needs 12000 bytes of memory, the limit is 11999"));
 }
 
 TEST(RawFiles, SidecarKeysAreHonoured) {

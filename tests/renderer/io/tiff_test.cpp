@@ -264,7 +264,7 @@ TEST(TiffFiles, PagesOfAnotherSizeAreRefused) {
   const std::size_t second = 8 + 2 + 9 * 12 + 4 + 12;
   bytes[second + 2 + 8] = 2;  // the width of page 2
   EXPECT_THAT(loadError(writeBytes(folder / "a.tif", bytes)),
-              HasSubstr("page 2: expected 3x2, 1 x uint16 as the first, found 2x2"));
+              HasSubstr("page 2: expected 3x2, 1 x uint16 as on page 1, found 2x2"));
 }
 
 TEST(TiffFiles, ImageJsCountsMustMakeUpThePages) {
