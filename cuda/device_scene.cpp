@@ -26,7 +26,7 @@ DeviceScene::DeviceScene(const kernel::SceneView& host) : view_(host) {
   const std::size_t voxels = std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z);
   std::vector<kernel::ChannelView> channels(host.channels, host.channels + host.channelCount);
   for (kernel::ChannelView& channel : channels) {
-    // By itself: neighbouring threads read neighbouring voxels of one channel.
+    // Each channel is stored by itself: neighbouring threads read neighbouring voxels of one channel.
     visitScalarType(channel.type, [&](auto zero) {
       using T = decltype(zero);
       const T* mixed = static_cast<const T*>(channel.voxels) + channel.lane;

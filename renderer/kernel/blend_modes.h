@@ -56,8 +56,7 @@ SCOLOPAX_HD Largest largestOf(const View& scene, Channels channels, glm::vec3 po
 
 /// Extinctions add up; a collision happens in one channel and has its colour (Eq. 6-7).
 struct BlendDensity {
-  static constexpr bool kSums =
-      true;  ///< the combined bound is the sum of the channels' bounds; else their maximum
+  static constexpr bool kSums = true;       ///< the combined bound is the channels' sum; else their maximum
   static constexpr bool kSeparate = false;  ///< channels are rendered independently
   static constexpr bool kMixes = false;     ///< a collision has the weighted colours of all channels
 };

@@ -51,9 +51,8 @@ inline constexpr float kAlongPlane = 0x1p-21f;
 /// Intersection of a ray with a plane.
 template <class L>
 struct PlaneHit {
-  typename L::Float side,
-      slope;  ///< signed distance of the ray's origin, and its change per t; the side above 0 is kept
-  typename L::Float t;  ///< where the ray crosses the plane; infinite or NaN if it is parallel
+  typename L::Float side, slope;  ///< signed distance of the ray's origin, and its change per t
+  typename L::Float t;            ///< where the ray crosses the plane; infinite or NaN if it is parallel
 
   SCOLOPAX_LANES PlaneHit(const ClipPlaneView& plane, const RayOf<L>& ray)
       : side(sideOf<L>(plane, ray.origin)),

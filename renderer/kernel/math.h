@@ -67,8 +67,7 @@ SCOLOPAX_LANES Float exp2Of(Float x) {
       r * (1.0f + r * (0.5f + r * (0.166666667f +
                                    r * (0.0416666667f +
                                         r * (0.00833333333f + r * (0.00138888889f + r * 0.000198412698f))))));
-  const auto half =
-      rightSigned<1>(whole + right<31>(whole));  // two factors, as 2^whole itself may be out of range
+  const auto half = rightSigned<1>(whole + right<31>(whole));  // two factors: 2^whole may be out of range
   return where(some, p * floatOf(left<23>(half + 127)) * floatOf(left<23>(whole - half + 127)));
 }
 

@@ -71,8 +71,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
   using Vec = typename L::Vec;
   constexpr Detail kDetail = Features::kAny ? Detail::moment : Detail::emission;
   Vec color(0.0f);
-  Float transmittance(1.0f),
-      opacity(0.0f);  // both are kept: 1 - transmittance would lose the digits of thin matter
+  Float transmittance(1.0f), opacity(0.0f);  // both: 1 - transmittance loses the digits of thin matter
   const Mask meets = inside.enter < inside.exit;
   const auto random = sampler.next(meets);
   // A tracker's ray would end where the opacity passes this number.
@@ -137,8 +136,7 @@ struct RayMarch {
                                           const IntervalOf<L>& inside, SamplerOf<L>& sampler, CostOf<L>* cost,
                                           FirstCollisionOf<L>* first) {
     using Float = typename L::Float;
-    const SamplerOf<L> ofStrata =
-        sampler.aside();  // one for all channels, whose sets of numbers are independent
+    const SamplerOf<L> ofStrata = sampler.aside();  // one for all channels: their sets are independent
     Radiance<L> sum{typename L::Vec(0.0f), Float(0.0f)};
     for (int n = 0; n < (blend.separate ? scene.channelCount : 1); ++n) {
       const std::uint32_t channels =

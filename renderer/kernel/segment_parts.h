@@ -10,10 +10,9 @@ namespace scolopax::kernel {
 /// A blend mode as quadrature uses it. Only kSums is chosen at compile time.
 template <bool kSumsExtinction>
 struct Blending {
-  static constexpr bool kSums =
-      kSumsExtinction;  ///< extinctions add up; else only the largest counts (Eq. 8)
-  bool separate;        ///< channels are rendered independently
-  bool mixes;           ///< the largest extinction has the weighted colours of all channels
+  static constexpr bool kSums = kSumsExtinction;  ///< extinctions add up; else the largest counts (Eq. 8)
+  bool separate;                                  ///< channels are rendered independently
+  bool mixes;  ///< the largest extinction has the weighted colours of all channels
 };
 
 /// Computes partAlone() where the opacity depends on |gradient|, which is taken to be linear on the segment
