@@ -152,7 +152,8 @@ class Engine final : public Renderer {
   }
 
  private:
-  /// Makes the plan of a scene. For Method::automatic, chooses method and step first.
+  /// Makes the plan of a scene. For Method::automatic, chooses method and step if the previous choice is not
+  /// valid.
   RebuildStats take(const Scene& scene, const std::stop_token& stop) {
     Scene chosen = scene;
     chosen.targetError = 0;  // does not affect the picture

@@ -22,8 +22,8 @@ struct Pictures {
   double step;  ///< smallest spacings
   std::vector<std::vector<glm::vec4>> samples;
 };
-/// Samples taken first, and at most. Where one step has noise that another has not, more samples distinguish
-/// the noise from bias.
+/// Number of samples taken first, and at most. Where one step has noise that another has not, more samples
+/// distinguish the noise from bias.
 constexpr std::size_t kSamples = 4, kMostSamples = 32;
 /// Maximum number of segments of a ray, at the smallest step.
 constexpr double kMostSegments = 1 << 16;

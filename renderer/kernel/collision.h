@@ -32,7 +32,8 @@ SCOLOPAX_HD inline void keepNearer(FirstCollision* first, const FirstCollision& 
 }
 
 /// Maximum number of tentative collisions of a ray. A ray with more stops there and counts as truncated. This
-/// bounds the work, and is far above what any matter needs that is distinguishable from opaque.
+/// bounds the work, and is far above what is needed for any optical depth that is distinguishable from
+/// opaque.
 inline constexpr std::uint32_t kMaxTentativeCollisions = 1u << 20;
 
 /// Tests a tentative collision of the combined process of several channels in a macrocell, whose combined

@@ -60,8 +60,8 @@ SCOLOPAX_LANES typename L::Float lengthOf(const typename L::Vec& v) {
   return select(largest < kInfinity, divisor * squareRoot(dot(scaled, scaled)), largest);
 }
 
-/// Position of |gradient| on the factor's curve, which may lie outside [0,1] like stretchPosition() in
-/// optical_curve.h; NaN where the gradient is not finite.
+/// Position of |gradient| on the factor's curve. It may lie outside [0,1], like that of stretchPosition() in
+/// optical_curve.h. NaN where the gradient is not finite.
 template <class L>
 SCOLOPAX_LANES_RARE void findFactorPosition(const ChannelView& channel, glm::ivec3 dims,
                                             const typename L::Vec& point, typename L::Float* position) {

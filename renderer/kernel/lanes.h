@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lane types: each holds as many numbers as its instruction set has lanes. Kernels are templates over a lane
-// type, and compute the same bits in every lane. This file lists the functions that lane types share and
-// defines them for `One`, the type with a single lane.
+// type, and a lane computes the same bits with every one of them. This file lists the functions that lane
+// types share and defines them for `One`, the type with a single lane.
 #pragma once
 #include <bit>
 #include <cstdint>
