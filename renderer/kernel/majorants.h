@@ -62,8 +62,8 @@ struct MajorantView {
   const BoundTable* tables;  ///< per visible channel
   /// Cells (i,j,k) outside [filledLow, filledHigh) are empty. The range consists of whole blocks.
   glm::ivec3 filledLow, filledHigh;
-  /// Per cell: bit n is set if the bound of visible channel n is above 0. Used where several rays share a
-  /// walk; null where packets do not need it (PointSegments::meetsSomething).
+  /// Per cell: bit n is set if the bound of visible channel n is above 0. For packets of rays, which look up
+  /// several cells at once; null where they do not need it (PointSegments::meetsSomething).
   const std::uint32_t* active;
 
   /// Combined bound of all visible channels: of the sum of their extinctions or, for blend modes in which the

@@ -91,8 +91,8 @@ class PointSegments {
 
   /// Whether any ray may be in a non-empty cell between `start` and `end`. If none is, the walk has advanced
   /// to the next such cell of every ray or some way towards it, and rays that have none left have ended. If
-  /// MajorantView::active is null, finding one such ray is enough: voxels are then finite and extinctions add
-  /// up, so the segments of the other rays have no extinction.
+  /// MajorantView::active is null, finding one such ray is enough: voxels are then finite, and extinctions
+  /// add up and depend on the value alone, so the segments of the other rays have no extinction.
   SCOLOPAX_LANES bool meetsSomething(Float start, Float end) {
     walk_.jump(start);
     cost_->cellSteps = cost_->cellSteps + Word(onesOf(live_));
