@@ -7,13 +7,13 @@ namespace scolopax::cuda {
 
 void check(cudaError_t result, const char* doing) {
   if (result == cudaSuccess) return;
-  cudaGetLastError();  // else the next call would report this failure again
+  cudaGetLastError();  // clears the error: otherwise, the next call would report it again
   throw Error(result == cudaErrorMemoryAllocation ? ErrorCode::tooLarge : ErrorCode::device,
               std::string("CUDA: ") + doing + " failed: " + cudaGetErrorString(result));
 }
 
 int deviceCount() {
-  int count = 0;  // a failing call leaves it as it is
+  int count = 0;  // a failing call leaves it unchanged
   if (cudaGetDeviceCount(&count) == cudaSuccess) return count;
   cudaGetLastError();
   return 0;

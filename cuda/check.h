@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Results of the CUDA runtime become exceptions here.
+// Turns errors of the CUDA runtime into exceptions.
 #pragma once
 #include <cuda_runtime_api.h>
 
 namespace scolopax::cuda {
 
-/// Throws Error(tooLarge) when the device's memory is used up and Error(device) for any other failure;
-/// `doing` says what failed: "copying 64 bytes to the device".
+/// Throws Error(tooLarge) if the device is out of memory, and Error(device) for any other failure. `doing`
+/// names the operation that failed: "copying 64 bytes to the device".
 void check(cudaError_t result, const char* doing);
 
-/// Devices that can be used; 0 without a driver, with one too old, or when anything else is wrong.
+/// Number of usable devices; 0 without a driver, with a driver that is too old, or after any other error.
 int deviceCount();
 
 }  // namespace scolopax::cuda

@@ -9,15 +9,16 @@
 
 namespace scolopax::cuda {
 
-/// `count` objects of T on the device; move-only. T is copied byte by byte. No memory is taken for none.
+/// `count` objects of T on the device; move-only. T is copied byte by byte. An empty buffer allocates no
+/// memory.
 template <class T>
 class DeviceBuffer {
  public:
   DeviceBuffer() = default;
-  /// Uninitialised. Throws Error(tooLarge) when the memory cannot be had.
+  /// Leaves the memory uninitialised. Throws Error(tooLarge) if it cannot be allocated.
   explicit DeviceBuffer(std::size_t count) : count_(count) {
     void* memory = nullptr;
-    if (count > 0) check(cudaMalloc(&memory, count * sizeof(T)), "taking device memory");
+    if (count > 0) check(cudaMalloc(&memory, count * sizeof(T)), "allocating device memory");
     data_ = static_cast<T*>(memory);
   }
   explicit DeviceBuffer(std::span<const T> host) : DeviceBuffer(host.size()) {
@@ -39,7 +40,7 @@ class DeviceBuffer {
   void fillWithZeros() {
     if (count_ > 0) check(cudaMemset(data_, 0, count_ * sizeof(T)), "clearing device memory");
   }
-  /// Waits for the kernels before it; host.size() must be count().
+  /// Waits for kernels launched before. host.size() must be count().
   void copyTo(std::span<T> host) const {
     if (count_ > 0)
       check(cudaMemcpy(host.data(), data_, host.size_bytes(), cudaMemcpyDeviceToHost),

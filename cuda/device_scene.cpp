@@ -27,7 +27,7 @@ DeviceScene::DeviceScene(const kernel::SceneView& host) : view_(host) {
   std::vector<kernel::ChannelView> channels(host.channels, host.channels + host.channelCount);
   for (int n = 0; n < host.channelCount; ++n) {
     kernel::ChannelView& channel = channels[std::size_t(n)];
-    // By itself: neighbouring threads read neighbouring voxels of one channel.
+    // Each channel is stored by itself: neighbouring threads read neighbouring voxels of one channel.
     visitScalarType(channel.type, [&](auto zero) {
       using T = decltype(zero);
       const T* mixed = static_cast<const T*>(channel.voxels) + channel.lane;

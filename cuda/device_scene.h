@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene's arrays in device memory: what a render plan's view points to, uploaded. Kernels read it.
+// A scene's arrays in device memory: a copy of what the view of a render plan points to. Kernels read it.
 #pragma once
 #include <vector>
 
@@ -10,9 +10,10 @@ namespace scolopax::cuda {
 
 class DeviceScene {
  public:
-  /// Copies everything that `host` points to. Throws Error(tooLarge) when it does not fit the device.
+  /// Copies the arrays that `host` points to, except MajorantView::active, which kernels on devices do not
+  /// use. Throws Error(tooLarge) if they do not fit into the device's memory.
   explicit DeviceScene(const kernel::SceneView& host);
-  /// The same scene with pointers of the device; valid as long as this object.
+  /// The same scene with device pointers; valid while this object lives.
   const kernel::SceneView& view() const { return view_; }
 
  private:

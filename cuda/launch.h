@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Passes over a picture on a CUDA device: scene up, one sample of every pixel and its cost back.
+// Passes over a picture on a CUDA device: uploads a scene, and returns one sample of every pixel and its
+// cost.
 #pragma once
 #include <cuda_runtime_api.h>
 
@@ -12,7 +13,7 @@
 
 namespace scolopax::cuda {
 
-/// As kernel::RenderPixel; pointers are the device's.
+/// As kernel::RenderPixel, with device pointers.
 struct DevicePass {
   kernel::SceneView scene;
   kernel::SampleNumber number;
@@ -23,18 +24,18 @@ struct DevicePass {
 /// Starts a pass without waiting for it.
 using LaunchFunction = cudaError_t (*)(const DevicePass&);
 
-/// The kernels of one integrator, each in a file of its own; `plain` ones draw only what a PlainSceneView can
-/// show.
+/// The kernels of one integrator for a scene. Each integrator is compiled in a file of its own. With `plain`,
+/// they can render only what a PlainSceneView can represent.
 template <class Integrator>
 LaunchFunction chooseLaunch(const Scene& scene, bool plain);
 
 class Passes {
  public:
-  /// `view` is that of a render plan of `scene`. `counting` sums up what the samples cost.
+  /// `view` is that of a render plan of `scene`. `counting`: sum up the costs of samples.
   Passes(const Scene& scene, const kernel::SceneView& view, bool counting);
   /// Renders one sample of every pixel into width x height linear premultiplied RGBA values.
   void render(const kernel::SampleNumber& number, std::span<glm::vec4> pixels);
-  /// Of all passes so far, one per pixel; empty unless counting.
+  /// Costs of all passes so far, one per pixel; empty unless counting.
   std::vector<kernel::SampleCost> cost() const;
 
  private:

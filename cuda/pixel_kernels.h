@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kernels as CUDA runs them: a thread for every pixel, an instance for every combination that a scene can
-// ask for. An integrator's instances are compiled in a file of their own, kernels_*.cu.
+// The kernels for CUDA: one thread per pixel, and one instance for every combination that a scene can use.
+// The instances of each integrator are compiled in a file of its own, kernels_*.cu.
 #pragma once
 #include <cuda_runtime.h>
 

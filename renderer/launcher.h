@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What runs kernels: the processor's threads (cpu/) or a device. The engine asks one for passes; everything
-// above pixels is the engine's.
+// A launcher runs kernels on the CPU's threads (cpu/) or on a device. The engine calls it to render passes,
+// and does everything above the level of pixels itself.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -15,14 +15,15 @@
 
 namespace scolopax {
 
-/// One sample of every pixel of a picture; pixels, cost and first as in kernel::RenderPixel.
+/// One sample of every pixel of a picture. `cost` and `first` are as in kernel::RenderPixel, and `pixels` is
+/// its `pass`.
 struct Pass {
   kernel::SceneView scene;
   kernel::SampleNumber number;
   glm::vec4* pixels;
   kernel::SampleCost* cost;
   kernel::FirstCollision* first;
-  std::uint8_t* done;  ///< width x height: pixels of this pass that are rendered; the others are still to do
+  std::uint8_t* done;  ///< width x height: nonzero for the pixels of this pass that are already rendered
   const std::atomic<bool>* cancel;
   std::chrono::steady_clock::time_point deadline;
 };
@@ -32,12 +33,13 @@ class Launcher {
  public:
   virtual ~Launcher() = default;
   virtual std::string_view name() const = 0;
-  /// Calls f with the threads that are the launcher's: parallel loops in it take no others. Rethrows what it
+  /// Calls f in the launcher's thread arena: parallel loops in f use no other threads. Rethrows what f
   /// throws.
   virtual void run(const std::function<void()>& f) = 0;
-  /// Renders what is still to do of a pass, with the method, blend mode and light of `scene`, whose method is
-  /// not automatic. Returns false when something is left, because `cancel` became true or the deadline
-  /// passed; both are looked at every few pixels. Takes the caller's threads: see run().
+  /// Renders the pixels of a pass that are not yet done, with the method, blend mode and lighting of `scene`;
+  /// Method::automatic renders as superposed. Returns false if pixels are left because `cancel` became true
+  /// or the deadline passed; both are checked every few pixels. Runs in the caller's thread arena: call it
+  /// from run() to use the launcher's threads.
   virtual bool launch(const Scene& scene, const Pass& pass) = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The processor's threads: kernels over tiles, by TBB.
+// The CPU launcher: runs kernels over tiles of pixels with TBB.
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -13,7 +13,7 @@ namespace scolopax {
 namespace {
 
 TileFunction chooseTiles(Scene scene, const kernel::SceneView& view) {
-  scene.shadows = scene.shadows && view.lightCount > 0;  // without light there is nothing to take away
+  scene.shadows = scene.shadows && view.lightCount > 0;  // without lights there is nothing to block
   if (hasStep(scene.method)) return quadratureTileFunction(scene, view);
   return visitIntegrator(scene,
                          [&](auto type) { return chooseTileFunction<typename decltype(type)::type>(scene); });

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// The processor's instruction sets that there is code for.
+// The instruction sets for which there is code.
 #pragma once
 
 namespace scolopax {
 
-/// Each has what those before it have.
+/// Each includes those before it.
 enum class InstructionSet { baseline, avx2, avx512 };
 
-/// Whether this processor has it.
+/// Whether this processor supports the set.
 bool available(InstructionSet set);
-/// The fastest that this processor has; at most the one that SCOLOPAX_INSTRUCTIONS names in the environment
-/// (baseline, avx2), for measurements and tests.
+/// The fastest set that this processor supports. The environment variable SCOLOPAX_INSTRUCTIONS (baseline or
+/// avx2) sets an upper limit, for measurements and tests.
 InstructionSet fastestInstructionSet();
 
 }  // namespace scolopax

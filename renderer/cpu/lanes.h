@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the lane types of all instruction sets are made of in the same way. Included by lanes_*.h. Functions
-// that are not inlined (SCOLOPAX_LANES_APART) take and return lanes in memory: GCC 12 may clear the upper
-// halves of registers before it returns.
+// The parts of lane types that are the same for all instruction sets. Included by lanes_*.h. Functions that
+// are not inlined (SCOLOPAX_LANES_APART) take and return lanes in memory: GCC 12 may clear the upper halves
+// of registers before they return.
 #pragma once
 #include <bit>
 #include <glm/vec3.hpp>
@@ -22,7 +22,7 @@ SCOLOPAX_LANES Mask isFinite(Float x) {
   const Int exponent = 0x7f800000;
   return without(everywhere(), (bitsOf(x) & exponent) == exponent);
 }
-/// Both halves are exact, so that their sum is rounded as the number itself would be.
+/// Both halves are exact, so their sum is rounded as the number itself would be.
 SCOLOPAX_LANES Float floatOfWord(Int k) { return toFloat(right<16>(k)) * 65536.0f + toFloat(k & 0xffff); }
 SCOLOPAX_LANES Int gather(const std::uint32_t* base, Int index) { return gatherWords<4>(base, index); }
 SCOLOPAX_LANES Int gather(const std::uint16_t* base, Int index) {
@@ -48,7 +48,7 @@ SCOLOPAX_LANES Vec select(Mask m, const Vec& a, const Vec& b) {
   return {select(m, a[0], b[0]), select(m, a[1], b[1]), select(m, a[2], b[2])};
 }
 
-/// The lane type.
+/// The lane type of this instruction set.
 struct Lanes {
   static constexpr int kLanes = SCOLOPAX_SIMD_SPACE::kLanes;
   using Float = SCOLOPAX_SIMD_SPACE::Float;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Eight lanes in AVX2 (kernel/lanes.h says what the functions mean). Before all kernels, in files of this
-// instruction set alone.
+// The AVX2 lane type, with eight lanes (kernel/lanes.h explains the functions). Included before all kernels,
+// and only in files for this instruction set.
 #pragma once
 #include <immintrin.h>
 

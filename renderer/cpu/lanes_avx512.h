@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sixteen lanes in AVX-512 (kernel/lanes.h says what the functions mean). Before all kernels, in files of
-// this instruction set alone.
+// The AVX-512 lane type, with sixteen lanes (kernel/lanes.h explains the functions). Included before all
+// kernels, and only in files for this instruction set.
 #pragma once
 #include <immintrin.h>
 
@@ -39,7 +39,8 @@ SCOLOPAX_LANES Int operator*(Int a, Int b) { return {_mm512_mullo_epi32(a.v, b.v
 SCOLOPAX_LANES Int operator&(Int a, Int b) { return {_mm512_and_si512(a.v, b.v)}; }
 SCOLOPAX_LANES Int operator^(Int a, Int b) { return {_mm512_xor_si512(a.v, b.v)}; }
 SCOLOPAX_LANES Int operator|(Int a, Int b) { return {_mm512_or_si512(a.v, b.v)}; }
-// Masked intrinsics where the others of GCC 12 begin with a vector that its warnings find uninitialised.
+// Some intrinsics are the masked ones: in GCC 12, the others start from a vector that its warnings take to be
+// uninitialised.
 template <int kBits>
 SCOLOPAX_LANES Int left(Int a) {
   return {_mm512_maskz_slli_epi32(0xffff, a.v, kBits)};

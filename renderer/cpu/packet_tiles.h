@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Quadrature of a packet of rays, one a lane, and tiles of such packets. Included by the files that compile
-// it for an instruction set, after its lane type.
+// Quadrature of packets of rays, one ray per lane, and tiles of such packets. Included after a lane type by
+// the files that compile it for an instruction set.
 #pragma once
 #include <algorithm>
 #include <bit>
@@ -13,11 +13,12 @@
 
 namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
-/// Pixels of a packet: neighbours, which share voxels and macrocells.
+/// Pixels of a packet: neighbours, because their rays share voxels and macrocells.
 inline constexpr int kPacketWidth = 4, kPacketHeight = kLanes / kPacketWidth;
 static_assert(kTile % kPacketWidth == 0 && kTile % kPacketHeight == 0);
 
-/// kernel::RenderPixel for the pixels of a packet from (x, y) on, as far as they are below (endX, endY).
+/// Does what kernel::RenderPixel does, for a packet of pixels whose top left one is (x, y). Skips pixels that
+/// are already done and those with a column >= endX or a row >= endY.
 template <class Features, class Blend>
 SCOLOPAX_LANES_APART void renderPacket(const Pass& pass, const Blend& blend, int x, int y, int endX,
                                        int endY) {
@@ -30,7 +31,8 @@ SCOLOPAX_LANES_APART void renderPacket(const Pass& pass, const Blend& blend, int
     if (column < endX && row < endY && !pass.done[pixels[i]]) todo |= 1u << i;
   }
   if (todo == 0) return;
-  // Not what was stored one by one: a load that has to wait for many stores is slow.
+  // Not loaded from `pixels`, which is stored element by element: a load that must wait for many stores is
+  // slow.
   const Int columns = Int(x) + (laneNumbers() & Int(kPacketWidth - 1));
   const Int rows = Int(y) + right<std::countr_zero(unsigned(kPacketWidth))>(laneNumbers());
   const Mask wanted = maskOf(todo);

@@ -9,7 +9,7 @@ namespace scolopax {
 
 TileFunction packetTileFunction(const Scene& scene, const kernel::SceneView& view, InstructionSet set) {
   const auto cells = glm::dvec3(view.majorants.cells);
-  // The walk of a packet counts cells in 32 bits.
+  // The walk of a packet has cell indices of 32 bits.
   if (!hasStep(scene.method) || cells.x * cells.y * cells.z >= 0x1p30) return nullptr;
   switch (set) {
     case InstructionSet::avx512:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #if defined(__x86_64__)
 #include "renderer/cpu/lanes_avx512.h"
-// The lane type comes first.
+// After the lane type.
 #include "renderer/cpu/packet_tiles.h"
 #endif
 #include "renderer/cpu/ray_packets.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// kernel/sample_volume.h at a point a lane, with the same bits: one channel by gathering, neighbouring
-// channels four at once. After lanes_*.h.
+// kernel/sample_volume.h for one point per lane, with the same bits. Single channels are gathered;
+// neighbouring channels are read four at a time. Included after lanes_*.h.
 #pragma once
 #include <cstring>
 
@@ -8,13 +8,14 @@
 
 namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
-/// kernel::axisWeight: neighbours' indices, and the weight of the second.
+/// As kernel::AxisWeight, for one axis: the voxel indices of the two neighbours, and the weight of the
+/// second.
 struct Axis {
   Int low, high;
   Float t;
   Mask swapped;  ///< at the last voxel, where the neighbour is the one before
 };
-/// The axis has two voxels or more.
+/// `size` must be at least 2.
 SCOLOPAX_LANES Axis axisOf(Float x, int size) {
   const Float inside = clamp(x, 0.0f, float(size - 1));
   const Int whole = truncated(inside), last = Int(size - 2);
@@ -23,13 +24,13 @@ SCOLOPAX_LANES Axis axisOf(Float x, int size) {
   return {whole, select(swapped, last, whole + Int(1)), select(swapped, Float(0.0f), t), swapped};
 }
 
-/// Points among voxels.
+/// One point per lane, and its neighbouring voxels.
 struct Points {
   glm::ivec3 dims;
   Vec place;
   Axis x, y, z;
-  std::size_t first;  ///< the slice that gathers' indices, which are of 32 bits, count from: that of lane 0
-  float slices;       ///< at most so many are between them
+  std::size_t first;  ///< slice from which gathers count their 32-bit indices: that of lane 0
+  float slices;       ///< upper limit of the number of slices that these indices span
 };
 SCOLOPAX_LANES Points pointsAt(glm::ivec3 dims, const Vec& point) {
   Points points;
@@ -42,7 +43,7 @@ SCOLOPAX_LANES Points pointsAt(glm::ivec3 dims, const Vec& point) {
   points.slices = float(largestOf(maximum(away, Int(0) - away)) + 3);
   return points;
 }
-/// Lanes need a neighbour on every axis.
+/// Whether an axis has a single voxel. Lanes need a neighbour on every axis.
 SCOLOPAX_LANES bool isFlat(glm::ivec3 dims) { return dims.x < 2 || dims.y < 2 || dims.z < 2; }
 
 SCOLOPAX_LANES Float lerp(Float a, Float b, Float t) { return a + t * (b - a); }
@@ -50,7 +51,7 @@ SCOLOPAX_LANES __m128 lerp4(__m128 a, __m128 b, float t) {
   return _mm_add_ps(a, _mm_mul_ps(_mm_set1_ps(t), _mm_sub_ps(b, a)));
 }
 
-/// Voxels at these indices.
+/// Voxels at the given indices.
 template <class T>
 SCOLOPAX_LANES Float voxelsAt(const T* voxels, Int index) {
   if constexpr (std::is_same_v<T, float>) return gather(voxels, index);
@@ -60,8 +61,8 @@ SCOLOPAX_LANES Float voxelsAt(const T* voxels, Int index) {
   return toFloat(rightSigned<16>(left<16>(word)));
 }
 
-/// Interpolates along x from the voxels at `index` to the neighbours, `stride` further; of small ones that
-/// are next to each other one read gets both.
+/// Interpolates along x between the voxels at `index` and their neighbours, `stride` further on. Adjacent
+/// voxels of less than 32 bits are read in pairs.
 template <class T>
 SCOLOPAX_LANES Float alongX(const T* voxels, Int index, int stride, const Axis& x) {
   Float a, b;
@@ -80,7 +81,7 @@ SCOLOPAX_LANES Float alongX(const T* voxels, Int index, int stride, const Axis& 
   return lerp(select(x.swapped, b, a), select(x.swapped, a, b), x.t);
 }
 
-/// One channel.
+/// Samples one channel, whose voxels are of type T, by gathering.
 template <class T>
 SCOLOPAX_LANES Float sampleOne(const Points& at, const kernel::ChannelView& channel) {
   const int stride = channel.stride;
@@ -98,7 +99,8 @@ SCOLOPAX_LANES Float sampleOne(const Points& at, const kernel::ChannelView& chan
   return lerp(lerp(c00, c10, at.y.t), lerp(c01, c11, at.y.t), at.z.t);
 }
 
-/// One channel, whatever its type.
+/// Samples one channel of any type: by gathering if every axis has neighbours and 32-bit indices suffice,
+/// else lane by lane.
 SCOLOPAX_LANES Float sampleChannel(const Points& at, const kernel::ChannelView& channel) {
   if (isFlat(at.dims) ||
       !(at.slices * float(at.dims.x) * float(at.dims.y) * float(channel.stride) < 0x1p29f)) {
@@ -123,7 +125,7 @@ SCOLOPAX_LANES Float sampleChannel(const Points& at, const kernel::ChannelView& 
   return sampleOne<float>(at, channel);
 }
 
-/// Four channels of a voxel.
+/// Reads four channels of a voxel.
 SCOLOPAX_LANES __m128 load4(const std::uint8_t* v) {
   int bytes;
   std::memcpy(&bytes, v, sizeof bytes);
@@ -137,8 +139,8 @@ SCOLOPAX_LANES __m128 load4(const std::int16_t* v) {
 }
 SCOLOPAX_LANES __m128 load4(const float* v) { return _mm_loadu_ps(v); }
 
-/// Four neighbouring channels; members[lane - first lane] is where a channel's values go, or
-/// null.
+/// Samples four neighbouring channels, the first of which is at `lane`. The values of the channel at lane + i
+/// go to members[i], unless that is null.
 template <class T>
 SCOLOPAX_SIMD void sampleFour(const Points& at, const kernel::ChannelView& channel, int lane,
                               float* const* members) {
@@ -173,14 +175,14 @@ SCOLOPAX_LANES Float sampleStored(const kernel::ChannelView& channel, glm::ivec3
   return sampleChannel(pointsAt(dims, point), channel);
 }
 
-/// Channels by their bits; the values of channel n come into values[n].
+/// Samples `channels` (bit n: visible channel n). The values of channel n go to values[n].
 SCOLOPAX_LANES void sampleChannels(const kernel::SceneView& scene, std::uint32_t channels, const Vec& point,
                                    Float* values) {
   const Points at = pointsAt(scene.dims, point);
   for (int n = 0; n < scene.channelCount; ++n) {
     if (!(channels >> n & 1)) continue;
     const kernel::ChannelView& channel = scene.channels[n];
-    // Channels that lie in the same four.
+    // Finds the channels in the same group of four.
     const int lane = channel.lane & ~3;
     float* members[4] = {};
     std::uint32_t found = 0;

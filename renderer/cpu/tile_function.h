@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// One sample of every pixel, in tiles: what the CPU's launcher asks of its kernels.
+// Functions that render one sample of every pixel of a tile. The CPU launcher calls them; kernels implement
+// them.
 #pragma once
 #include "renderer/launcher.h"
 
 namespace scolopax {
 
-/// Neighbouring rays share voxels and macrocells.
+/// Side of a tile, in pixels. Neighbouring rays share voxels and macrocells.
 inline constexpr int kTile = 16;
 
-/// Renders the tile at (tileX, tileY), in tiles.
+/// Renders tile (tileX, tileY) of a pass, counted in tiles.
 using TileFunction = void (*)(const Pass&, int tileX, int tileY);
 
-/// The kernels of one integrator, each in a file of its own, kernels_*.cpp.
+/// The tile function of one integrator for a scene. Each integrator is compiled in a file of its own,
+/// kernels_*.cpp.
 template <class Integrator>
 TileFunction chooseTileFunction(const Scene& scene);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kernels over a tile of pixels, one instance for every combination that a scene can ask for. Included by the
-// files that compile an integrator's instances.
+// Kernels over a tile of pixels, instantiated for every combination that a scene can use. Included by the
+// files that compile the instances of an integrator.
 #pragma once
 #include <algorithm>
 
@@ -19,7 +19,7 @@ void renderTile(const Pass& pass, int tileX, int tileY) {
   const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
   const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
   for (int y = tileY * kTile; y < endY; ++y) {
-    // The clock is looked at once a row: it costs about a tenth of a ray.
+    // The clock is read once per row: reading it costs about a tenth of a ray.
     if (std::chrono::steady_clock::now() >= pass.deadline) return;
     for (int x = tileX * kTile; x < endX; ++x) {
       const int pixel = y * pass.scene.width + x;

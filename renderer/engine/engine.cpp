@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The engine: makes plans, owns the film, has a launcher render passes, and knows everything else of a
-// picture.
+// The engine: makes render plans, owns the film, has a launcher render passes, and keeps errors, costs and
+// AOVs.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -41,7 +41,7 @@ class Engine final : public Renderer {
     const std::uint64_t bytesBefore = memory_.bytes();
     RebuildStats stats;
     try {
-      // Memory first: when there is none, plan and film stay as they were.
+      // Memory first: if there is not enough, the plan and the film stay as they were.
       memory_.resize(std::max<std::uint64_t>(bytesBefore, bytes));
       if (newSize) resized.reset(scene.width, scene.height);
       launcher_->run([&] { stats = take(scene, stop); });
@@ -63,7 +63,7 @@ class Engine final : public Renderer {
   }
   bool takesLong(const Scene& scene) const override {
     const auto pixels = std::size_t(scene.width) * std::size_t(scene.height);
-    // Memory of a large film takes its time to be given back, and records to be emptied.
+    // Freeing the memory of a large film takes time, and so does clearing the records.
     const bool largeFilm = std::max(pixels, film_.pixelCount()) >= kLargePicture &&
                            (pixels != film_.pixelCount() || recording_ || counting_);
     return largeFilm || scene.method == Method::automatic || !plan_ || plan_->nextTakesLong(scene);
@@ -103,7 +103,7 @@ class Engine final : public Renderer {
     return std::hypot(*noise_, bias_.value_or(0));
   }
   bool errorTakesLong() const override {
-    // A film of few samples may be one of many that edits make, and is not worth the thumbnails.
+    // A film of few samples may be one of many that edits cause, and is not worth the thumbnails.
     return hasStep(plan_->scene().method) && !bias_ && film_.samples() >= kSamplesWorthBias;
   }
   Image image() const override {
@@ -152,10 +152,11 @@ class Engine final : public Renderer {
   }
 
  private:
-  /// Makes the plan; what is left to us of the scene is chosen.
+  /// Makes the plan of a scene. For Method::automatic, chooses method and step if the previous choice is not
+  /// valid.
   RebuildStats take(const Scene& scene, const std::stop_token& stop) {
     Scene chosen = scene;
-    chosen.targetError = 0;  // makes no picture of its own
+    chosen.targetError = 0;  // does not affect the picture
     const bool automatic = scene.method == Method::automatic;
     Choice choice = automatic_;
     double bias = automaticBias_;
@@ -170,7 +171,7 @@ class Engine final : public Renderer {
       stats.rebuildMs += own.rebuildMs;
     };
     if (automatic) {
-      // The choice before, if there was one: when nothing else is new either, the film goes on.
+      // Tries the previous choice first: if nothing else has changed, the film is kept.
       chosen.method = choice.method;
       chosen.step = choice.step;
       if (!plan_ || !plan_->makesSamePicture(chosen) || scene.targetError != target_) {
@@ -185,21 +186,22 @@ class Engine final : public Renderer {
     plan_ = std::move(plan);
     automatic_ = choice;
     automaticBias_ = bias;
-    target_ = automatic ? scene.targetError : 0;  // what was chosen is of no other scene
+    target_ = automatic ? scene.targetError : 0;  // the choice is not valid for other scenes
     return stats;
   }
 
-  /// Method and step for a scene that leaves them to us, with the bias that was found; on a plan of it.
+  /// Chooses method and step for a scene with Method::automatic. Returns them with the estimated bias.
+  /// `trial` is a plan of the scene.
   std::pair<Choice, double> choose(const Scene& scene, const RenderPlan& trial, const std::stop_token& stop) {
-    // Shadow rays are what costs most where there are any.
+    // Shadow rays, if there are any, cost the most.
     const Method quadrature = scene.shadows ? Method::hybrid : Method::raymarch;
-    // Half of the error is left to noise.
+    // Half of the error is left for noise.
     const auto found = largestStep(*launcher_, trial, quadrature, scene.targetError / 2, stop);
     if (!found) return {{Method::superposed, Scene().step}, 0};
     return {{quadrature, found->step}, found->bias};
   }
 
-  /// Of a film of this size, and of all that is kept of its pixels.
+  /// Bytes of a film of this size, with all records of its pixels.
   std::size_t filmBytes(std::size_t pixels, const Scene& scene) const {
     const std::size_t counted = counting_ ? sizeof(kernel::SampleCost) : 0;
     const std::size_t recorded =
@@ -218,13 +220,13 @@ class Engine final : public Renderer {
       fetches_.assign(pixels, 0);
       first_.reset(pixels, plan_->scene().channels.size());
     } catch (const std::bad_alloc&) {
-      throw Error(ErrorCode::tooLarge, "image: no memory for what is recorded of " +
+      throw Error(ErrorCode::tooLarge, "image: no memory for the records of " +
                                            std::to_string(film_.width()) + "x" +
                                            std::to_string(film_.height()) + " pixels");
     }
   }
 
-  /// Moves what a pass has cost into sums that do not overflow.
+  /// Moves the costs of a pass into sums that do not overflow.
   void addCosts() {
     stats_.rays += cost_.size();
     for (std::size_t i = 0; i < cost_.size(); ++i) {
@@ -239,22 +241,22 @@ class Engine final : public Renderer {
 
   const std::unique_ptr<Launcher> launcher_;
   const std::shared_ptr<MemoryBudget> budget_;
-  MemoryBudget::Share memory_;  // of the film and what is recorded
+  MemoryBudget::Share memory_;  // for the film and its records
   const std::shared_ptr<const Volume> volume_;
   std::shared_ptr<const RenderPlan> plan_;  // null until there is a scene
   Film film_;
-  std::vector<std::uint8_t> done_;  // pixels that a pass has behind it
+  std::vector<std::uint8_t> done_;  // pixels that the current pass has rendered
   bool counting_ = false, recording_ = false;
-  std::vector<kernel::SampleCost> cost_;  // of the pass, one per pixel while counting
+  std::vector<kernel::SampleCost> cost_;  // of the current pass, one per pixel while counting
   RenderStats stats_;
   std::vector<std::uint64_t> fetches_;  // one per pixel while recording
   FirstCollisions first_;
   static constexpr std::uint32_t kSamplesWorthBias = 16;
   Choice automatic_{Method::raymarch, 1};
   double automaticBias_ = 0;
-  double target_ = 0;                    // for which it was made
-  mutable std::optional<double> noise_;  // of the film as it stands, once somebody has asked for its error
-  mutable std::optional<double> bias_;   // of the film, once somebody has asked for its error
+  double target_ = 0;                    // target error of the choice
+  mutable std::optional<double> noise_;  // of the current film, once its error was requested
+  mutable std::optional<double> bias_;   // of the current film, once it is known
 };
 
 }  // namespace

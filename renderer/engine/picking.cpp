@@ -11,7 +11,7 @@ namespace {
 
 const std::atomic<bool> kNever{false};
 
-/// Of a pixel: within it, the samples of the filter `point` are one.
+/// Distance between samples with the filter `point`, in pixels: so small that they are practically one point.
 constexpr float kPointUnit = 0x1p-20f;
 
 class SampledPicking final : public Picking {
@@ -27,9 +27,9 @@ class SampledPicking final : public Picking {
         isPoint_(scene.filter == PixelFilter::point),
         unit_(isPoint_ ? kPointUnit : 1.0f / float(side_)),
         view_(plan_->view()) {
-    unlit_.shading = unlit_.shadows = false;  // light changes nothing of what a ray meets
+    unlit_.shading = unlit_.shadows = false;  // lighting does not change what a ray hits
     view_.rays = makeCameraRays(scene.camera, plan_->grid(), scene.width, scene.height);
-    // Depths from where rays start: from a far eye they would be too coarse for a point.
+    // Depths are measured from where rays start: from a distant eye, they would be too coarse for a point.
     start_ = double(std::exchange(view_.rays.start, 0.0f));
     halfSize_ = view_.rays.halfSize;
     view_.rays.pixelSize *= unit_;
@@ -47,7 +47,8 @@ class SampledPicking final : public Picking {
   bool run(std::chrono::nanoseconds budget) override {
     const auto deadline = std::chrono::steady_clock::now() + budget;
     for (; at_ < pixels_.size(); ++at_) {
-      // A picture of the pixel, whose own pixels are the samples: kernels take many at a time.
+      // Renders a picture of the pixel in which every pixel is a sample, because kernels take many pixels at
+      // a time.
       const glm::vec2 corner = glm::vec2(pixels_[at_]) + (isPoint_ ? 0.5f : 0.0f);
       view_.rays.halfSize = (halfSize_ - corner) / unit_;
       if (!launcher_.launch(unlit_, {view_, number_, colors_.data(), nullptr, met_.data(), done_.data(),
@@ -62,7 +63,7 @@ class SampledPicking final : public Picking {
   const std::vector<Picked>& found() const override { return found_; }
 
  private:
-  /// Where a sample of the pixel has ended.
+  /// What a sample of the pixel has hit.
   Picked pickedBy(int sample) const {
     const kernel::FirstCollision& met = met_[std::size_t(sample)];
     const int column = sample % side_, row = sample / side_;
@@ -81,12 +82,12 @@ class SampledPicking final : public Picking {
   const std::vector<glm::ivec2> pixels_;
   const int side_;
   const bool isPoint_;
-  const float unit_;        // between samples, in pixels; a power of two, so that it costs no precision
-  kernel::SceneView view_;  // of the pixel that is looked at
+  const float unit_;  // distance between samples, in pixels; a power of two, so that it costs no precision
+  kernel::SceneView view_;  // of the current pixel
   double start_ = 0;
   glm::vec2 halfSize_{0};  // of the picture
   std::size_t at_ = 0;
-  std::vector<kernel::FirstCollision> met_;  // by the samples of that pixel
+  std::vector<kernel::FirstCollision> met_;  // per sample of the current pixel
   std::vector<glm::vec4> colors_;
   std::vector<std::uint8_t> done_;
   std::vector<Picked> found_;

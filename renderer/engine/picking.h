@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pick by the kernels of the picture: samples of single pixels, on the thread of the caller.
+// Picking with the kernels that render the picture: takes samples of single pixels, on the caller's thread.
 #pragma once
 #include <memory>
 
@@ -9,7 +9,7 @@
 
 namespace scolopax {
 
-/// `scene`: that of the plan, but for size, method, step and filter. Borrows the launcher.
+/// `scene` is that of the plan, except that size, method, step and filter may differ. Borrows the launcher.
 std::unique_ptr<Picking> makePicking(Launcher& launcher, std::shared_ptr<const RenderPlan> plan,
                                      const Scene& scene, const PixelArea& area);
 

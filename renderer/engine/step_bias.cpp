@@ -16,15 +16,16 @@ namespace {
 
 constexpr double kSteps[] = {4, 2, 1, 0.5, 0.25, 0.125};
 
-/// Independent samples at one step. Sample s of every step has the same random numbers, and so nearly the
+/// Independent samples at one step. Sample s has the same random numbers at every step, and so nearly the
 /// same noise.
 struct Pictures {
   double step;  ///< smallest spacings
   std::vector<std::vector<glm::vec4>> samples;
 };
-/// Where one has noise that another step has not, more samples tell it from bias: up to so many.
+/// Number of samples taken first, and at most. Where one step has noise that another has not, more samples
+/// distinguish the noise from bias.
 constexpr std::size_t kSamples = 4, kMostSamples = 32;
-/// Of a ray, at the smallest step.
+/// Maximum number of segments of a ray, at the smallest step.
 constexpr double kMostSegments = 1 << 16;
 
 class Thumbnails {
@@ -37,7 +38,7 @@ class Thumbnails {
     view_.width = std::max(1, int(std::lround(scene.width * scale)));
     view_.height = std::max(1, int(std::lround(scene.height * scale)));
     view_.rays = makeCameraRays(scene.camera, plan.grid(), view_.width, view_.height);
-    view_.filterBox = false;  // all steps through the same points
+    view_.filterBox = false;  // the rays of all steps go through the same points
     view_.seed = 0;
     view_.stratum = stratumOf(scene.method);
   }
@@ -47,7 +48,7 @@ class Thumbnails {
     addSamples(pictures, kSamples);
     return pictures;
   }
-  /// Throws Error(cancelled) once a stop is requested.
+  /// Adds samples until there are `count`. Throws Error(cancelled) once a stop is requested.
   void addSamples(Pictures& pictures, std::size_t count) {
     view_.step = view_.smallestSpacing * float(pictures.step);
     const std::size_t pixels = std::size_t(view_.width) * std::size_t(view_.height);
@@ -58,7 +59,7 @@ class Thumbnails {
       const Pass pass{view_,   number,      sample.data(), nullptr,
                       nullptr, done.data(), &stopped_,     std::chrono::steady_clock::time_point::max()};
       if (!launcher_.launch(scene_, pass))
-        throw Error(ErrorCode::cancelled, "nobody waits for the bias of a step");
+        throw Error(ErrorCode::cancelled, "the bias estimate was cancelled");
       rays_ += pixels;
     }
   }
@@ -77,14 +78,14 @@ class Thumbnails {
   std::stop_callback<RaiseFlag> onStop_;
 };
 
-/// An estimate, and the standard deviation that its pixels' spread gives it.
+/// An estimate, and its standard deviation from the spread of the pixels.
 struct Estimate {
   double value, deviation;
   double upper() const { return std::max(0.0, value) + kDeviations * deviation; }
 };
 
-/// Mean squared difference of the expected pictures of two steps: from products of different samples, in
-/// which noise cancels out.
+/// Mean squared difference of the expected pictures of two steps. Computed from products of different
+/// samples, in which noise cancels out.
 Estimate squaredDifference(const Pictures& a, const Pictures& b) {
   const std::size_t count = std::min(a.samples.size(), b.samples.size()), pixels = a.samples[0].size();
   const double n = double(count);
@@ -105,36 +106,38 @@ Estimate squaredDifference(const Pictures& a, const Pictures& b) {
   return {mean, std::sqrt(variance / double(pixels))};
 }
 
-/// Small pictures at all steps that somebody has asked for.
+/// Thumbnails at all steps that have been requested.
 class Steps {
  public:
   Steps(Launcher& launcher, const RenderPlan& plan, const Scene& scene, const std::stop_token& stop)
       : thumbnails_(launcher, plan, scene, stop),
         finest_(plan.grid().diagonal() / double(plan.view().smallestSpacing) / kMostSegments) {}
 
-  /// Whether a step that is small enough beside this one is not too small to be marched with.
+  /// Whether the fine step that `step` is compared with is large enough to be rendered.
   bool canTell(double step) const { return step / 4 >= finest_; }
 
-  /// RMS difference of the expected picture at `step` from that of an infinitely fine one: what a fine step
-  /// changes of it, and what finer ones would as halving the step goes on to take away the same share. Steps
-  /// that all leap over the same voxels look alike: the fine one does not.
+  /// RMS difference of the expected picture at `step` from that at an infinitely fine step. The sum of two
+  /// terms: the difference from a fine step, and that of finer steps, if every further halving of the step
+  /// reduces the differences by the same ratio. The fine step is short enough not to leap over voxels: steps
+  /// that all leap over the same voxels give similar pictures.
   double bias(double step) {
     step = std::max(step, finest_);
     const double finest = fineStep(step);
     const Pictures& fine = at(finest);
     const Estimate last = squaredDifference(at(2 * finest), fine);
     const Estimate before = squaredDifference(at(4 * finest), at(2 * finest));
-    // 4 where the error is of order 2, as quadrature's is of smooth fields.
+    // 4 where the error is of second order, as that of quadrature is for smooth fields.
     double ratio = 4;
     if (last.value > last.deviation)
       ratio = std::clamp(std::sqrt(std::max(0.0, before.value) / last.value), 1.5, 4.0);
     return std::sqrt(squaredDifference(at(step), fine).upper()) + std::sqrt(last.upper()) / (ratio - 1);
   }
-  /// The same without what is added for noise.
+  /// A lower estimate: the difference from the fine step only, with neither extrapolation nor deviations
+  /// added.
   double leastBias(double step) {
     return std::sqrt(std::max(0.0, squaredDifference(at(step), at(fineStep(step))).value));
   }
-  /// Doubles the samples of what is known of `step`; false when there are as many as there may be.
+  /// Doubles the number of samples by which `step` is judged. Returns false if that exceeds the limit.
   bool lookAgain(double step) {
     const std::size_t more = 2 * at(step).samples.size();
     if (more > kMostSamples) return false;

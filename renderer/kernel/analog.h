@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sample by analog tracking: the ray ends at its first collision, and shows what is there, lit. With one of
-// the trackers its expected value is the picture, whatever the light.
+// A sample by analog tracking: the ray ends at its first collision and has the lit colour there. With every
+// tracker its expected value is the exact picture, whatever the lighting.
 #pragma once
 #include "renderer/kernel/shade.h"
 
 namespace scolopax::kernel {
 
-/// The first collision that track(span) finds in the spans of a ray in which some of `channels`, by their
-/// bits, are left.
+/// The first collision that track(span) finds in the spans of a ray in which some of `channels` (bit n:
+/// visible channel n) are not clipped.
 template <class Track>
 SCOLOPAX_HD std::optional<Collision> firstInSpans(const SceneView& scene, const Ray& ray, Interval inside,
                                                   std::uint32_t channels, Track&& track) {
@@ -27,7 +27,7 @@ SCOLOPAX_HD std::optional<Collision> trackAll(const View& scene, const Ray& ray,
     return Tracker::template track<Blend>(scene, ray, span, sampler, cost);
   });
 }
-/// The first collision with channel n, as if it were alone.
+/// The first collision with channel n, as if it were the only channel.
 template <class Blend, class View>
 SCOLOPAX_HD std::optional<Collision> trackAlone(const View& scene, int n, const Ray& ray, Interval inside,
                                                 Sampler& sampler, SampleCost* cost) {
@@ -36,7 +36,7 @@ SCOLOPAX_HD std::optional<Collision> trackAlone(const View& scene, int n, const 
   });
 }
 
-/// Whether a shadow ray meets anything; in separate blend modes, anything of the channel that cast it.
+/// Whether a shadow ray has a collision; in separate blend modes, with the channel that cast it.
 template <class Tracker, class Blend, class View>
 SCOLOPAX_HD bool isBlocked(const View& scene, const Ray& ray, Interval inside, int channel, Sampler& sampler,
                            SampleCost* cost) {
@@ -47,8 +47,8 @@ SCOLOPAX_HD bool isBlocked(const View& scene, const Ray& ray, Interval inside, i
   }
 }
 
-/// What a collision shows: its channel, or in mix all of them, each lit with its own material before it is
-/// weighted (Eq. 10).
+/// The lit colour at a collision: that of its channel or, in mix, of all channels, each lit with its own
+/// material before it is weighted (Eq. 10).
 template <class Tracker, class Blend, class Features, class View>
 SCOLOPAX_HD glm::vec3 radiance(const View& scene, const Ray& ray, const Collision& hit, Sampler& sampler,
                                SampleCost* cost) {
@@ -83,8 +83,8 @@ SCOLOPAX_HD glm::vec3 radiance(const View& scene, const Ray& ray, const Collisio
 
 template <class Tracker>
 struct Analog {
-  /// Linear premultiplied RGBA of one sample along a ray; `first`, where it is not null, is set at a
-  /// collision.
+  /// Linear premultiplied RGBA of one sample along a ray. If there is a collision and `first` is not null,
+  /// sets `first` to it.
   template <class Blend, class Features, class View>
   SCOLOPAX_HD static glm::vec4 sample(const View& scene, const Ray& ray, Interval inside, Sampler& sampler,
                                       SampleCost* cost, FirstCollision* first) {

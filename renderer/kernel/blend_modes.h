@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The blend modes: what N extinctions and colours at a point become. One struct each; data/method.h lists
-// them, trackers and shading ask only for what is declared here.
+// The blend modes: how the extinctions and colours of N channels at a point are combined. Each is a struct,
+// listed in data/method.h; trackers and shading use only what is declared here.
 #pragma once
 #include "renderer/kernel/clip.h"
 #include "renderer/kernel/gradient.h"
 
 namespace scolopax::kernel {
 
-/// Extinction of one channel at a point, and where it lies on the channel's curves; 0 where the voxels are
-/// not finite.
+/// Extinction of one channel at a point, and the position on the channel's curves; both are 0 where the
+/// voxels are not finite.
 struct Classified {
   float extinction, position;
 };
@@ -27,7 +27,8 @@ SCOLOPAX_HD Classified classify(const View& scene, int n, glm::vec3 point, Sampl
   return {extinction, position};
 }
 
-/// Which visible channels matter: all, and the loops over them need not ask; or some, by their bits.
+/// A set of visible channels: all of them, so that loops over them need no test, or some, given by their
+/// bits.
 struct AllChannels {
   SCOLOPAX_HD static constexpr bool has(int) { return true; }
 };
@@ -36,7 +37,7 @@ struct SomeChannels {
   SCOLOPAX_HD constexpr bool has(int n) const { return bits >> n & 1; }
 };
 
-/// Channel of the largest extinction; the lowest of equal ones.
+/// The channel with the largest extinction; of equal ones, the lowest.
 struct Largest {
   float extinction = 0.0f;
   int channel = 0;
@@ -53,21 +54,22 @@ SCOLOPAX_HD Largest largestOf(const View& scene, Channels channels, glm::vec3 po
   return largest;
 }
 
-/// Extinctions add up; a collision happens in one channel and shows its colour (Eq. 6-7).
+/// Extinctions add up; a collision happens in one channel and has its colour (Eq. 6-7).
 struct BlendDensity {
-  static constexpr bool kSums = true;       ///< bound of all channels together: their sum; else the largest
-  static constexpr bool kSeparate = false;  ///< channels do not see each other
-  static constexpr bool kMixes = false;     ///< a collision shows all channels, weighted
+  static constexpr bool kSums = true;       ///< the combined bound is the channels' sum; else their maximum
+  static constexpr bool kSeparate = false;  ///< channels are rendered independently
+  static constexpr bool kMixes = false;     ///< a collision has the weighted colours of all channels
 };
 /// The channel of the largest extinction hides the others (Eq. 8-9).
 struct BlendMax {
   static constexpr bool kSums = false, kSeparate = false, kMixes = false;
 };
-/// Extinction as max; the colours of all channels weighted by extinction and the user's weight (Eq. 8, 10).
+/// Extinction as in max; the colours of all channels are weighted by extinction and the user's weight (Eq. 8,
+/// 10).
 struct BlendMix {
   static constexpr bool kSums = false, kSeparate = false, kMixes = true;
 };
-/// Every channel rendered alone, pictures added (section 4.2).
+/// Every channel is rendered alone, and the pictures are added (section 4.2).
 struct BlendComposite {
   static constexpr bool kSums = true, kSeparate = true, kMixes = false;
 };

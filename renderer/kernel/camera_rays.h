@@ -16,16 +16,17 @@ struct RayOf {
 };
 using Ray = RayOf<One>;
 
-/// With film coordinates s = (x - width/2, height/2 - y) * pixelSize, in units of the view's height:
-/// origin = origin0 + s.x * originX + s.y * originY, the same for the direction, which is then divided by
-/// sqrt(1 + perspective * |s|^2), its length in world units.
+/// With film coordinates s = (x - width/2, height/2 - y) * pixelSize, in units of the view's height, a ray
+/// has the origin origin0 + s.x * originX + s.y * originY. Its direction has the same form and is then
+/// divided by sqrt(1 + perspective * |s|^2), its length in world units.
 struct CameraRays {
   glm::vec3 origin0, originX, originY;
   glm::vec3 direction0, directionX, directionY;
   float pixelSize;     ///< 1 / height
   float perspective;   ///< (2 tan(fovY/2))^2, or 0 for an orthographic camera
   glm::vec2 halfSize;  ///< width/2, height/2 in pixels
-  float start;  ///< distance of the plane in which rays start from the eye, along the view, world units
+  float start;  ///< distance from the eye to the plane in which rays start, along the view direction, world
+                ///< units
 
   /// Ray through the point (x, y) of the image plane, in pixels from the top left corner.
   SCOLOPAX_HD Ray operator()(float x, float y) const { return through<One>(x, y); }

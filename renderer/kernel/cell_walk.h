@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// A ray's way through the macrocells (Amanatides and Woo 1987).
-// Every step moves one index by one, so no input, NaN included, can make a walk endless.
+// Traverses the macrocells along a ray (Amanatides and Woo 1987). Every step moves forward by at least one
+// cell, so no input, not even NaN, makes a walk endless.
 #pragma once
 #include "renderer/kernel/clip.h"
 
 namespace scolopax::kernel {
 
-/// Cell after cell along a ray; but where blocks of cells are empty, many cells are one step: from the entry
-/// of the first to the exit of the last, at which the walk then stands. What is not empty is visited as
-/// without that, to the last bit.
+/// Visits the cells along a ray one after another. Where blocks of cells are empty, one step covers many
+/// cells, from the entry of the first to the exit of the last, and the last becomes the current cell. Cells
+/// that are not empty are visited exactly as without such leaps, to the last bit.
 class CellWalk {
  public:
   SCOLOPAX_HD CellWalk(const Ray& ray, Interval inside, const MajorantView& grid)
@@ -26,7 +26,7 @@ class CellWalk {
       stride *= grid.cells[axis];
       plane_[axis] = float(cell + (up ? 1 : 0)) * grid.cellSize;
       planeStep_[axis] = up ? grid.cellSize : -grid.cellSize;
-      // Finite also for a denormal direction: a plane at distance 0 is at t = 0, not NaN.
+      // Kept finite even for a denormal direction, so that a plane at distance 0 is at t = 0, not NaN.
       inverseDirection_[axis] = clamp(1.0f / ray.direction[axis], -kLargestFinite, kLargestFinite);
       next_[axis] = exitThrough(axis);
     }
@@ -34,22 +34,22 @@ class CellWalk {
     leapIfEmpty();
   }
 
-  /// Segment of the ray in the current cell, or the cells that were leapt over with it; exit >= enter.
+  /// Part of the ray in the current cell and in the cells leapt over on the way to it; exit >= enter.
   SCOLOPAX_HD float enter() const { return enter_; }
   SCOLOPAX_HD float exit() const { return exit_; }
 
-  /// Offset of the current cell's entry, in cells.
+  /// Index of the current cell, as in MajorantView.
   SCOLOPAX_HD std::size_t index() const { return std::size_t(index_); }
 
   /// Moves to the next cell; false at the end of the ray.
   SCOLOPAX_HD bool advance() {
     if (!(exit_ < end_)) return false;
-    // A loop over constant indices: what a variable indexes cannot stay in a GPU's registers.
+    // A loop over constant indices: an array indexed by a variable cannot stay in a GPU's registers.
     for (int axis = 0; axis < 3; ++axis) {
       if (axis != axis_) continue;
       cell_[axis] += step_[axis];
       index_ += stride_[axis];
-      plane_[axis] += planeStep_[axis];  // whole numbers: exact
+      plane_[axis] += planeStep_[axis];  // exact, as these are whole numbers
       next_[axis] = exitThrough(axis);
     }
     enter_ = exit_;
@@ -58,8 +58,8 @@ class CellWalk {
     return true;
   }
 
-  /// The point at t, moved into the current cell where rounding has put it outside: the cell's bound holds
-  /// there.
+  /// The point at t, moved into the current cell if rounding has put it outside, because the cell's bound
+  /// holds only there.
   SCOLOPAX_HD glm::vec3 pointAt(float t) const {
     glm::vec3 p;
     for (int axis = 0; axis < 3; ++axis) {
@@ -73,11 +73,12 @@ class CellWalk {
   }
 
  private:
-  /// Where the ray crosses the k-th plane of cells on its way, 0 being the next.
+  /// t at which the ray crosses the k-th plane between cells ahead of it; 0 is the next.
   SCOLOPAX_HD float planeAt(int axis, int k) const {
     return (plane_[axis] + float(k) * planeStep_[axis] - ray_.origin[axis]) * inverseDirection_[axis];
   }
-  /// Where the ray leaves the current cell through `axis`; infinity where the box ends or it never does.
+  /// t at which the ray leaves the current cell through `axis`; infinite if it never does or if the grid ends
+  /// there.
   SCOLOPAX_HD float exitThrough(int axis) const {
     return cell_[axis] == last_[axis] ? kInfinity : planeAt(axis, 0);
   }
@@ -85,7 +86,7 @@ class CellWalk {
     axis_ = nearestOf(next_);
     exit_ = maximum(enter_, minimum(axis_ == 0 ? next_.x : axis_ == 1 ? next_.y : next_.z, end_));
   }
-  /// A leap costs as much as some steps, so that one over a single block does not pay.
+  /// A leap costs as much as several steps, so a leap over a single block does not pay.
   SCOLOPAX_HD void leapIfEmpty() {
     if (!grid_.totals) return;
     const int radius = grid_.emptyRadius(index());
@@ -95,10 +96,10 @@ class CellWalk {
     return t.x <= t.y ? (t.x <= t.z ? 0 : 2) : (t.y <= t.z ? 1 : 2);
   }
 
-  /// Goes on to the last cell along the ray of the empty cube of blocks around the current one: over all
-  /// planes that come before the cube's own, in the order in which leave() takes them.
+  /// Advances to the last cell along the ray inside the empty cube of blocks around the current one. Crosses
+  /// all planes that come before the cube's faces, in the order in which leave() would.
   SCOLOPAX_HD void leap(int radius) {
-    glm::ivec3 most;  // steps to the side of the cube that the ray goes to
+    glm::ivec3 most;  // steps to the face of the cube that the ray moves towards
     glm::vec3 side;
     for (int axis = 0; axis < 3; ++axis) {
       const int into = cell_[axis] & (kBlockEdge - 1);
@@ -109,7 +110,7 @@ class CellWalk {
     }
     const int out = nearestOf(side);
     const float nearest = out == 0 ? side.x : out == 1 ? side.y : side.z;
-    if (!(nearest < end_)) {  // nothing but empty cells is left
+    if (!(nearest < end_)) {  // only empty cells are left
       exit_ = maximum(enter_, end_);
       return;
     }

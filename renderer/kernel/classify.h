@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stored value -> position on the curves -> extinction and colour. Every step is monotone in float, so the
-// bound that data/majorant_grid takes over an interval's ends and inner knots holds to the last bit.
+// Stored value -> position on the curves -> extinction and colour. Every step is monotone in float arithmetic
+// (gamma nearly so, which largestExtinction allows for). So a bound that data/majorant_grid takes over an
+// interval's ends and the knots inside it holds to the last bit.
 #pragma once
 #include "renderer/kernel/math.h"
 #include "renderer/kernel/views.h"
@@ -15,14 +16,14 @@ SCOLOPAX_HD int knotBefore(const CurveView<Value>& curve, float p) {
   return p < curve.positions[i] ? -1 : i;
 }
 
-/// Between a and b also after rounding.
+/// Interpolates from a to b; the result lies between them even after rounding.
 SCOLOPAX_HD inline float between(float a, float b, float t) {
   const float v = a + t * (b - a);
   return a < b ? clamp(v, a, b) : clamp(v, b, a);
 }
 SCOLOPAX_HD inline glm::vec3 between(glm::vec3 a, glm::vec3 b, float t) { return a + t * (b - a); }
 
-/// Value of the curve at p in [0,1]; of two knots at one position the later holds there.
+/// Value of the curve at p in [0,1]. If two knots share a position, the later one holds there.
 template <class Value>
 SCOLOPAX_HD Value evaluate(const CurveView<Value>& curve, float p) {
   if (curve.count == 1) return curve.values[0];
@@ -38,7 +39,7 @@ SCOLOPAX_HD inline float curvePosition(const ChannelView& channel, float stored)
   return channel.gamma == 1.0f ? p : power(p, channel.gamma);
 }
 
-/// Positions beyond [0,1] are kept up to here where a stretch of a ray is taken to be linear.
+/// Limit of positions outside [0,1], which occur where the scalar is taken to be linear on a segment.
 inline constexpr float kFarPosition = 1e6f;
 
 /// Extinction per world unit at a curve position.
@@ -46,12 +47,12 @@ SCOLOPAX_HD inline float extinctionAt(const ChannelView& channel, float position
   return evaluate(channel.opacity, position) * channel.density;
 }
 
-/// Position on the factor's curve of |gradient| of stored values per smallest spacing.
+/// Position of |gradient|, in stored values per smallest spacing, on the factor's curve.
 SCOLOPAX_HD inline float factorPosition(const GradientFactorView& factor, float magnitude) {
   return clamp((magnitude - factor.origin) * factor.scale + factor.offset, 0.0f, 1.0f);
 }
 
-/// Largest value of the curve from position a to position b, in any order.
+/// Largest value of the curve between positions a and b, in either order.
 SCOLOPAX_HD inline float largestBetween(const CurveView<float>& curve, float a, float b) {
   if (a > b) {
     const float other = a;
@@ -65,7 +66,7 @@ SCOLOPAX_HD inline float largestBetween(const CurveView<float>& curve, float a, 
   return largest;
 }
 
-/// Largest extinction over an interval of stored values, lo <= hi, where the gradient's factor is 1.
+/// Largest extinction over the stored values from lo to hi, lo <= hi, where the gradient factor is 1.
 SCOLOPAX_HD inline float largestExtinction(const ChannelView& channel, float lo, float hi) {
   float a = curvePosition(channel, lo), b = curvePosition(channel, hi);
   if (channel.gamma != 1.0f) {  // the power function is within 2e-6 of monotone
@@ -76,7 +77,7 @@ SCOLOPAX_HD inline float largestExtinction(const ChannelView& channel, float lo,
   return largestBetween(channel.opacity, a, b) * channel.density;
 }
 
-/// Largest factor where |gradient| is from lo to hi, in stored values per smallest spacing.
+/// Largest gradient factor for |gradient| from lo to hi, in stored values per smallest spacing.
 SCOLOPAX_HD inline float largestFactor(const GradientFactorView& factor, float lo, float hi) {
   return largestBetween(factor.curve, factorPosition(factor, lo), factorPosition(factor, hi));
 }

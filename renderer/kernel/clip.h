@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clipping: the interval of a ray inside the crop box and clip planes, the channels that are left at a point,
-// and the spans of a ray in which the same channels are left.
+// Clipping: the interval of a ray inside the crop box and clip planes, the channels that are kept at a point,
+// and the spans of a ray in which the same channels are kept.
 #pragma once
 #include "renderer/kernel/math.h"
 #include "renderer/kernel/views.h"
@@ -10,12 +10,12 @@ namespace scolopax::kernel {
 template <class L>
 struct IntervalOf {
   typename L::Float enter, exit;   ///< along the ray; empty when enter >= exit
-  typename L::Word channels{~0u};  ///< bit n: visible channel n is left there
+  typename L::Word channels{~0u};  ///< bit n: visible channel n is kept there
 };
 using Interval = IntervalOf<One>;
 
-/// The part of the ray with t >= 0 inside the box [low, high], low < high; faces belong to the box. A ray
-/// that is not finite, or has no direction at all, sees nothing.
+/// The part of the ray with t >= 0 inside the box [low, high], low < high; faces belong to the box. Empty for
+/// a ray that is not finite or whose direction is zero.
 template <class L>
 SCOLOPAX_LANES IntervalOf<L> clipToBox(const RayOf<L>& ray, glm::vec3 low, glm::vec3 high) {
   using Float = typename L::Float;
@@ -36,7 +36,7 @@ SCOLOPAX_LANES IntervalOf<L> clipToBox(const RayOf<L>& ray, glm::vec3 low, glm::
   return {where(meets, inside.enter), where(meets, inside.exit)};
 }
 
-/// How far a point is on the kept side of a plane, in voxels.
+/// Signed distance of a point from a plane, in voxels; positive on the kept side.
 template <class L>
 SCOLOPAX_LANES typename L::Float sideOf(const ClipPlaneView& plane, const typename L::Vec& point) {
   return dot(typename L::Vec(plane.normal), point) + plane.offset;
@@ -45,14 +45,14 @@ template <class Vec>
 SCOLOPAX_LANES auto sumOfMagnitudes(const Vec& v) {
   return maximum(v[0], -v[0]) + maximum(v[1], -v[1]) + maximum(v[2], -v[2]);
 }
-/// What rounding makes of a slope, and of a side, relative to what they are sums of.
+/// Rounding error of a slope or side, relative to the sum of the magnitudes that it is computed from.
 inline constexpr float kAlongPlane = 0x1p-21f;
 
-/// A plane as a ray meets it.
+/// Intersection of a ray with a plane.
 template <class L>
 struct PlaneHit {
-  typename L::Float side, slope;  ///< of the start, and per t; above 0 is kept
-  typename L::Float t;            ///< where the ray passes the plane; not finite or NaN along it
+  typename L::Float side, slope;  ///< signed distance of the ray's origin, and its change per t
+  typename L::Float t;            ///< where the ray crosses the plane; infinite or NaN if it is parallel
 
   SCOLOPAX_LANES PlaneHit(const ClipPlaneView& plane, const RayOf<L>& ray)
       : side(sideOf<L>(plane, ray.origin)),
@@ -60,8 +60,8 @@ struct PlaneHit {
         t(-side / slope) {}
 };
 
-/// The interval of the ray in which there may be anything: inside the box that crop leaves, on the kept side
-/// of all planes that clip all channels.
+/// The interval of the ray that may contain anything: inside the crop box, and on the kept side of all planes
+/// that clip all channels.
 template <class L>
 SCOLOPAX_LANES IntervalOf<L> clipToScene(const SceneView& scene, const RayOf<L>& ray) {
   using Mask = typename L::Mask;
@@ -69,7 +69,7 @@ SCOLOPAX_LANES IntervalOf<L> clipToScene(const SceneView& scene, const RayOf<L>&
   for (int i = 0; i < scene.clip.wholePlanes; ++i) {
     const ClipPlaneView& plane = scene.clip.planes[i];
     const PlaneHit<L> hit(plane, ray);
-    // Rounding tilts a ray along the plane, and puts its start a little beside it.
+    // Rounding may tilt a ray that is parallel to the plane, and move its origin slightly off the plane.
     const auto reach = sumOfMagnitudes(ray.direction) * kAlongPlane;
     const Mask begins = hit.slope > reach, ends = hit.slope < -reach;
     const Mask kept = hit.side + sumOfMagnitudes(ray.origin) * kAlongPlane >= 0.0f;
@@ -80,8 +80,8 @@ SCOLOPAX_LANES IntervalOf<L> clipToScene(const SceneView& scene, const RayOf<L>&
   return inside;
 }
 
-/// A point of the clipped volume, moved back where rounding has put it outside of the crop box or behind a
-/// plane of all channels: a ray from outside may see nothing.
+/// A point of the clipped volume, moved back if rounding has put it outside the crop box or behind a plane
+/// that clips all channels. A ray that starts outside may miss the volume.
 template <class L>
 SCOLOPAX_LANES typename L::Vec insideOf(const ClipView& clip, typename L::Vec point) {
   for (int axis = 0; axis < 3; ++axis) point[axis] = clamp(point[axis], clip.low[axis], clip.high[axis]);
@@ -92,7 +92,8 @@ SCOLOPAX_LANES typename L::Vec insideOf(const ClipView& clip, typename L::Vec po
   return point;
 }
 
-/// Bits of the visible channels that planes of some channels and regions of crop leave at a point.
+/// Bits of the visible channels that are kept at a point by the crop regions and by the planes that clip only
+/// some channels.
 template <class L>
 SCOLOPAX_LANES typename L::Word channelsAt(const ClipView& clip, const typename L::Vec& point) {
   using Int = typename L::Int;
@@ -109,7 +110,7 @@ SCOLOPAX_LANES typename L::Word channelsAt(const ClipView& clip, const typename 
   return channels;
 }
 
-/// The spans of rays, front to back, in each of which the same channels are left.
+/// Divides rays into spans, front to back, in each of which the same channels are kept.
 template <class L>
 class Spans {
  public:
@@ -117,13 +118,13 @@ class Spans {
   using Word = typename L::Word;
   using Mask = typename L::Mask;
 
-  /// Of channels by their bits: what else is clipped does not matter.
+  /// `channels`: bit n is visible channel n; how other channels are clipped does not matter.
   SCOLOPAX_LANES Spans(const SceneView& scene, const RayOf<L>& ray, const IntervalOf<L>& inside,
                        std::uint32_t channels)
       : clip_(scene.clip), ray_(ray), rest_(inside), channels_(channels) {}
 
-  /// Returns the next span of every ray in `wants`. It is empty for other rays, where no channel is left, and
-  /// at the end.
+  /// Returns the next span of every ray in `wants`. It is empty for other rays, where none of the channels is
+  /// kept, and at the end.
   SCOLOPAX_LANES IntervalOf<L> next(Mask wants) {
     IntervalOf<L> span = rest_;
     Mask some = wants;
@@ -145,7 +146,7 @@ class Spans {
   SCOLOPAX_LANES bool done(Mask wants) const { return !any(wants & (rest_.enter < rest_.exit)); }
 
  private:
-  /// A face at t ends the span. Along the face, t is infinite or not a number, and ends nothing.
+  /// Ends the span at a face at t. For a ray parallel to the face, t is infinite or NaN and changes nothing.
   SCOLOPAX_LANES static void end(IntervalOf<L>& span, Float t) {
     span.exit = select((t > span.enter) & (t < span.exit), t, span.exit);
   }

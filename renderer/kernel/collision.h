@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What trackers look for, and the tests of a tentative collision that they share.
+// Collisions, which trackers search for, and the tests of a tentative collision that they share.
 #pragma once
 #include <optional>
 
@@ -9,8 +9,8 @@
 
 namespace scolopax::kernel {
 
-/// A distance along a ray, in world units, kept as the entry of a macrocell and the way past it: free flights
-/// far shorter than the resolution of their sum can still be told apart.
+/// A distance along a ray, in world units, stored as the entry of a macrocell and the distance past it. So
+/// free flights far shorter than the float resolution of the sum can still be told apart.
 struct Place {
   float enter, past;
   SCOLOPAX_HD float t() const { return enter + past; }
@@ -19,28 +19,29 @@ SCOLOPAX_HD inline bool nearer(const Place& a, const Place& b) {
   return a.enter < b.enter || (a.enter == b.enter && a.past < b.past);
 }
 
-/// Nearest accepted collision along a ray.
+/// An accepted collision along a ray.
 struct Collision {
   Place place;
   glm::vec3 point;  ///< voxel coordinates
-  int channel;      ///< among the visible channels
-  float position;   ///< on that channel's curves
+  int channel;      ///< index among the visible channels
+  float position;   ///< position on that channel's curves
 };
 
 SCOLOPAX_HD inline void keepNearer(FirstCollision* first, const FirstCollision& other) {
   if (first->channel < 0 || other.depth < first->depth) *first = other;
 }
 
-/// Tentative collisions after which a ray gives up and counts as truncated: a bound on its work, far above
-/// what any thickness that can be told from opaque needs.
+/// Maximum number of tentative collisions of a ray. A ray with more stops there and counts as truncated. This
+/// bounds the work, and is far above what is needed for any optical depth that is distinguishable from
+/// opaque.
 inline constexpr std::uint32_t kMaxTentativeCollisions = 1u << 20;
 
-/// Tests a tentative collision of the process of several channels together in a macrocell; `bound` is their
-/// total. Accepts with probability extinction / bound (Eq. 4), strictly below, so that zero extinction is
-/// never hit.
+/// Tests a tentative collision of the combined process of several channels in a macrocell, whose combined
+/// bound is `bound`. Accepts with probability extinction / bound (Eq. 4). The comparison is strict, so that
+/// zero extinction is never hit.
 struct PickOneChannel {
-  /// Draws the channel first, with probability bound_n / bound, and fetches only that one. What the bounds
-  /// leave of the total belongs to none.
+  /// Draws a channel first, with probability bound_n / bound, and fetches only that one. Where the combined
+  /// bound exceeds the sum of the channels' bounds, the excess belongs to no channel.
   template <class Channels, class View>
   SCOLOPAX_HD static std::optional<Collision> test(const View& scene, Channels channels, std::size_t cell,
                                                    float bound, Place place, glm::vec3 point,
@@ -75,7 +76,7 @@ struct TestAllChannels {
     return std::nullopt;
   }
 };
-/// The same for max and mix, whose bound is the largest of the channels'.
+/// The same for max and mix, where `bound` is the largest of the channels' bounds.
 struct TestLargest {
   template <class Channels, class View>
   SCOLOPAX_HD static std::optional<Collision> test(const View& scene, Channels channels, std::size_t,
@@ -87,8 +88,8 @@ struct TestLargest {
   }
 };
 
-/// Tests a tentative collision of channel n's own process. In max and mix a channel has extinction only where
-/// it is the largest of `channels` (Eq. 8).
+/// Tests a tentative collision of channel n's own process. In max and mix, a channel has extinction only
+/// where its extinction is the largest among `channels` (Eq. 8).
 template <class Blend, class Channels, class View>
 SCOLOPAX_HD std::optional<Collision> testChannel(const View& scene, Channels channels, int n, float bound,
                                                  Place place, glm::vec3 point, const RandomBlock& random,

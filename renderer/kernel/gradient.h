@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The gradient of a channel at points, and the factor that its magnitude makes of the opacity. What only
-// scenes with such a factor need is not inlined, and takes no scene: its address would put it in memory.
+// The gradient of a channel at a point, and the factor of the opacity that depends on its magnitude.
+// Functions that only scenes with such a factor need are not inlined and do not take the scene as a
+// parameter: passing its address would force it into memory.
 #pragma once
 #include "renderer/kernel/classify.h"
 #include "renderer/kernel/sample_volume.h"
@@ -20,11 +21,11 @@ SCOLOPAX_LANES auto largestComponent(const Vec& v) {
 
 template <class L>
 struct Gradient {
-  typename L::Vec perSpacing;  ///< of stored values in world space, per smallest spacing
-  typename L::Mask finite;     ///< where all differences are
+  typename L::Vec perSpacing;  ///< gradient of stored values in world space, per smallest spacing
+  typename L::Mask finite;     ///< where all differences are finite
 };
 
-/// Central differences of one voxel, one-sided at the border.
+/// Central differences of one voxel, one-sided at the border. `point` is in voxel coordinates.
 template <class L>
 SCOLOPAX_LANES Gradient<L> gradientAt(const ChannelView& channel, glm::ivec3 dims, const glm::mat3& fromVoxel,
                                       const typename L::Vec& point) {
@@ -44,12 +45,12 @@ SCOLOPAX_LANES Gradient<L> gradientAt(const ChannelView& channel, glm::ivec3 dim
   const typename L::Mask finite = isFinite(perVoxel[0]) & isFinite(perVoxel[1]) & isFinite(perVoxel[2]);
   return {product<L>(fromVoxel, perVoxel), finite};
 }
-/// How many samples that takes.
+/// Number of fetches that gradientAt() takes.
 SCOLOPAX_HD inline unsigned gradientFetches(glm::ivec3 dims) {
   return 2u * (unsigned(dims.x > 1) + unsigned(dims.y > 1) + unsigned(dims.z > 1));
 }
 
-/// Length of a vector whose squares may be beyond what floats hold.
+/// Length of a vector whose squared components may overflow or underflow.
 template <class L>
 SCOLOPAX_LANES typename L::Float lengthOf(const typename L::Vec& v) {
   using Float = typename L::Float;
@@ -59,8 +60,8 @@ SCOLOPAX_LANES typename L::Float lengthOf(const typename L::Vec& v) {
   return select(largest < kInfinity, divisor * squareRoot(dot(scaled, scaled)), largest);
 }
 
-/// Where |gradient| lies on the factor's curve, beyond [0,1] too, as stretchPosition() of optical_curve.h;
-/// NaN where it is not finite.
+/// Position of |gradient| on the factor's curve. It may lie outside [0,1], like that of stretchPosition() in
+/// optical_curve.h. NaN where the gradient is not finite.
 template <class L>
 SCOLOPAX_LANES_RARE void findFactorPosition(const ChannelView& channel, glm::ivec3 dims,
                                             const typename L::Vec& point, typename L::Float* position) {
@@ -71,7 +72,7 @@ SCOLOPAX_LANES_RARE void findFactorPosition(const ChannelView& channel, glm::ive
   *position = select(gradient.finite, clamp(unbounded, -kFarPosition, kFarPosition), Float(kNaN));
 }
 
-/// Factor of the opacity at a point.
+/// Factor of the opacity at a point; 0 where the gradient is not finite.
 SCOLOPAX_RARE inline float gradientFactorAt(const ChannelView& channel, glm::ivec3 dims, glm::vec3 point) {
   const GradientFactorView& factor = channel.factor;
   const Gradient<One> gradient = gradientAt<One>(channel, dims, factor.fromVoxel, point);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lane types: as many numbers at once as an instruction set has lanes. Kernels are templates over them and
-// give every lane the same bits; here are the functions they share, for the lane type of one number.
+// Lane types: each holds as many numbers as its instruction set has lanes. Kernels are templates over a lane
+// type, and a lane computes the same bits with every one of them. This file lists the functions that lane
+// types share and defines them for `One`, the type with a single lane.
 #pragma once
 #include <bit>
 #include <cstdint>
@@ -8,18 +9,20 @@
 
 #include "renderer/kernel/portable.h"
 
-// A lane type L has kLanes, Float, Int (32 bits), Word (the same without a sign; where it is compared or
-// converted its highest bit is 0), Mask (all of a lane, or nothing), Vec (three Floats), everywhere() and
-// laneNumbers(). `if (any(mask))` is a plain `if` where there is one lane. Beside arithmetic there are:
-// - without(a, b): a, but not where b is set;
-// - select(m, a, b): a where m is set, else b; where(m, a): with b = 0; onesOf(m): with a = 1 and b = 0;
+// A lane type L has kLanes, Float, Int (32 bits), Word (32 bits, unsigned; where it is compared or converted,
+// its highest bit is 0), Mask (all bits of a lane are set, or none), Vec (three Floats), everywhere() (the
+// mask of all lanes) and laneNumbers() (0, 1, 2, ...). With one lane, `if (any(mask))` is a plain `if`.
+// Besides arithmetic there are:
+// - without(a, b): a and not b;
+// - select(m, a, b): a where m is set, else b; where(m, a): select(m, a, 0); onesOf(m): select(m, 1, 0);
 // - bitsOf(mask): bit i is lane i; bitsOf(a), floatOf(a): the same bits as another type;
-// - left<bits>, right<bits>, rightSigned<bits>: shifts, of which right takes a number without a sign;
-// - permuted(a, index): lane index[i] of a in lane i; firstIn(m, a): that of the first lane in the mask;
-// - at(a, i), put(x, i, p): one lane, p in memory;
-// - minimum(a, b), maximum(a, b): b where either is NaN, with which every comparison is false;
-// - gather(base, i): base[i]; of 16-bit numbers it may read two bytes more;
-// - truncated, toFloat: conversions; floatOfWord: of all 32 bits.
+// - left<bits>, right<bits>, rightSigned<bits>: shifts; right is logical, rightSigned arithmetic;
+// - permuted(a, index): lane index[i] of a in lane i; firstIn(m, a): the value in the first lane of m, in all
+//   lanes;
+// - at(a, i): lane i of a; put(x, i, p): sets lane i of *p, in memory;
+// - minimum(a, b), maximum(a, b): b where either is NaN; every comparison with NaN is false;
+// - gather(base, i): base[i]; for 16-bit numbers it may read two bytes past the element;
+// - truncated, toFloat: conversions between Float and Int; floatOfWord: converts all 32 bits as unsigned.
 namespace scolopax::kernel {
 
 inline constexpr float kInfinity = __builtin_huge_valf();
@@ -27,7 +30,7 @@ inline constexpr float kNaN = __builtin_nanf("");
 inline constexpr float kLargestFinite = 0x1.fffffep127f;
 inline constexpr float kLeastNormal = 0x1p-126f;
 
-/// One number: what host and device have without more.
+/// A single lane, in plain C++ for host and device.
 struct One {
   static constexpr int kLanes = 1;
   using Float = float;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The functions that kernels may call: built from IEEE operations alone, so that g++, clang, nvcc and
+// The mathematical functions for kernels: built from IEEE operations alone, so that g++, clang, nvcc and
 // every instruction set give the same bits. No std:: math, no contraction.
 #pragma once
 #include <type_traits>
@@ -12,7 +12,7 @@ SCOLOPAX_HD inline float magnitude(float x) { return maximum(x, -x); }
 SCOLOPAX_HD inline int clampInt(int x, int lo, int hi) { return x < lo ? lo : (x > hi ? hi : x); }
 
 namespace detail {
-/// Splits x > 0, normal, into m * 2^e with m in [sqrt(1/2), sqrt(2)).
+/// Splits a normal x > 0 into m * 2^e with m in [sqrt(1/2), sqrt(2)).
 template <class Float>
 struct Exponent {
   Float mantissa, exponent;
@@ -23,8 +23,8 @@ SCOLOPAX_LANES Exponent<Float> splitExponent(Float x) {
   const auto bits = bitsOf(x), e = rightSigned<23>(bits - 0x3f3504f3);
   return {floatOf(bits - left<23>(e)), toFloat(e)};
 }
-/// log(1 + f), 1 + f in [sqrt(1/2), sqrt(2)): 2 artanh(s), s = f / (2 + f), |s| < 0.1716. The series is cut
-/// where its next term is below 2e-9 of the result.
+/// log(1 + f) for 1 + f in [sqrt(1/2), sqrt(2)): 2 artanh(s), s = f / (2 + f), |s| < 0.1716. The series is
+/// truncated where its next term is below 2e-9 of the result.
 template <class Float>
 SCOLOPAX_LANES Float log1pReduced(Float f) {
   const Float s = f / (2.0f + f);
@@ -36,26 +36,26 @@ SCOLOPAX_LANES Float log1pReduced(Float f) {
 }
 }  // namespace detail
 
-/// -log(1 - u) for u in (0, 1): the optical depth of a free flight (Eq. 3). Within 2 ulp, also for tiny u,
-/// where a plain logarithm of the rounded 1 - u would lose everything.
+/// -log(1 - u) for u in (0, 1): the optical depth of a free flight (Eq. 3). Accurate to 2 ulp even for tiny
+/// u, where the logarithm of the rounded 1 - u would lose all digits.
 template <class Float>
 SCOLOPAX_LANES Float opticalDepth(Float u) {
   const Float w = 1.0f - u;
   const Float lost = (1.0f - w) - u;  // w + lost == 1 - u exactly
   const detail::Exponent<Float> of = detail::splitExponent(w);
   const Float correction = lost * (2.0f - w);      // lost / w, to first order in 1 - w
-  const Float low = of.exponent * 1.42860682e-6f;  // log(2) = a part of 15 bits, exact times e, + this
+  const Float low = of.exponent * 1.42860682e-6f;  // log(2) = 15 bits, whose product with e is exact, + this
   return -(of.exponent * 0.693145752f + (detail::log1pReduced(of.mantissa - 1.0f) + (low + correction)));
 }
 
-/// Base-2 logarithm of x > 0, normal.
+/// Base-2 logarithm of a normal x > 0.
 template <class Float>
 SCOLOPAX_LANES Float log2Of(Float x) {
   const detail::Exponent<Float> of = detail::splitExponent(x);
   return of.exponent + detail::log1pReduced(of.mantissa - 1.0f) * 1.44269504f;
 }
 
-/// 2^x for x < 128; 0 up to -126.
+/// 2^x for x < 128; 0 for x <= -126.
 template <class Float>
 SCOLOPAX_LANES Float exp2Of(Float x) {
   const auto some = x > -126.0f;
@@ -67,12 +67,12 @@ SCOLOPAX_LANES Float exp2Of(Float x) {
       r * (1.0f + r * (0.5f + r * (0.166666667f +
                                    r * (0.0416666667f +
                                         r * (0.00833333333f + r * (0.00138888889f + r * 0.000198412698f))))));
-  const auto half = rightSigned<1>(whole + right<31>(whole));  // two steps: 2^whole may be out of range
+  const auto half = rightSigned<1>(whole + right<31>(whole));  // two factors: 2^whole may be out of range
   return where(some, p * floatOf(left<23>(half + 127)) * floatOf(left<23>(whole - half + 127)));
 }
 
-/// 1 - exp(-depth) for depth >= 0: what a stretch of that optical depth absorbs. By its series where the
-/// difference from 1 would lose digits.
+/// 1 - exp(-depth) for depth >= 0: the fraction of light that this optical depth absorbs. For small depths by
+/// its series, as the difference from 1 would lose digits.
 template <class Float>
 SCOLOPAX_LANES Float absorbed(Float depth) {
   const auto thick = depth >= 0.25f;

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Both curves of a channel as one, integrated over a stretch of a ray: between two samples the scalar is
-// taken to be linear, and a piecewise-linear curve of it is integrated exactly (pre-integration: Engel, Kraus
-// and Ertl 2001). What a stretch hides of itself is left out: colours count by their extinction alone.
+// Integrates the opacity and colour curves of a channel over a segment of a ray. The scalar is taken to be
+// linear between two samples, and its piecewise-linear curves are integrated exactly (pre-integration: Engel,
+// Kraus and Ertl 2001). Self-occlusion within the segment is ignored: colours are weighted by their
+// extinction alone.
 #pragma once
 #include "renderer/kernel/classify.h"
 
 namespace scolopax::kernel {
 
-/// Where a stored value lies on the curves, beyond [0,1] too: linear in the stored value, so that a stretch
-/// that leaves the range is cut where it does. With gamma it is clamped. NaN where the value is not finite.
+/// Position of a stored value on the curves. It may lie outside [0,1], up to kFarPosition from 0, so that it
+/// is linear in the stored value and a segment that leaves the range is split where it does. With a gamma
+/// other than 1, it is clamped to [0,1]. NaN where the value is not finite.
 template <class Float>
 SCOLOPAX_LANES Float stretchPosition(const ChannelView& channel, Float stored) {
   Float position =
@@ -17,14 +19,14 @@ SCOLOPAX_LANES Float stretchPosition(const ChannelView& channel, Float stored) {
   return select(isFinite(stored), position, Float(kNaN));
 }
 
-/// Knots of the curves.
+/// One knot per lane.
 template <class L>
 struct Knots {
   typename L::Float position, inverseWidth, opacity;
   typename L::Vec color;
 };
 
-/// A knot a lane.
+/// The knot at each lane's index.
 template <class L>
 SCOLOPAX_LANES Knots<L> knotsAt(const OpticalCurveView& curve, typename L::Int index) {
   if constexpr (L::kLanes == 1) {
@@ -39,7 +41,7 @@ SCOLOPAX_LANES Knots<L> knotsAt(const OpticalCurveView& curve, typename L::Int i
             {gather(&knot.color.x, at), gather(&knot.color.y, at), gather(&knot.color.z, at)}};
   }
 }
-/// The same in all lanes.
+/// One knot, the same in all lanes.
 template <class L>
 SCOLOPAX_LANES Knots<L> knotAt(const OpticalCurveView& curve, int index) {
   using Float = typename L::Float;
@@ -54,8 +56,8 @@ SCOLOPAX_LANES typename L::Float knotPositions(const OpticalCurveView& curve, ty
     return gather(&curve.knots[0].position, index * kKnotFloats);
 }
 
-/// A position on the curves, and the piece that it is on: piece k lies between knots k and k + 1; before the
-/// first knot and after the last the curve is constant.
+/// A position on the curves, and the index of its piece. Piece k lies between knots k and k + 1. Before the
+/// first knot (piece -1) and after the last (piece count - 1), the curves are constant.
 template <class L>
 struct CurvePoint {
   typename L::Float position;
@@ -71,12 +73,13 @@ SCOLOPAX_LANES CurvePoint<L> pointOn(const OpticalCurveView& curve, typename L::
   for (;;) {
     const Int following = minimum(k + 1, Int(curve.count - 1));
     const Mask on = inside & (knotPositions<L>(curve, following) <= position);
-    if (!any(on)) break;  // before the last knot, which is at 1
+    if (!any(on)) break;  // at the latest before the last knot, which is at 1
     k = k + onesOf(on);
   }
   return {position, select(inside, k, select(above, Int(curve.count - 1), Int(-1)))};
 }
-/// pointOn() from a known point on: as many steps as there are knots in between. Of some lanes.
+/// pointOn(), searched from a known point: takes as many steps as there are knots in between. For lanes in
+/// `which`.
 template <class L>
 SCOLOPAX_LANES CurvePoint<L> pointFrom(const OpticalCurveView& curve, const CurvePoint<L>& from,
                                        typename L::Float position, typename L::Mask which) {
@@ -103,11 +106,11 @@ struct Optical {
   typename L::Vec color;
 };
 
-/// How much is wanted of what channels do on a segment.
+/// What to compute of a channel on a segment; each level includes those before it.
 enum class Detail { extinction, emission, moment };
 
-/// Values of the line from knot a to knot b, which is piece `piece`; at its right end the limit from the
-/// left.
+/// Opacity and colour at `position` on piece `piece`, which goes from knot a to knot b. At its right end, the
+/// limit from the left.
 template <Detail kDetail, class L>
 SCOLOPAX_LANES Optical<L> opticalIn(const Knots<L>& a, const Knots<L>& b, typename L::Int piece,
                                     typename L::Float position) {
@@ -119,8 +122,7 @@ SCOLOPAX_LANES Optical<L> opticalIn(const Knots<L>& a, const Knots<L>& b, typena
   return optical;
 }
 
-/// Both knots of a piece in every lane, by reading one pair where all lanes in the mask are on the same
-/// piece.
+/// The two knots of each lane's piece. If all lanes in `which` are on the same piece, only one pair is read.
 template <class L>
 SCOLOPAX_LANES void knotsOf(const OpticalCurveView& curve, typename L::Int piece, typename L::Mask which,
                             Knots<L>* a, Knots<L>* b) {
@@ -147,8 +149,9 @@ SCOLOPAX_LANES Optical<L> opticalAt(const OpticalCurveView& curve, const CurvePo
   return opticalIn<kDetail, L>(a, b, point.piece, point.position);
 }
 
-/// What a channel does on a segment: means over it of its part in the extinction that is seen, of that times
-/// its colour, and of that times the place in [0,1]. Per world unit; 0 beyond the detail.
+/// Contribution of a channel to a segment, as means over the segment: of its part of the visible extinction,
+/// of that part times the colour, and of that part times the place in [0,1]. Per world unit. Means that
+/// Detail does not include are 0.
 template <class L>
 struct PartOf {
   typename L::Float opacity;
@@ -170,7 +173,7 @@ SCOLOPAX_LANES PartOf<L> sum(const PartOf<L>& a, const PartOf<L>& b) {
 }
 
 namespace detail {
-/// Adds a part of a stretch, from place s to place e of it, on which both curves are linear; exact.
+/// Adds the part of a segment from place s to place e, on which both curves are linear. Exact.
 template <Detail kDetail, class L>
 SCOLOPAX_LANES void addLinear(const Optical<L>& a, const Optical<L>& b, typename L::Float s,
                               typename L::Float e, typename L::Mask which, PartOf<L>* means) {
@@ -186,16 +189,16 @@ SCOLOPAX_LANES void addLinear(const Optical<L>& a, const Optical<L>& b, typename
     means->moment = means->moment + where(which, sixth * (left * s + right * e));
 }
 
-/// The same where the opacity is multiplied by what is linear from `first` to `second`; exact.
+/// The same, with the opacity multiplied by a factor that changes linearly from `first` to `second`. Exact.
 template <Detail kDetail, class L>
 SCOLOPAX_LANES void addProduct(const Optical<L>& a, const Optical<L>& b, typename L::Float first,
                                typename L::Float second, typename L::Float s, typename L::Float e,
                                typename L::Mask which, PartOf<L>* means) {
   using Float = typename L::Float;
-  // Simpson's rule, of up to a cubic.
+  // Simpson's rule, exact up to cubics.
   const Float sixth = (e - s) * 0.166666667f;
   const Float left = a.opacity * first, right = b.opacity * second;
-  const Float middle = (a.opacity + b.opacity) * (first + second);  // four times the product there
+  const Float middle = (a.opacity + b.opacity) * (first + second);  // four times the product in the middle
   means->opacity = means->opacity + where(which, sixth * (left + middle + right));
   if constexpr (kDetail >= Detail::emission)
     for (int c = 0; c < 3; ++c)
@@ -208,9 +211,10 @@ SCOLOPAX_LANES void addProduct(const Optical<L>& a, const Optical<L>& b, typenam
 }
 }  // namespace detail
 
-/// Calls visit(a, b, piece, from, to, s, e, lanes) for every piece of the curve, piece `piece` between knots
-/// a and b, on the way from p to q, not NaN: positions `from` to `to` at places s to e of the way. Of some
-/// lanes; positions may lie outside [0,1], where the curve is constant.
+/// Calls visit(a, b, piece, from, to, s, e, lanes) for every piece of the curve between p and q, which must
+/// not be NaN. The piece lies between knots a and b, and the way from p to q covers positions `from` to `to`
+/// of it, at places s to e in [0,1]. For lanes in `which`. Positions may lie outside [0,1], where the curve
+/// is constant.
 template <class L, class Visit>
 SCOLOPAX_LANES void forEachPiece(const OpticalCurveView& curve, const CurvePoint<L>& p,
                                  const CurvePoint<L>& q, typename L::Mask which, Visit&& visit) {
@@ -245,7 +249,7 @@ SCOLOPAX_LANES void forEachPiece(const OpticalCurveView& curve, const CurvePoint
   }
 }
 
-/// Means from p to q, not NaN, of some lanes, the others having 0.
+/// Means over a segment from p to q, which must not be NaN; 0 in lanes that are not in `which`.
 template <Detail kDetail, class L>
 SCOLOPAX_LANES PartOf<L> meansBetween(const OpticalCurveView& curve, const CurvePoint<L>& p,
                                       const CurvePoint<L>& q, typename L::Mask which) {
@@ -260,7 +264,7 @@ SCOLOPAX_LANES PartOf<L> meansBetween(const OpticalCurveView& curve, const Curve
   return means;
 }
 
-/// The same where the opacity is multiplied by another curve, which goes from g to h meanwhile.
+/// The same, with the opacity multiplied by the curve `factor`, on which the segment goes from g to h.
 template <Detail kDetail, class L>
 SCOLOPAX_LANES PartOf<L> meansOfProduct(const OpticalCurveView& curve, const CurvePoint<L>& p,
                                         const CurvePoint<L>& q, const OpticalCurveView& factor,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The segments of a ray a lane, in step with each other: what segments.h finds cell by cell for one ray.
+// Finds the segments of one ray per lane, in lockstep. segments.h does the same for a single ray, cell by
+// cell.
 #pragma once
 #include <bit>
 #include <type_traits>
@@ -34,15 +35,15 @@ class PointSegments {
     if (any(live_)) k_ = firstSegment(walk_.enter()) - 1;
   }
 
-  /// Goes on to the next segment that may have extinction for some ray; false when there is none: then it is
-  /// empty.
+  /// Advances to the next segment that may have extinction for some ray. If there is none, returns false and
+  /// an empty segment.
   SCOLOPAX_LANES bool next(Segment<L>& segment) {
     settle();
     for (++k_; any(live_); ++k_) {
       const Float start = k_ > 0 ? endOf(k_ - 1) : inside_.enter, end = endOf(k_);
       if (!meetsSomething(start, end)) {
         const int first = firstSegment(select(walk_.full(), walk_.enter(), walk_.exit()));
-        // Where floats cannot tell segments apart there may be no end of them.
+        // Where floats cannot tell segments apart, this might go on for ever.
         if (first <= k_ + 1 && ++idle_ > kMaxSegments) giveUp(live_);
         k_ = k_ > first - 1 ? k_ : first - 1;
         continue;
@@ -64,14 +65,14 @@ class PointSegments {
     return false;
   }
 
-  /// Ends rays that do not want more; whether there may be more for some ray.
+  /// Ends the rays that are not in `wants`. Returns whether there may be more segments for some ray.
   SCOLOPAX_LANES bool keep(Mask wants) {
     more_ = more_ & wants;
     return any(more_);
   }
 
  private:
-  /// Leaves the segment behind.
+  /// Finishes the current segment.
   SCOLOPAX_LANES void settle() {
     live_ = more_;
     for (std::uint32_t left = known_; left != 0; left &= left - 1)
@@ -88,10 +89,10 @@ class PointSegments {
     return minimum(inside_.enter + (float(segment) + offset_) * step_, inside_.exit);
   }
 
-  /// Whether a ray may be in a cell that is not empty between these places. If none is, the walk has gone on
-  /// to the next such cell of every ray or some way there; rays that have none left end. Without bits of
-  /// channels the first such ray is enough: where voxels are finite and extinctions add up, the others'
-  /// segments have no extinction.
+  /// Whether any ray may be in a non-empty cell between `start` and `end`. If none is, the walk has advanced
+  /// to the next such cell of every ray or some way towards it, and rays that have none left have ended. If
+  /// MajorantView::active is null, finding one such ray is enough: voxels are then finite, and extinctions
+  /// add up and depend on the value alone, so the segments of the other rays have no extinction.
   SCOLOPAX_LANES bool meetsSomething(Float start, Float end) {
     walk_.jump(start);
     cost_->cellSteps = cost_->cellSteps + Word(onesOf(live_));
@@ -103,7 +104,7 @@ class PointSegments {
       else if (any(here))
         return true;
       walk_.measure();
-      // What has nothing left may still have met something.
+      // A ray with nothing left ahead may still have crossed something here.
       const Mask rest = walk_.full() | (walk_.exit() < inside_.exit);
       const Mask behind = live_ & rest & (walk_.exit() < end);
       if (!any(behind)) {
@@ -117,11 +118,11 @@ class PointSegments {
     }
   }
 
-  /// First segment that has one of these points, of rays that have not ended.
+  /// First segment that contains `t` for some ray that has not ended.
   SCOLOPAX_LANES int firstSegment(Float t) const {
     const Float place = (t - inside_.enter) / step_ - offset_ + 1.0f;
     const int k = int(clamp(smallestOf(select(live_, place, Float(kInfinity))), 0.0f, 1e9f));
-    // Rounding may have come to the next.
+    // Rounding may have given the next segment.
     return k > 0 && any(live_ & (t < endOf(k - 1))) ? k - 1 : k;
   }
 
@@ -150,16 +151,16 @@ class PointSegments {
   Float offset_, step_;
   CostOf<L>* cost_;
   PointWalk<L> walk_;
-  Mask live_, more_;  // rays that have not ended, and those that have something behind the segment
-  Mask counted_;      // rays for which it is one of those that a ray may have
+  Mask live_, more_;  // rays that have not ended, and those that continue beyond the segment
+  Mask counted_;      // rays for which the segment counts towards kMaxSegments
   Word met_;
   Int taken_{0};
-  int k_ = 0, last_ = -2;    // the segment, and which was taken last
+  int k_ = 0, last_ = -2;    // index of the segment, and of the one taken last
   std::uint32_t known_ = 0;  // channels that were sampled at its end
   int idle_ = 0;
 };
 
-/// Segments of rays: cell by cell for one, which takes fewer steps; point by point for many.
+/// Finds segments cell by cell for one ray, which takes fewer steps, and point by point for many.
 template <class L, class View>
 using Segments = std::conditional_t<L::kLanes == 1, CellSegments<View>, PointSegments<L, View>>;
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The way of a ray a lane through the macrocells. Where cell_walk.h goes from cell to cell, this asks at
-// points and leaps from there, so that rays keep step.
+// Traverses the macrocells along one ray per lane. Unlike cell_walk.h, which goes from cell to cell, it looks
+// up cells at given points and leaps from there, so that the rays stay in lockstep.
 #pragma once
 #include "renderer/kernel/cell_walk.h"
 
 namespace scolopax::kernel {
 
-/// Finds what is not empty along every ray: asks cells at points, and walks on from there, a cube of empty
-/// blocks as one step.
+/// Finds the non-empty cells along every ray. Looks up the cell at a point and advances from there, with a
+/// cube of empty blocks as one step.
 template <class L>
 class PointWalk {
  public:
@@ -16,8 +16,8 @@ class PointWalk {
   using Word = typename L::Word;
   using Mask = typename L::Mask;
 
-  /// Only the part of the interval in which there are cells that are not empty. Where the grid has bits of
-  /// channels, those of `channels` matter.
+  /// Reduces the interval to the part that may have non-empty cells. If the grid has MajorantView::active,
+  /// cells without any of `channels` count as empty.
   SCOLOPAX_LANES PointWalk(const RayOf<L>& rays, const IntervalOf<L>& inside, const MajorantView& grid,
                            Word channels)
       : rays_(rays), grid_(grid), inverseSize_(1.0f / grid.cellSize), end_(inside.exit) {
@@ -31,7 +31,7 @@ class PointWalk {
       const Mask along = d == 0.0f;
       last_[axis] = select(along, Int(-1), Int(grid.cells[axis] - 1));
       inverse_[axis] = clamp(1.0f / d, -kLargestFinite, kLargestFinite);
-      // Rounding must not take anything away.
+      // Rounding must not cut off any non-empty cell.
       constexpr float kMargin = 0.0625f;
       const float lo = float(grid.filledLow[axis]) * grid.cellSize - kMargin;
       const float hi = float(grid.filledHigh[axis]) * grid.cellSize + kMargin;
@@ -45,17 +45,17 @@ class PointWalk {
   }
 
   SCOLOPAX_LANES Mask meets() const { return meets_; }
-  /// Up to here there is nothing, but what was asked before.
+  /// The point looked up last. Everything before it is empty, except what was looked up earlier.
   SCOLOPAX_LANES Float enter() const { return enter_; }
   /// Rays whose cell at enter() may have extinction.
   SCOLOPAX_LANES Mask full() const { return full_; }
-  /// Bits of the channels that may have extinction there; only where the grid has them.
+  /// Bits of the channels that may have extinction there; only if the grid has MajorantView::active.
   SCOLOPAX_LANES Word active() const { return active_; }
-  /// Where the cells of enter(), or the cubes of empty blocks around them, end; infinite when nothing is
+  /// Where rays leave the cells at enter(), or the cubes of empty blocks around them; infinite if nothing is
   /// left.
   SCOLOPAX_LANES Float exit() const { return exit_; }
 
-  /// Asks at t where that is further.
+  /// Moves forward to t where t is further, and looks up the cells there.
   SCOLOPAX_LANES void jump(Float t) {
     const Mask further = t > enter_;
     enter_ = maximum(t, enter_);
@@ -63,7 +63,7 @@ class PointWalk {
     ask();
   }
 
-  /// Finds out exit(); before advance().
+  /// Computes exit(). Call before advance().
   SCOLOPAX_LANES void measure() {
     const Int one = Int(1);
     const Int radius = code_ - Int(kEmptyCode);
@@ -83,15 +83,15 @@ class PointWalk {
     exit_ = select(exit_ < end_, maximum(exit_, enter_), Float(kInfinity));
   }
 
-  /// These rays, which have something left, go where their cells or cubes end.
+  /// Moves the rays in `which` to exit(), which must be finite, and looks up the cells there.
   SCOLOPAX_LANES void advance(Mask which) {
     const Float t = exit_;
     enter_ = select(which, t, enter_);
-    Mask first = which;  // a ray leaves through one axis: the first of those that are as near
+    Mask first = which;  // a ray leaves through one axis: the first of equally near ones
     for (int axis = 0; axis < 3; ++axis) {
       const Mask out = first & (through_[axis] <= t);
       first = without(first, out);
-      // Never back, so that no input makes a walk endless.
+      // Never backwards, so that no input makes a walk endless.
       const Int least = minimum(cell_[axis], next_[axis] + Int(1));
       const Int most = maximum(cell_[axis], next_[axis] - Int(1));
       const Int across = minimum(maximum(cellAt(axis, t), least), most);
@@ -104,7 +104,8 @@ class PointWalk {
   static constexpr int kShift = 2;
   static_assert(kBlockEdge == 1 << kShift);
 
-  /// The interval begins (or else ends) at t; along the plane, rays are on the right side or see nothing.
+  /// Moves the start of the interval, or its end where `begins` is false, to t. Rays that are parallel to the
+  /// plane (`along`) must be on its inner side (`right`), or they miss everything.
   SCOLOPAX_LANES void narrow(Mask begins, Mask along, Float t, Mask right) {
     enter_ = select(begins, maximum(enter_, t), enter_);
     end_ = select(begins | along, end_, minimum(end_, t));
@@ -131,7 +132,7 @@ class PointWalk {
   Float inverse_[3], through_[3];
   Word channels_, active_;
   Int code_;
-  Int cell_[3], last_[3], next_[3];  // next: behind the plane through which a ray may leave
+  Int cell_[3], last_[3], next_[3];  // next_: the cell behind the plane through which a ray may leave
 };
 
 }  // namespace scolopax::kernel

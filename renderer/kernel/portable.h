@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What marks code that runs on host and device alike, and code that runs on one lane or many. Kernels use
-// only arithmetic, comparisons and the functions of this folder, so that every compiler and device computes
-// the same bits.
+// Macros that mark code that runs on host and device alike, and code that runs on one lane or many. Kernels
+// use only arithmetic, comparisons and the functions of this folder, so that every compiler and device
+// computes the same bits.
 #pragma once
 
 #if defined(__CUDACC__)
@@ -10,9 +10,10 @@
 #define SCOLOPAX_HD
 #endif
 
-// What most of the time is spent in, with all that it calls; and what is seldom called, out of its way. On a
-// device everything is inlined but what only rare scenes need; with sanitizers, whose code is long, nothing
-// must be.
+// SCOLOPAX_HOT marks functions in which most of the time is spent; everything that they call is inlined.
+// SCOLOPAX_APART and SCOLOPAX_RARE mark functions that are seldom called and are not inlined. On a device,
+// everything is inlined except SCOLOPAX_RARE functions, which only few scenes need. With sanitizers, whose
+// code is long, no inlining is forced.
 #if defined(__CUDACC__)
 #define SCOLOPAX_HOT SCOLOPAX_HD
 #define SCOLOPAX_APART SCOLOPAX_HD
@@ -27,12 +28,12 @@
 #define SCOLOPAX_RARE SCOLOPAX_APART
 #endif
 
-// For everything that is a template over a lane type (lanes.h). A file that is compiled for an instruction
-// set includes cpu/lanes_*.h first, which defines SCOLOPAX_SIMD: its instances are of that set's lane type,
-// and are inlined into functions that have the set. Functions, not files, have it: an inline function that a
-// file compiled for AVX2 might be the one that the linker keeps for everybody. What is not inlined takes and
-// returns vectors by their addresses: by value, g++ 12 passes half of a vector of a set that is not the
-// file's.
+// SCOLOPAX_LANES marks templates over a lane type (lanes.h). A file that is compiled for an instruction set
+// includes cpu/lanes_*.h first, which defines SCOLOPAX_SIMD. The instances of the templates in that file then
+// have the lane type of the set, and are inlined into functions whose target is the set. The target is set
+// for functions, not for files: otherwise an inline function in a file compiled for AVX2 might be the copy
+// that the linker keeps for the whole program. Functions that are not inlined take and return vectors by
+// address: g++ 12 passes only half of a vector by value if its instruction set is not that of the file.
 #if defined(SCOLOPAX_SIMD)
 #define SCOLOPAX_LANES SCOLOPAX_SIMD_INLINE inline
 #define SCOLOPAX_LANES_LAMBDA SCOLOPAX_SIMD_INLINE

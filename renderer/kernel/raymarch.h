@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Quadrature along a ray a lane: equal segments from a jittered start, over each of which the scalars are
-// linear and the curves exact (the paper's baseline of 5.2-5.3 takes one point instead). Lighting is worked
-// out once for every stratum of absorbed light. Biased; of order 2 in the step.
+// Ray marching by quadrature, one ray per lane. Segments are of equal length, from a jittered start. On each,
+// the scalars are taken to be linear and their curves are integrated exactly (the paper's baseline of 5.2-5.3
+// takes one point instead). Lighting is computed once per stratum of absorbed light. Biased; the error is of
+// second order in the step.
 #pragma once
 #include "renderer/kernel/collision.h"
 #include "renderer/kernel/strata.h"
 
 namespace scolopax::kernel {
 
-/// Transmittance below which what lies behind no longer shows, not even in float pictures of high contrast.
+/// Transmittance below which matter behind is invisible, even in float pictures of high contrast.
 inline constexpr float kOpaqueTransmittance = 1e-4f;
 
 /// Linear premultiplied RGBA.
@@ -18,7 +19,8 @@ struct Radiance {
   typename L::Float opacity;
 };
 
-/// Collisions on a segment; `pick` in [0,1) decides about the channel where extinctions add up.
+/// Collisions on a segment. `pick`, in [0,1), is the place on the segment and, where extinctions add up,
+/// selects the channel.
 template <class L>
 struct SegmentCollision {
   Segment<L> segment;
@@ -33,7 +35,7 @@ SCOLOPAX_LANES void keepNearer(FirstCollisionOf<L>* first, typename L::Mask whic
   first->channel = select(nearer, channel, first->channel);
 }
 
-/// Keeps collisions that are nearer than what rays have met so far.
+/// Records collisions that are nearer than the rays' nearest so far.
 template <class L, class Blend, class View>
 SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const SegmentEnds<L, View>& ends,
                                Hidden<L, Blend::kSums>& hidden, const SegmentCollision<L>& collision,
@@ -57,7 +59,8 @@ SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const Segm
              channel);
 }
 
-/// Of rays among some channels, by their bits; `set` tells the random numbers of such marches apart.
+/// Marches rays through `channels` (bit n: visible channel n). `set` keeps the random numbers of several such
+/// marches apart.
 template <class Features, class L, class Blend, class View>
 SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                     const IntervalOf<L>& inside, std::uint32_t channels, int set,
@@ -68,7 +71,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
   using Vec = typename L::Vec;
   constexpr Detail kDetail = Features::kAny ? Detail::moment : Detail::emission;
   Vec color(0.0f);
-  Float transmittance(1.0f), opacity(0.0f);  // both: 1 - transmittance would lose what is thin
+  Float transmittance(1.0f), opacity(0.0f);  // both: 1 - transmittance loses the digits of thin matter
   const Mask meets = inside.enter < inside.exit;
   const auto random = sampler.next(meets);
   // A tracker's ray would end where the opacity passes this number.
@@ -133,7 +136,7 @@ struct RayMarch {
                                           const IntervalOf<L>& inside, SamplerOf<L>& sampler, CostOf<L>* cost,
                                           FirstCollisionOf<L>* first) {
     using Float = typename L::Float;
-    const SamplerOf<L> ofStrata = sampler.aside();  // one for all channels: their draws are independent
+    const SamplerOf<L> ofStrata = sampler.aside();  // one for all channels: their sets are independent
     Radiance<L> sum{typename L::Vec(0.0f), Float(0.0f)};
     for (int n = 0; n < (blend.separate ? scene.channelCount : 1); ++n) {
       const std::uint32_t channels =

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One sample of one pixel. Launchers run it for every pixel and add the result to the
-// film.
+// One sample of one pixel. Launchers run it for every pixel of a pass; the engine adds the pass to the film.
 #pragma once
 #include <glm/vec4.hpp>
 
@@ -9,14 +8,14 @@
 
 namespace scolopax::kernel {
 
-/// A ray of every lane through its pixel, and the part of it that may show anything.
+/// One ray per lane through its pixel, and the part of it inside the clipped volume.
 template <class L>
 struct PixelRay {
   typename L::Float x, y;  ///< on the film, in pixels
   RayOf<L> ray;
   IntervalOf<L> inside;
 };
-/// Takes a block of random numbers, of lanes in the mask.
+/// Draws one block of random numbers, for lanes in `which`.
 template <class L>
 SCOLOPAX_LANES PixelRay<L> rayThrough(const SceneView& scene, typename L::Int column, typename L::Int row,
                                       SamplerOf<L>& sampler, typename L::Mask which) {
@@ -36,14 +35,14 @@ struct RenderPixel {
   View scene;
   SampleNumber number;
   glm::vec4* pass;                  ///< width x height: this sample's linear premultiplied RGBA
-  SampleCost* cost;                 ///< the same shape, or null where nobody counts
-  FirstCollision* first = nullptr;  ///< the same shape, or null where nobody asks
+  SampleCost* cost;                 ///< the same shape, or null if costs are not counted
+  FirstCollision* first = nullptr;  ///< the same shape, or null if it is not needed
 
   SCOLOPAX_HD void operator()(int pixel) const {
     Sampler sampler(std::uint32_t(pixel), number, scene.seed);
     const PixelRay<One> at = rayThrough<One>(scene, pixel % scene.width, pixel / scene.width, sampler, true);
 #if defined(__CUDA_ARCH__)
-    constexpr FirstCollision* const first = nullptr;  // devices are not asked, and need not compile it
+    constexpr FirstCollision* const first = nullptr;  // devices do not record it, and need not compile it
 #endif
     SampleCost spent;
     glm::vec4 result(0.0f);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random numbers by counting: a bijection of (pixel, sample, block, seed), so that no two draws share a
-// state and none depends on threads, tiles or processes; the first ones of low discrepancy. Integer only
-// until the last step.
+// Counter-based random numbers: a bijection of (pixel, sample, block, seed), so that no two draws share a
+// state and none depends on threads, tiles or processes. The first blocks may be of low discrepancy. Integers
+// only, until the last step.
 #pragma once
 #include <cstdint>
 
@@ -31,7 +31,7 @@ SCOLOPAX_LANES RandomBlockOf<Word> pcg4d(Word x, Word y, Word z, Word w) {
 }
 
 /// (k + 1/2) 2^-32, at most 1 - 2^-24: never 0 or 1, and fine enough near 0 that a free flight through
-/// optical thickness 1e-7 still has the right chance of a collision.
+/// optical thickness 1e-7 still collides with the right probability.
 template <class Word>
 SCOLOPAX_LANES auto uniformOf(Word k) {
   return minimum((floatOfWord(k) + 0.5f) * 0x1p-32f, 0x1.fffffep-1f);
@@ -46,17 +46,17 @@ SCOLOPAX_LANES Word hashOf(Word x) {
   return x ^ right<16>(x);
 }
 
-/// Blocks of a sample whose words x, y, z come from a Sobol sequence.
+/// Number of leading blocks of a sample whose words x, y, z come from a Sobol sequence.
 inline constexpr std::uint32_t kLowDiscrepancyBlocks = 3;
-/// Consecutive samples of a pixel that share a scrambling. Between replicates samples are independent, so the
-/// error of a picture can be estimated from them.
+/// Number of consecutive samples of a pixel that share a scrambling: a replicate. Different replicates are
+/// independent, so the error of a picture can be estimated from them.
 inline constexpr std::uint32_t kReplicateSamples = 64;
 
-/// The part of a sample's numbers that all pixels share (data/sampling.h makes it).
+/// The part of a sample's random numbers that all pixels share (made by data/sampling.h).
 struct SampleNumber {
   std::uint32_t sample;
-  bool lowDiscrepancy;  ///< false: all draws independent
-  /// Point sample % kReplicateSamples of the Sobol sequence, bits of each coordinate reversed.
+  bool lowDiscrepancy;  ///< false: all draws are independent
+  /// Point sample % kReplicateSamples of the Sobol sequence, with the bits of each coordinate reversed.
   std::uint32_t point[kLowDiscrepancyBlocks][3];
 };
 
@@ -69,8 +69,8 @@ SCOLOPAX_LANES Word reverseBits(Word x) {
   return left<1>(x & 0x55555555u) | (right<1>(x) & 0x55555555u);
 }
 
-/// Owen's nested uniform scrambling of a coordinate whose bits come reversed (Burley, "Practical Hash-based
-/// Owen Scrambling", JCGT 9(4), 2020): every bit is flipped by a hash of the bits before it.
+/// Owen's nested uniform scrambling of a coordinate whose bits are reversed (Burley, "Practical Hash-based
+/// Owen Scrambling", JCGT 9(4), 2020): every bit is flipped according to a hash of the bits before it.
 template <class Word>
 SCOLOPAX_LANES Word owenScramble(Word reversed, Word seed) {
   // The seed's lowest bit flips the coordinate's highest, and pcg4d's lowest bits are not random enough.
@@ -82,8 +82,8 @@ SCOLOPAX_LANES Word owenScramble(Word reversed, Word seed) {
   return reverseBits(x);
 }
 
-/// The draws of one sample of a pixel a lane. Block 0 places the sample in the pixel; every tentative
-/// collision takes the next block: x its optical depth, y the channel, z acceptance.
+/// Random numbers of one sample of one pixel per lane. Block 0 places the sample in the pixel. Every
+/// tentative collision takes the next block: x gives its optical depth, y the channel, z acceptance.
 template <class L>
 class SamplerOf {
  public:
@@ -93,13 +93,13 @@ class SamplerOf {
   /// Borrows `number`.
   SCOLOPAX_LANES SamplerOf(Word pixel, const SampleNumber& number, std::uint32_t seed)
       : number_(number), pixel_(pixel), seed_(seed) {}
-  /// Lanes that are not in the mask stay at their block, and get anything.
+  /// Returns the next block. Lanes that are not in `which` do not advance, and their numbers are undefined.
   SCOLOPAX_LANES Block next(Mask which = L::everywhere()) {
     const Word block = block_;
     block_ = block_ + Word(onesOf(which));
     return at(block, which);
   }
-  /// Any block, in any order.
+  /// Returns any block, in any order. Numbers of lanes that are not in `which` are undefined.
   SCOLOPAX_LANES Block at(Word block, Mask which = L::everywhere()) const {
     const Mask low = Word(number_.lowDiscrepancy ? kLowDiscrepancyBlocks : 0u) > block;
     const Block random = pcg4d(pixel_, Word(number_.sample), block, Word(seed_));
@@ -113,11 +113,10 @@ class SamplerOf {
             select(low, owenScramble(gather(&number_.point[0][2], row), scrambling.z), random.z),
             select(low, scrambling.w, random.w)};
   }
-  /// How many next() has given.
+  /// Number of blocks that next() has returned.
   SCOLOPAX_LANES Word blocks() const { return block_; }
   SCOLOPAX_LANES void skipTo(Word block) { block_ = block; }
-  /// Numbers apart from these, for a purpose whose need for them must not change what the others are. Pixels
-  /// stay below 2^31.
+  /// A sampler with other numbers, for a purpose whose draws must not change these. Pixels stay below 2^31.
   SCOLOPAX_LANES SamplerOf aside() const { return SamplerOf(pixel_ | Word(0x80000000u), number_, seed_); }
 
  private:

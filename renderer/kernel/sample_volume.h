@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Trilinear interpolation of stored voxels. Between voxel centres; beyond the outer ones the edge value.
+// Trilinear interpolation of stored voxels between voxel centres; beyond the outermost centres, the edge
+// value.
 #pragma once
 #include <cstddef>
 
@@ -8,8 +9,9 @@
 
 namespace scolopax::kernel {
 
-/// One axis of a fetch: the two neighbours' offsets in voxels, and the weight of the second, below 1: at the
-/// last voxel and beyond they change places, so that its value comes out exactly, whatever is beside it.
+/// One axis of a fetch: the array offsets of the two neighbours, and the weight of the second. At the last
+/// voxel and beyond, axisWeight() swaps the neighbours and returns the weight 0, so that the last voxel's
+/// value comes out exactly, whatever finite value is beside it.
 struct AxisWeight {
   std::size_t low, high;
   float t;
@@ -23,7 +25,7 @@ SCOLOPAX_HD inline AxisWeight axisWeight(float x, int size, std::size_t stride) 
   return {std::size_t(whole) * stride, std::size_t(size > 1 ? whole + 1 : 0) * stride, inside - float(whole)};
 }
 
-/// Exact where a == b; between a and b but for rounding, which the macrocells allow for.
+/// Exact where a == b. Between a and b except for rounding, which the macrocells allow for.
 SCOLOPAX_HD inline float lerp(float a, float b, float t) { return a + t * (b - a); }
 
 template <class T>
@@ -39,7 +41,7 @@ SCOLOPAX_HD float trilinear(const T* v, const AxisWeight& x, const AxisWeight& y
   return lerp(lerp(c00, c10, y.t), lerp(c01, c11, y.t), z.t);
 }
 
-/// Stored value of one channel at a point in voxel coordinates; not finite exactly when one of the eight
+/// Stored value of one channel at a point in voxel coordinates. Not finite if and only if one of the eight
 /// corners is not (differences cannot overflow: Volume keeps float voxels below 2^124).
 SCOLOPAX_HD inline float sampleStored(const ChannelView& channel, glm::ivec3 dims, glm::vec3 point) {
   const auto stride = std::size_t(channel.stride);

@@ -1,20 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the channels do on a segment of every ray: their extinction, emission and its centre, and which of
-// them counts where they hide each other. After the segments, before raymarch.h and strata.h.
+// Contributions of the channels to a segment of every ray: their extinction, its centre, and their emission,
+// and which of them counts where they hide each other. Takes segments (point_segments.h); used by raymarch.h
+// and strata.h.
 #pragma once
 #include "renderer/kernel/point_segments.h"
 
 namespace scolopax::kernel {
 
-/// How quadrature sees a blend mode. Only the first decides what is compiled.
+/// A blend mode as quadrature uses it. Only kSums is chosen at compile time.
 template <bool kSumsExtinction>
 struct Blending {
-  static constexpr bool kSums = kSumsExtinction;  ///< extinctions add up; else the largest is seen (Eq. 8)
-  bool separate;                                  ///< channels do not see each other
-  bool mixes;                                     ///< the largest extinction shows all colours, weighted
+  static constexpr bool kSums = kSumsExtinction;  ///< extinctions add up; else the largest counts (Eq. 8)
+  bool separate;                                  ///< channels are rendered independently
+  bool mixes;  ///< the largest extinction has the weighted colours of all channels
 };
 
-/// Finds partAlone() where the opacity depends on the gradient, whose magnitude is linear on the segment too.
+/// Computes partAlone() where the opacity depends on |gradient|, which is taken to be linear on the segment
+/// too.
 template <Detail kDetail, class L, class View>
 SCOLOPAX_LANES_RARE void findPartWithFactor(const ChannelView& channel, const SegmentEnds<L, View>& ends,
                                             int n, const typename L::Mask& which, PartOf<L>* part) {
@@ -24,7 +26,7 @@ SCOLOPAX_LANES_RARE void findPartWithFactor(const ChannelView& channel, const Se
   const CurvePoint<L>& from = ends.from[n];
   const CurvePoint<L>& to = ends.to[n];
   const Float g = ends.factorPositionFrom[n], h = ends.factorPositionTo[n];
-  // An end has a value and a gradient, or counts for nothing.
+  // An end without a finite value and gradient counts for nothing.
   const Mask known = (from.position == from.position) & isFinite(g);
   const Mask other = (to.position == to.position) & isFinite(h), some = which & (known | other);
   *part = noPart<L>();
@@ -35,8 +37,8 @@ SCOLOPAX_LANES_RARE void findPartWithFactor(const ChannelView& channel, const Se
   *part = scaled(means, select(known & other, Float(channel.density), Float(0.5f * channel.density)));
 }
 
-/// Part of channel n on a segment of some rays, as if it were alone; of the others nothing. Next to voxels
-/// that are not finite only the half of the segment that has a value counts.
+/// Part of channel n on a segment, as if it were the only channel; nothing for rays that are not in `which`.
+/// If only one end of the segment has a finite value, only half of the segment counts.
 template <Detail kDetail, class L, class View>
 SCOLOPAX_LANES PartOf<L> partAlone(const View& scene, const SegmentEnds<L, View>& ends, int n,
                                    typename L::Mask which) {
@@ -66,8 +68,8 @@ SCOLOPAX_LANES PartOf<L> partAlone(const View& scene, const SegmentEnds<L, View>
   return scaled(meansBetween<kDetail, L>(curve, from, to, seen), density);
 }
 
-/// Where channels hide each other, extinctions are compared at this many places of a segment, and at this
-/// many where a channel's curve is not one line on it.
+/// Where channels hide each other, their extinctions are compared at kPlaces places of a segment, or at
+/// kPlacesAtKnots where the extinction of some channel may not be linear on it.
 inline constexpr int kPlaces = 2, kPlacesAtKnots = 8;
 
 /// The parts of channels that hide each other.
@@ -75,11 +77,11 @@ template <class L, bool kSums>
 struct Hidden {
   PartOf<L> of[kMaxVisibleChannels];
 };
-/// Nothing where extinctions add up.
+/// Empty where extinctions add up.
 template <class L>
 struct Hidden<L, true> {};
 
-/// Takes rays out of the mask on whose segment the factor of channel n may change.
+/// Removes rays from the mask where the gradient factor of channel n may change on the segment.
 template <class L, class View>
 SCOLOPAX_LANES_RARE void dropWhereFactorChanges(const ChannelView& channel, const SegmentEnds<L, View>& ends,
                                                 int n, typename L::Mask* straight) {
@@ -91,7 +93,7 @@ SCOLOPAX_LANES_RARE void dropWhereFactorChanges(const ChannelView& channel, cons
                opticalAt<Detail::extinction, L>(curve, h, L::everywhere()).opacity);
 }
 
-/// Multiplies an opacity of channel n by its factor at a place in [0,1] of a segment.
+/// Multiplies an opacity of channel n by its gradient factor at a place in [0,1] of a segment.
 template <class L, class View>
 SCOLOPAX_LANES_RARE void multiplyByFactor(const ChannelView& channel, const SegmentEnds<L, View>& ends, int n,
                                           const typename L::Float& place, const typename L::Mask& which,
@@ -107,7 +109,8 @@ SCOLOPAX_LANES_RARE void multiplyByFactor(const ChannelView& channel, const Segm
   *opacity = where(known | other, *opacity * factor);
 }
 
-/// What channel n is at a place in [0,1] of a segment; of other rays anything.
+/// Extinction (as `opacity`) and colour of channel n at a place in [0,1] of a segment. Undefined for rays
+/// that are not in `which`.
 template <Detail kDetail, class L, class View>
 SCOLOPAX_LANES Optical<L> opticalOn(const View& scene, const SegmentEnds<L, View>& ends, int n,
                                     typename L::Float place, typename L::Mask which) {
@@ -126,7 +129,7 @@ SCOLOPAX_LANES Optical<L> opticalOn(const View& scene, const SegmentEnds<L, View
   return optical;
 }
 
-/// Adds what is seen of a channel around one place of a segment.
+/// Adds the visible part of a channel at one place of a segment.
 template <Detail kDetail, class L>
 SCOLOPAX_LANES void add(typename L::Float opacity, const typename L::Vec& color, typename L::Float place,
                         typename L::Mask which, PartOf<L>* part) {
@@ -135,8 +138,8 @@ SCOLOPAX_LANES void add(typename L::Float opacity, const typename L::Vec& color,
   if constexpr (kDetail >= Detail::moment) part->moment = part->moment + where(which, opacity * place);
 }
 
-/// Compares the channels of a segment, for some rays: the mean of the largest extinction, and what is seen of
-/// each channel.
+/// Compares the channels of a segment, for rays in `which`. Returns the mean of the largest extinction, and
+/// sets `hidden` to the visible part of each channel.
 template <Detail kDetail, class L, class View>
 SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Segment<L>& segment,
                                          const SegmentEnds<L, View>& ends, typename L::Mask which,
@@ -188,8 +191,8 @@ SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Se
   }
   return sum * share;
 }
-/// Calls visit(n, part of channel n) for all channels of the segment, and returns the mean extinction that is
-/// seen. One channel alone needs no comparisons.
+/// Calls visit(n, part of channel n) for all channels of the segment, and returns the mean of the visible
+/// extinction. Rays with a single channel need no comparisons.
 template <Detail kDetail, class L, class Blend, class Visit, class View>
 SCOLOPAX_LANES typename L::Float visitParts(const View& scene, const Blend& blend, const Segment<L>& segment,
                                             const SegmentEnds<L, View>& ends,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A ray cut into segments of one step, without those in empty macrocells, and the channels' positions at
-// their ends: what quadrature works on.
+// Cuts a ray into segments of one step, skips those in empty macrocells, and finds the curve positions of the
+// channels at the segments' ends. Quadrature works on these segments.
 #pragma once
 #include "renderer/kernel/cell_walk.h"
 #include "renderer/kernel/gradient.h"
@@ -8,12 +8,13 @@
 
 namespace scolopax::kernel {
 
-/// Segments after which a ray gives up and counts as truncated.
+/// Maximum number of segments of a ray. A ray with more stops there and counts as truncated.
 inline constexpr int kMaxSegments = 1 << 20;
 
-/// Where a segment's ends lie on the curves of its channels, and |gradient| on those of its factor, of
-/// channels that have one; NaN where there is no finite value. What variables index is in objects like this
-/// and nothing else is: a device keeps such objects in memory, all of them.
+/// Positions of the channels at a segment's two ends: on their curves and, for channels with a gradient
+/// factor, of |gradient| on the factor's curve. NaN where the value is not finite. Objects like this one hold
+/// arrays that are indexed by variables, and nothing else: a device keeps such an object in memory as a
+/// whole.
 template <class L, class View>
 struct SegmentEnds {
   CurvePoint<L> from[kMaxVisibleChannels], to[kMaxVisibleChannels];
@@ -26,16 +27,16 @@ struct SegmentEnds {
   }
 };
 
-/// A segment of every ray.
+/// One segment per ray.
 template <class L>
 struct Segment {
   using Mask = typename L::Mask;
   using Word = typename L::Word;
   typename L::Float start, end;  ///< world units along the ray
   std::uint32_t channels;        ///< bit n: channel n may have extinction for some ray; the others have none
-  Mask live;                     ///< the other rays have ended
-  bool apart;                    ///< rays differ in their channels: met says which
-  Word met;                      ///< bit n: channel n may have extinction
+  Mask live;                     ///< rays that have not ended
+  bool apart;                    ///< rays may differ in their channels, which `met` gives
+  Word met;                      ///< bit n: channel n may have extinction, for each ray
 
   SCOLOPAX_LANES typename L::Float length() const { return end - start; }
   /// Rays for which channel n, one of `channels`, may have extinction.
@@ -44,14 +45,14 @@ struct Segment {
     const Word bit(1u << n);
     return live & ((met & bit) == bit);
   }
-  /// Rays for which more than one may have.
+  /// Rays for which more than one channel may have extinction.
   SCOLOPAX_LANES Mask several() const {
     if (L::kLanes > 1 && apart) return without(live, (met & (met - Word(1u))) == Word(0u));
     return (channels & (channels - 1)) != 0 ? live : without(live, live);
   }
 };
 
-/// Bit n: one of `channels` that may have extinction in the cell.
+/// Those of `channels` that may have extinction in the cell. Bit n: visible channel n.
 SCOLOPAX_HD inline std::uint32_t activeChannels(const SceneView& scene, std::size_t cell,
                                                 std::uint32_t channels) {
   if (!(scene.majorants.total(cell) > 0.0f)) return 0;
@@ -61,12 +62,12 @@ SCOLOPAX_HD inline std::uint32_t activeChannels(const SceneView& scene, std::siz
   return active;
 }
 
-/// Finds the segments of one ray, front to back, by going from cell to cell. Segment k ends at inside.enter +
-/// (k + offset) * step, with offset in (0, 1], or at inside.exit.
+/// Finds the segments of one ray, front to back, by walking from macrocell to macrocell. Segment k ends at
+/// inside.enter + (k + offset) * step, with offset in (0, 1], but at inside.exit at the latest.
 template <class View>
 class CellSegments {
  public:
-  /// Of channels by their bits.
+  /// `channels`: bit n is visible channel n.
   SCOLOPAX_HD CellSegments(SegmentEnds<One, View>& ends, const View& scene, const Ray& ray,
                            const Interval& inside, std::uint32_t channels, float offset, float step,
                            SampleCost* cost)
@@ -82,8 +83,9 @@ class CellSegments {
     enterCell();
   }
 
-  /// Goes on to the next segment that may have extinction; false when there is none: then it is empty. A
-  /// device's compiler inlines all of it wherever this is called: once in a kernel for every kind of ray.
+  /// Advances to the next segment that may have extinction. If there is none, returns false and an empty
+  /// segment. A device compiler inlines all of this wherever it is called, so a kernel should contain only
+  /// one call per kind of ray.
   SCOLOPAX_HD bool next(Segment<One>& segment) {
     if (!find()) {
       segment = {inside_.exit, inside_.exit, 0, false, false, 0};
@@ -103,7 +105,7 @@ class CellSegments {
     known_ = has_;
     return true;
   }
-  /// Ends the ray unless it wants more; whether there may be more.
+  /// Ends the ray unless `wants` is true. Returns whether there may be more segments.
   SCOLOPAX_HD bool keep(bool wants) { return wants; }
 
  private:
@@ -131,11 +133,11 @@ class CellSegments {
     fresh_ = true;
   }
 
-  /// Leaves out segments that end before the cell.
+  /// Skips segments that end before the cell.
   SCOLOPAX_HD void skipToCell() {
     const float place = (cells_.enter() - inside_.enter) / step_ - offset_ + 1.0f;
     int guess = int(clamp(place, 0.0f, 1e9f));
-    if (guess > 0 && cells_.enter() < end(guess - 1)) --guess;  // rounding had come to the next
+    if (guess > 0 && cells_.enter() < end(guess - 1)) --guess;  // rounding gave the next segment
     if (guess > following_) following_ = guess;
     fresh_ = false;
   }
@@ -175,12 +177,12 @@ class CellSegments {
   float offset_, step_;
   SampleCost* cost_;
   CellWalk cells_;
-  std::uint32_t active_;       // channels of the cell
-  bool fresh_ = true;          // nothing of the cell is taken
+  std::uint32_t active_;       // channels that may have extinction in the cell
+  bool fresh_ = true;          // no segment of the cell has been taken
   int following_ = 0;          // first segment that no cell has taken
-  int found_ = 0, taken_ = 0;  // segment found last, and how many were
+  int found_ = 0, taken_ = 0;  // segment found last, and number of segments found
   std::uint32_t has_ = 0;      // its channels
-  std::uint32_t waiting_ = 0;  // not 0: found_ reaches beyond the cells so far; their channels
+  std::uint32_t waiting_ = 0;  // channels of found_ if it extends beyond the cells visited so far, else 0
   int last_ = -2;              // segment sampled last
   std::uint32_t known_ = 0;    // channels that were sampled at its end
 };

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light at a collision: gradient shading and shadows (renderer section 4.6). Both are parameters of the
-// kernel: what a scene does not use is not compiled into the one that runs.
+// Lighting at a point of a ray: gradient shading and shadows (renderer section 4.6). Both are template
+// parameters of the kernel, so a scene's kernel contains no code for features that the scene does not use.
 #pragma once
 #include "renderer/kernel/trackers/process_per_channel.h"
 
 namespace scolopax::kernel {
 
-/// What a scene asks for; an instance per combination.
+/// The lighting features that a scene uses. Kernels are instantiated for every combination.
 template <bool kShadingOn, bool kShadowsOn>
 struct LightFeatures {
   static constexpr bool kShading = kShadingOn, kShadows = kShadowsOn;
   static constexpr bool kAny = kShading || kShadows;
 };
 
-/// Points of rays that light falls on, inside the clipped volume.
+/// Points on rays at which lighting is evaluated, inside the clipped volume.
 template <class L>
 struct LitPoint {
-  RayOf<L> ray;  ///< that ends here
+  RayOf<L> ray;  ///< the ray that ends here
   typename L::Float t;
   typename L::Vec point;
 };
@@ -28,7 +28,7 @@ struct ToLight {
   typename L::Float distance;
 };
 
-/// v times the matrix that takes voxel space to the world in units of the smallest spacing.
+/// Transforms v from voxel space to world space in units of the smallest spacing.
 template <class L>
 SCOLOPAX_LANES typename L::Vec toWorld(const SceneView& scene, const typename L::Vec& v) {
   return product<L>(scene.worldFromVoxel, v);
@@ -45,15 +45,16 @@ SCOLOPAX_LANES ToLight<L> toLight(const SceneView& scene, const LightView& light
   return {way * (1.0f / maximum(distance, kLeastNormal)), distance};
 }
 
-/// Which lights reach points, as the sums that every channel's material needs.
+/// How much of each light reaches points, and the sum of it that every channel's material needs.
 template <class L>
 struct Visibility {
   typename L::Float lights[kMaxLights];  ///< in [0,1]
   typename L::Vec share;                 ///< sum I V / sum I, 1 where there is no light
 };
 
-/// shadow(ray, part of it inside the box) estimates the ray's transmittance, in [0,1]; only of lanes in the
-/// mask.
+/// Visibility of the lights at points, for lanes in `which`. shadow(ray, interval) returns the ray's
+/// transmittance, in [0,1], over the interval, which is its part before the light and inside the clipped
+/// volume.
 template <class Features, class L, class Shadow>
 SCOLOPAX_LANES Visibility<L> visibilityAt(const SceneView& scene, const LitPoint<L>& hit,
                                           typename L::Mask which, Shadow&& shadow) {
@@ -81,8 +82,9 @@ SCOLOPAX_LANES Visibility<L> visibilityAt(const SceneView& scene, const LitPoint
   return visibility;
 }
 
-/// L = c [(1-s) A + s (ka + kd sum I V max(n.l, 0))] + s ks sum I V max(n.h, 0)^p, faded by the gradient's
-/// magnitude g with s = 1 - (1-g)^2 (Kniss et al. 2002, 6.3); A dims unshaded matter in shadow.
+/// L = c [(1-s) A + s (ka + kd sum I V max(n.l, 0))] + s ks sum I V max(n.h, 0)^p. Shading fades with the
+/// magnitude g of the gradient, by s = 1 - (1-g)^2 (Kniss et al. 2002, 6.3). A dims unshaded matter in
+/// shadow.
 template <class Features, class L>
 SCOLOPAX_LANES typename L::Vec lit(const SceneView& scene, const ChannelView& channel,
                                    const typename L::Vec& color, const LitPoint<L>& hit,
@@ -97,8 +99,8 @@ SCOLOPAX_LANES typename L::Vec lit(const SceneView& scene, const ChannelView& ch
   const Vec unshaded = color * ambient;
   if constexpr (!Features::kShading) return unshaded;
 
-  // In units of its largest component: stored values may be as large or small as floats can, and their
-  // squares are not.
+  // Scaled by its largest component: stored values may be as large or as small as floats allow, so squares of
+  // the gradient may overflow or underflow.
   const Gradient<L> at = gradientAt<L>(channel, scene.dims, scene.gradientFromVoxel, hit.point);
   cost->fetches = cost->fetches + typename L::Word(onesOf(which)) * gradientFetches(scene.dims);
   const Vec gradient = select(at.finite, at.perSpacing, Vec(0.0f));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light of marched rays. What a ray absorbs of its light is divided into equal strata; each is lit at one
-// place, where visibility and the shading of every channel are taken together. raymarch has 64 strata,
-// hybrid 8.
+// Lighting of marched rays. The light that a ray absorbs is divided into equal strata. Each stratum is lit at
+// one point, where visibility and the shading of every channel are evaluated together. raymarch has 64
+// strata, hybrid 8.
 #pragma once
 #include "renderer/kernel/rng.h"
 #include "renderer/kernel/segment_parts.h"
@@ -9,12 +9,13 @@
 
 namespace scolopax::kernel {
 
-/// Optical depth behind which a shadow ray sees no light: a transmittance of 1e-4.
+/// Optical depth at which a shadow ray counts as blocked: a transmittance of 1e-4.
 inline constexpr float kOpaqueDepth = 9.21034f;
-/// Step of shadow rays, in steps: what they find is one factor of the light, and varies less.
+/// Step of shadow rays, as a multiple of the scene's step. A shadow ray estimates only one factor of the
+/// light, which varies less.
 inline constexpr float kShadowSteps = 2.0f;
 
-/// Transmittance of shadow rays, of channels by their bits.
+/// Transmittance of shadow rays through the channels in `channels` (bit n: visible channel n).
 template <class L, class Blend, class View>
 SCOLOPAX_LANES typename L::Float marchTransmittance(const View& scene, const Blend& blend,
                                                     const RayOf<L>& ray, const IntervalOf<L>& inside,
@@ -36,8 +37,9 @@ SCOLOPAX_LANES typename L::Float marchTransmittance(const View& scene, const Ble
   return 1.0f - absorbed(depth);
 }
 
-/// Mean place, in [0,1], of what a segment absorbs. `centre` is that of its extinction; the thicker the
-/// segment the further in front: in equal matter the mean is 1 / depth - 1 / (exp(depth) - 1).
+/// Mean place, in [0,1], at which a segment of optical depth `depth` absorbs light. `centre` is the mean
+/// place of its extinction. The thicker the segment, the further to the front: in homogeneous matter the mean
+/// is 1 / depth - 1 / (exp(depth) - 1).
 template <class Float>
 SCOLOPAX_LANES Float placeOfAbsorption(Float depth, Float centre) {
   const auto thick = depth >= 0.25f;
@@ -47,20 +49,20 @@ SCOLOPAX_LANES Float placeOfAbsorption(Float depth, Float centre) {
   return select(thick, centre * (2.0f / depth - 2.0f * (1.0f - alpha) / alpha), thin);
 }
 
-/// Places of rays where strata are lit, and the channels there.
+/// The point of each ray at which a stratum is lit, and the channels there.
 template <class L>
 struct StratumPlaces {
   using Float = typename L::Float;
-  Float mass;                        ///< of the stratum: what it absorbs of the ray's light
-  typename L::Vec emission;          ///< of the whole stratum, without lights
-  Float t, offset;                   ///< the place, world units along the ray; the jitter of its shadow rays
-  typename L::Word kept;             ///< bit n: channel n is there
-  typename L::Vec radiance;          ///< of a unit of absorbed light there, without lights
-  Float share[kMaxVisibleChannels];  ///< of the extinction
+  Float mass;                        ///< what the stratum absorbs of the ray's light
+  typename L::Vec emission;          ///< emission of the whole stratum, without lighting
+  Float t, offset;                   ///< the point, world units along the ray; the jitter of its shadow rays
+  typename L::Word kept;             ///< bit n: channel n is present at the point
+  typename L::Vec radiance;          ///< radiance of a unit of absorbed light there, without lighting
+  Float share[kMaxVisibleChannels];  ///< each channel's share of the extinction
   typename L::Vec color[kMaxVisibleChannels];
 };
 
-/// Light of a unit of absorbed light at such places, for lanes in the mask.
+/// Lit radiance of a unit of absorbed light at such points, for lanes in `which`.
 template <class Features, class L, class Blend, class View>
 SCOLOPAX_LANES typename L::Vec lightOf(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                        std::uint32_t channels, const StratumPlaces<L>& places,
@@ -85,25 +87,26 @@ SCOLOPAX_LANES typename L::Vec lightOf(const View& scene, const Blend& blend, co
   return sum;
 }
 
-/// A stratum once its place is lit.
+/// A stratum whose point has been lit.
 struct LitStratum {
-  glm::vec3 light;     ///< of a unit of absorbed light at the place
-  glm::vec3 radiance;  ///< the same without lights
-  glm::vec3 emission;  ///< of the whole stratum, without lights
-  float mass;          ///< what it absorbs of the ray's light
+  glm::vec3 light;     ///< lit radiance of a unit of absorbed light at the point
+  glm::vec3 radiance;  ///< the same without lighting
+  glm::vec3 emission;  ///< emission of the whole stratum, without lighting
+  float mass;          ///< what the stratum absorbs of the ray's light
 };
 
-/// Sums up a ray's lit strata. What light makes of a stratum's emission is taken to be what it made of a
-/// neighbour's, and the stratum's own place corrects that (a control variate, whose factor must not depend on
-/// the place that it corrects). So the noise is that of the light's changes, not of the emission's.
+/// Sums the lit strata of a ray, with a control variate. The emission of a stratum is multiplied by the
+/// factor by which lighting changes the radiance of a neighbouring stratum, and the stratum's own point
+/// corrects the result. The factor must not depend on the point that corrects it. The noise is then that of
+/// changes in lighting between strata, not that of the emission.
 class StrataSum {
  public:
   SCOLOPAX_HD void add(const LitStratum& lit, glm::vec3& color) {
     glm::vec3 factor(1.0f);
-    for (int c = 0; c < 3; ++c)  // highlights may be brighter than anything that their matter sends out
+    for (int c = 0; c < 3; ++c)  // capped, as a highlight may be much brighter than the unlit radiance
       if (lit.radiance[c] > kLeastNormal) factor[c] = minimum(lit.light[c] / lit.radiance[c], 2.0f);
     if (count_ == 0) {
-      first_ = lit;  // waits for its neighbour
+      first_ = lit;  // waits for the factor of its neighbour
     } else {
       if (count_ == 1) color += corrected(first_, factor);
       color += corrected(lit, factor_);
@@ -124,17 +127,18 @@ class StrataSum {
   int count_ = 0;
 };
 
-/// Lights the strata [j, j + 1) / K of a ray's light, front to back, their ends moved to the ends of
-/// segments: each at one place, in a segment that is drawn in proportion to what it absorbs, with random
-/// numbers that depend on the sample and on j alone. Pictures of different steps so light nearly the same
-/// places.
+/// Lights the strata [j, j + 1) / K of a ray's light, front to back, with their ends moved to the ends of
+/// segments. Each stratum is lit at one point, in a segment drawn with probability proportional to what it
+/// absorbs. The random numbers depend only on the sample and on j, so that pictures with different steps
+/// light nearly the same points.
 ///
-/// How much a stratum holds is known only at its end, and remembering all that may be lit is out of the
-/// question. So the places of stratum j are the records u1, u1 u2, u1 u2 u3, ... of a unit interval, u
-/// uniform: the largest that is at most m is uniform in [0, m), whatever m is (the records of a Poisson
-/// process are scale-free). As absorption passes a record, the place moves on to it.
+/// The mass of a stratum is known only at its end, and keeping every segment until then is out of the
+/// question. This is weighted reservoir sampling, with a reservoir of one: the candidate places of stratum j
+/// are the records u1, u1 u2, u1 u2 u3, ... of a unit interval, with u uniform. The largest record that is at
+/// most m is uniform in [0, m), whatever m is (the records of a Poisson process are scale-free). When
+/// absorption passes a record, the point moves on to that record's segment.
 ///
-/// One ray's strata are lit as they end; those of many wait until there are as many as lanes.
+/// With one lane, strata are lit as they end. With many, they wait until there is one for every lane.
 template <class Features, class L, class Blend, class View>
 class Strata {
  public:
@@ -143,21 +147,22 @@ class Strata {
   using Word = typename L::Word;
   using Mask = typename L::Mask;
   using Vec = typename L::Vec;
-  /// What variables index: apart from the rest, as SegmentEnds is.
+  /// Arrays indexed by variables, apart from the rest as in SegmentEnds.
   struct Memory {
-    PartOf<L> parts[kMaxVisibleChannels];  ///< of the segment
+    PartOf<L> parts[kMaxVisibleChannels];  ///< per channel, of the current segment
     StratumPlaces<L> places;
     struct Waiting {
       StratumPlaces<L> places;
       Int ray;
-      StrataSum sums[L::kLanes];  ///< of rays, as what follows
+      StrataSum sums[L::kLanes];  ///< per ray, like the colours
       glm::vec3 color[L::kLanes];
     };
     struct Nothing {};
     std::conditional_t<L::kLanes == 1, Nothing, Waiting> waiting;
   };
 
-  /// Of channels by their bits, with random numbers number `set` of those of the sampler.
+  /// `channels`: bit n is visible channel n. `set` selects the blocks of `sampler` that are used: marches
+  /// with different sets draw independent numbers.
   SCOLOPAX_LANES Strata(Memory& memory, const View& scene, const Blend& blend, const RayOf<L>& ray,
                         std::uint32_t channels, int set, const SamplerOf<L>& sampler, CostOf<L>* cost)
       : memory_(memory),
@@ -176,9 +181,9 @@ class Strata {
       }
   }
 
-  /// Takes a segment that absorbs [before, after) of the rays' light and without lights would send out
-  /// `emission` of it, with its parts in memory, whose extinctions add up to `extinction`; `last` if the rays
-  /// end with it. Adds light to `color`: of strata that are complete, and by the last of all.
+  /// Adds a segment that absorbs [before, after) of the rays' light and, without lighting, emits `emission`.
+  /// Its parts are in `memory`, and their extinctions add up to `extinction`. `last`: the rays end with this
+  /// segment. The light of completed strata goes into `color`, which is complete after the last segment.
   SCOLOPAX_LANES void absorb(Float before, Float after, bool last, const Segment<L>& segment,
                              Float extinction, const Vec& emission, Vec& color) {
     const Mask on = after > before;
@@ -187,7 +192,8 @@ class Strata {
       emission_ = select(on, emission_ + emission, emission_);
       const Mask fresh = on & (next_ == 0.0f);
       if (any(fresh)) draw(fresh);
-      // Records lie below the ends of strata; the part of a segment beyond is drawn apart.
+      // Records lie below the ends of strata. Whether the point moves to the part of a segment beyond the end
+      // is drawn separately.
       const Mask beyond = on & (mass > scene_.stratum), moves = without(on, beyond | (mass < next_));
       Float place = select(beyond, shared_ * mass, Float(-1.0f));
       if (any(moves)) place = select(moves, largestRecord(mass, moves), place);
@@ -216,7 +222,7 @@ class Strata {
     shared_ = select(which, uniformOf(hashOf(random.z)), shared_);
   }
 
-  /// Of the stratum's, at most `mass`; the one above it is the next.
+  /// Largest record of the stratum that is at most `mass`. Sets next_ to the record above it.
   SCOLOPAX_LANES Float largestRecord(Float mass, Mask which) {
     Float record = first_, next(kInfinity);
     Word chain = chain_;
@@ -241,7 +247,7 @@ class Strata {
       const PartOf<L>& own = memory_.parts[n];
       opacity = opacity + own.opacity;
       moment = moment + own.moment;
-      const Mask seen = which & (own.opacity > kLeastNormal);  // else its colour would not be a number
+      const Mask seen = which & (own.opacity > kLeastNormal);  // else its colour might be NaN
       if (!any(seen)) continue;
       kept_ = kept_ | where(seen, Word(1u << n));
       places.share[n] = select(seen, own.opacity / extinction, places.share[n]);
@@ -254,7 +260,7 @@ class Strata {
     place_ = select(which, place, place_);
   }
 
-  /// Lights these, or has them wait for it.
+  /// Lights the strata of the rays in `which`, or queues them.
   SCOLOPAX_LANES void light(Mask which, Float mass, Vec& color) {
     StratumPlaces<L>& places = memory_.places;
     places.mass = mass;
@@ -292,7 +298,7 @@ class Strata {
     }
   }
 
-  /// Lights what waits, in the order in which it came.
+  /// Lights the queued strata, in the order in which they were added.
   SCOLOPAX_LANES_APART void shine() {
     auto& waiting = memory_.waiting;
     const Int ray = waiting.ray;
@@ -319,7 +325,7 @@ class Strata {
     count_ = 0;
   }
 
-  /// All that is lit, and what has waited for more.
+  /// Lights the strata that still wait, and completes `color`.
   SCOLOPAX_LANES void finish(Vec& color) {
     if constexpr (L::kLanes == 1) {
       sum_.finish(color);
@@ -338,21 +344,21 @@ class Strata {
   const Blend& blend_;
   const RayOf<L>& ray_;
   std::uint32_t channels_;
-  float perLight_;  // a power of two
+  float perLight_;  // strata per ray; a power of two
   std::uint32_t firstBlock_;
   const SamplerOf<L>& sampler_;
   CostOf<L>* cost_;
   Int index_{0};
-  Float begin_{0.0f};  // of the stratum, in absorbed light
-  Float next_{0.0f};   // record at which its place moves on; 0: none has been drawn
+  Float begin_{0.0f};  // start of the stratum, in absorbed light
+  Float next_{0.0f};   // record at which the point moves on; 0: none has been drawn
   Float first_{0.0f}, offset_{0.0f}, shared_{0.0f};
   Word chain_{0u};
-  Float place_{0.0f};  // world units along the ray
+  Float place_{0.0f};  // the point, world units along the ray
   Word kept_{0u};
-  Vec radiance_{0.0f};  // there, without lights
-  Vec emission_{0.0f};  // of all of the stratum, without lights
+  Vec radiance_{0.0f};  // radiance there, without lighting
+  Vec emission_{0.0f};  // emission of the whole stratum, without lighting
   std::conditional_t<L::kLanes == 1, StrataSum, typename Memory::Nothing> sum_;
-  int count_ = 0;  // that wait
+  int count_ = 0;  // strata that wait
 };
 
 }  // namespace scolopax::kernel

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a kernel sees of a scene: plain views over memory that a launcher owns (data/render_plan fills them).
-// Only channels that can be seen are in here.
+// A scene as kernels see it: plain views of memory that a render plan (data/render_plan, which fills them) or
+// a device owns. Only visible channels are included.
 #pragma once
 #include <cstdint>
 #include <glm/mat3x3.hpp>
@@ -14,7 +14,7 @@ namespace scolopax::kernel {
 
 inline constexpr int kCurveBuckets = 256;
 
-/// Piecewise-linear curve over [0,1], constant outside the first and last of its knots.
+/// Piecewise-linear curve over [0,1], constant before its first knot and after its last.
 template <class Value>
 struct CurveView {
   const float* positions;  ///< not decreasing
@@ -26,18 +26,19 @@ struct CurveView {
 /// Opacity and colour at a knot of either curve.
 struct OpticalKnot {
   float position;
-  float inverseWidth;  ///< 1 / way to the next knot, or 0
+  float inverseWidth;  ///< 1 / distance to the next knot, or 0
   float opacity;
   glm::vec3 color;  ///< linear RGB
 };
 inline constexpr int kKnotFloats = sizeof(OpticalKnot) / sizeof(float);
 
-/// Both curves of a channel on the knots of both; the first knot is at 0 and the last at 1.
+/// The opacity and colour curves of a channel, merged: both are given at the knots of either. The first knot
+/// is at 0 and the last at 1.
 struct OpticalCurveView {
   const OpticalKnot* knots;
   const std::uint16_t* buckets;  ///< as in CurveView
   int count;
-  float first, last;  ///< no opacity at positions up to `first` and from `last` on
+  float first, last;  ///< the opacity is 0 at positions up to `first` and from `last` on
 };
 
 /// Blinn-Phong coefficients of one channel.
@@ -54,52 +55,53 @@ struct ClipPlaneView {
 inline constexpr int kMaxClipPlanes = 8;
 inline constexpr int kCropRegions = 27;
 
-/// What clip planes and crop leave of the volume, in voxel coordinates. Nothing lies outside of the box and
-/// of the planes that clip all channels; inside, parts may be cut out of some.
+/// The part of the volume that clip planes and crop keep, in voxel coordinates. Everything outside the box
+/// and behind the planes that clip all channels is cut away; inside, parts may be cut away, from some
+/// channels or all.
 struct ClipView {
   glm::vec3 low, high;
-  int wholePlanes;  ///< the first of the planes: they clip all channels
+  int wholePlanes;  ///< number of leading planes that clip all channels
   int planeCount;
   ClipPlaneView planes[kMaxClipPlanes];
-  bool parts;                           ///< planes of some channels, or regions of crop that are not a box
-  glm::vec3 cropAt[2];                  ///< crop planes; infinite where they cut nothing off
-  std::uint32_t regions[kCropRegions];  ///< at x + 3 y + 9 z: all bits where the region is kept, or none
+  bool parts;           ///< some planes clip only some channels, or the kept crop regions are not a box
+  glm::vec3 cropAt[2];  ///< positions of the crop planes; infinite where they cut nothing off
+  std::uint32_t regions[kCropRegions];  ///< (x, y, z) is at x + 3 y + 9 z: all bits set if kept, else 0
 };
 
 enum class LightKind : std::uint8_t { directional, point, headlight };
 
 struct LightView {
   LightKind kind;
-  glm::vec3 vector;     ///< directional: towards the light, voxel space, length 1 in world units; point: its
-                        ///< voxel position
+  glm::vec3 vector;     ///< directional: towards the light in voxel space, of length 1 in world units; point:
+                        ///< the light's position in voxel coordinates
   glm::vec3 intensity;  ///< linear colour times intensity
 };
 inline constexpr int kMaxLights = 8;
 inline constexpr int kMaxVisibleChannels = 32;
 
-/// Factor of the opacity by |gradient| of stored values per smallest spacing.
+/// Factor of the opacity that depends on |gradient|, in stored values per smallest spacing.
 struct GradientFactorView {
   float origin, scale, offset;  ///< position = clamp((|gradient| - origin) * scale + offset, 0, 1)
   CurveView<float> curve;       ///< no knots: opacity does not depend on the gradient
-  OpticalCurveView optical;     ///< the same, for quadrature
+  OpticalCurveView optical;     ///< the same curve, for quadrature
   glm::mat3 fromVoxel;          ///< as SceneView::gradientFromVoxel
 };
 
 /// One channel: where its voxels are and how a stored value becomes extinction and colour.
 struct ChannelView {
-  const void* voxels;  ///< of this channel and others of its type, interleaved
+  const void* voxels;  ///< voxels of this channel, interleaved with others of its type
   ScalarType type;
-  int lane, stride;             ///< which of how many
+  int lane, stride;             ///< index among the interleaved channels, and their number
   float origin, scale, offset;  ///< position = clamp((stored - origin) * scale + offset, 0, 1)
-  float gamma;                  ///< position^gamma goes into both curves
+  float gamma;                  ///< both curves are evaluated at position^gamma
   float density;                ///< extinction = opacity * density, per world unit
   CurveView<float> opacity;
   CurveView<glm::vec3> color;  ///< linear RGB
-  OpticalCurveView optical;    ///< both, for quadrature
-  float weight;                ///< of the colour in blend mode mix
+  OpticalCurveView optical;    ///< both curves, for quadrature
+  float weight;                ///< weight of the colour in blend mode mix
   MaterialView material;
-  float inverseRange;  ///< 1 / |hi - lo| of the range in stored values
-  bool finite;         ///< all voxels are
+  float inverseRange;  ///< 1 / |hi - lo| of the channel's range, in stored values
+  bool finite;         ///< whether all voxels are finite
   GradientFactorView factor;
 };
 
@@ -107,17 +109,18 @@ struct SceneView {
   CameraRays rays;
   int width, height;
   std::uint32_t seed;
-  bool filterBox;  ///< false: every sample at the pixel's centre
+  bool filterBox;  ///< false: every sample is at the pixel's centre
   glm::ivec3 dims;
   ClipView clip;
   int channelCount;
   const ChannelView* channels;
   MajorantView majorants;
-  float step;      ///< of quadrature, world units
-  float stratum;   ///< share of a ray's light for which quadrature works out lighting once
+  float step;      ///< step of quadrature, world units
+  float stratum;   ///< share of a ray's light per lighting computation of quadrature (strata.h)
   int lightCount;  ///< 0 unless shading or shadows are on
   LightView lights[kMaxLights];
-  glm::mat3 worldFromVoxel;  ///< linear part, in units of the smallest spacing: lengths near 1 at any scale
+  glm::mat3 worldFromVoxel;  ///< linear part, in units of the smallest spacing, so that lengths are near 1 at
+                             ///< any scale
   glm::mat3 gradientFromVoxel;  ///< its inverse transpose
   float smallestSpacing;        ///< world units
 
@@ -126,14 +129,15 @@ struct SceneView {
   SCOLOPAX_HD bool hasFactor(int n) const { return channels[n].factor.curve.count != 0; }
 };
 
-/// A scene of curves alone: kernels of this view are compiled without what other scenes need. Only devices
-/// have such kernels, whose registers and local memory are taken for all that is compiled.
+/// A scene in which no opacity depends on the gradient. Kernels of this view are compiled without the code
+/// that only other scenes need. Only devices have such kernels: there, registers and local memory are
+/// allocated for all compiled code, whether it runs or not.
 struct PlainSceneView : SceneView {
   static constexpr int kFactors = 1;  // none, but arrays must not be empty
   SCOLOPAX_HD static constexpr bool hasFactor(int) { return false; }
 };
 
-/// What the samples of all lanes cost, for tests, benchmarks and the cost heat map.
+/// Cost of one sample per lane, for tests, benchmarks and the cost heat map.
 template <class L>
 struct CostOf {
   using Word = typename L::Word;
@@ -141,11 +145,12 @@ struct CostOf {
 };
 using SampleCost = CostOf<One>;
 
-/// What every lane's ray meets first, for pictures of depth and channels.
+/// First collision of every lane's ray, for pictures of depth and channels.
 template <class L>
 struct FirstCollisionOf {
-  typename L::Float depth{0.0f};  ///< world units; integrators give it along the ray, passes along the view
-  typename L::Int channel{-1};    ///< among the visible channels; -1: nothing was met
+  /// World units; integrators give it along the ray, passes along the view direction.
+  typename L::Float depth{0.0f};
+  typename L::Int channel{-1};  ///< index among the visible channels; -1: no collision
 };
 using FirstCollision = FirstCollisionOf<One>;
 

@@ -40,7 +40,7 @@ TEST(Passes, ThatDoNotFitTheDeviceSaySoAndLeaveNothingBehind) {
     } catch (const Error& error) {
       ++failures;
       EXPECT_EQ(error.code(), ErrorCode::tooLarge);
-      EXPECT_STREQ(error.what(), "CUDA: taking device memory failed: out of memory");
+      EXPECT_STREQ(error.what(), "CUDA: allocating device memory failed: out of memory");
     }
     EXPECT_TRUE(substitute::allocations().empty());
   }

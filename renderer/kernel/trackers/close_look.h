@@ -1,23 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// Thick macrocells from near: bounds of the extinction over short stretches of a ray, from the voxels around
-// it. Without them a ray would cross what is empty beside dense matter by one null collision after another.
+// Close tracking of thick macrocells: bounds the extinction over short stretches of a ray, from the voxels
+// around it. With the macrocell's bound alone, a ray would cross the empty space beside dense matter in many
+// short steps, each ending in a null collision.
 #pragma once
 #include "renderer/kernel/collision.h"
 
 namespace scolopax::kernel {
 
-/// A tracker looks closer at the rest of a macrocell after this many null collisions in it, if the bound
-/// promises this many more.
+/// After kPatience null collisions in a macrocell, a tracker switches to close tracking for the rest of it if
+/// the bound predicts more than kManyCollisions further ones.
 inline constexpr std::uint32_t kPatience = 32;
 inline constexpr float kManyCollisions = 128.0f;
-/// Tentative collisions per stretch and channel that are few enough for its bound.
+/// Expected tentative collisions per stretch and channel that are few enough for the stretch's bound.
 inline constexpr float kFewCollisions = 2.0f;
 
-/// `stuck`: the cell is to be looked at closely.
+/// `stuck`: the cell needs close tracking.
 enum class CellOutcome { nothing, hit, exhausted, stuck };
 
-/// The cell between eight voxels that a ray goes on through from a point, and how far, in world units. Outer
-/// cells reach to the faces of the box.
+/// A voxel cell, which lies between eight voxels: the one that a ray passes through after a point. `way` is
+/// how far the ray goes in it, in world units. Outer cells extend to the faces of the box.
 struct VoxelCell {
   glm::ivec3 low;
   float way;
@@ -35,7 +36,8 @@ struct VoxelCell {
       way = minimum(way, (float(plane) - point[axis]) / direction);
     }
   }
-  /// The point, moved into the cell where rounding has put it outside: the cell's bounds hold there.
+  /// The point, moved into the cell if rounding has put it outside, because the cell's bounds hold only
+  /// there.
   SCOLOPAX_HD glm::vec3 inside(glm::ivec3 dims, glm::vec3 point) const {
     for (int axis = 0; axis < 3; ++axis)
       point[axis] = clamp(point[axis], low[axis] == 0 ? -0.5f : float(low[axis]),
@@ -44,7 +46,7 @@ struct VoxelCell {
   }
 };
 
-/// Stored values of one channel: at a point of a voxel cell, and the least and largest of its corners.
+/// Stored values of one channel in a voxel cell: at a point, and the smallest and largest at the corners.
 struct CellValues {
   float value, lo, hi;
 };
@@ -71,13 +73,13 @@ SCOLOPAX_HD inline CellValues valuesIn(const ChannelView& channel, glm::ivec3 di
   });
 }
 
-/// |gradient| of stored values per smallest spacing in a voxel cell: at a point of it, and by how much it may
-/// change per voxel of way along the axes together.
+/// |gradient| in a voxel cell, in stored values per smallest spacing: at a point, and by how much it may
+/// change per voxel of distance, summed over the axes.
 struct CellGradient {
   float magnitude, change, slack;  ///< slack: what rounding may add
-  bool finite;                     ///< the cell has gradients
+  bool finite;                     ///< the gradient is finite in the cell
 };
-/// Inside a cell each difference is an average of neighbour-to-neighbour slopes along its axis, so that a
+/// Inside a cell, each difference is an average of slopes between neighbouring voxels along its axis. So a
 /// step of one voxel along any axis changes it by at most the spread of those slopes.
 SCOLOPAX_RARE inline CellGradient gradientIn(const ChannelView& channel, glm::ivec3 dims, glm::ivec3 cell,
                                              glm::vec3 point) {
@@ -101,7 +103,7 @@ SCOLOPAX_RARE inline CellGradient gradientIn(const ChannelView& channel, glm::iv
                              std::size_t(k) * strides[v];
           const float a = float(from[0]), b = float(from[strides[axis]]);
           if (!isFinite(a) || !isFinite(b)) {
-            // Beyond the last voxels differences are one-sided, and do not see the edge before.
+            // Beyond the last voxel, differences are one-sided and do not use the edge before the cell.
             finite = finite && edge < low && low + 2 == dims[axis];
             continue;
           }
@@ -122,24 +124,25 @@ SCOLOPAX_RARE inline CellGradient gradientIn(const ChannelView& channel, glm::iv
   }
   const Gradient<One> here = gradientAt<One>(channel, dims, fromVoxel, point);
   CellGradient gradient{lengthOf<One>(here.perSpacing), lengthOf<One>(turned), 0.0f, finite};
-  // Of values, and of places among as many voxels.
+  // Rounding of values, and of coordinates, which may be as large as the longest side.
   gradient.slack = 3.0f * scale * most * 0x1p-19f + gradient.change * longest * 0x1p-22f;
-  // Only on a face does a point see voxels that are not the cell's.
+  // If the cell is finite, this happens only on a face, where the gradient uses voxels outside the cell.
   if (!here.finite) gradient.magnitude = 0.0f, gradient.change = kLargestFinite;
   return gradient;
 }
 
-/// Bound of channel n's extinction from `point` on, for at most `*way`, which becomes shorter where the bound
-/// would be loose, down to `least`. The scalar's slope along the ray is bounded by the corners' range.
+/// Bound of channel n's extinction over the next `*way` (world units) from `point`. Halves `*way` while the
+/// bound is loose and `*way` is above `least`. The slope of the scalar along the ray is bounded by the range
+/// of the corners.
 template <class View>
 SCOLOPAX_HD float boundAhead(const View& scene, int n, const Ray& ray, const VoxelCell& cell, glm::vec3 point,
                              float least, float* way, SampleCost* cost) {
   const ChannelView& channel = scene.channels[n];
   ++cost->fetches;
   const CellValues values = valuesIn(channel, scene.dims, cell, point);
-  if (!isFinite(values.value)) return 0.0f;  // and so is no sample of this cell
+  if (!isFinite(values.value)) return 0.0f;  // then no sample of this cell is finite
   const float slope = (values.hi - values.lo) * sumOfMagnitudes(ray.direction);
-  // As much as rounding may bring a sample beyond the corners; an end at 0 is exact.
+  // By how much rounding may put a sample outside the corners' range; an end at 0 is exact.
   const float slack =
       values.lo < values.hi ? maximum(magnitude(values.lo), magnitude(values.hi)) * 0x1p-20f : 0.0f;
   const float lo = values.lo == 0.0f ? 0.0f : values.lo - slack;
@@ -166,10 +169,10 @@ SCOLOPAX_HD float boundAhead(const View& scene, int n, const Ray& ray, const Vox
   }
 }
 
-/// Goes on through the walk's macrocell, from `past` its entry to `end`, in stretches that have bounds of
-/// their own. On entry and exit, `random` and `depth` belong to the next tentative collision. `boundOf(cell,
-/// point, least, &way)` bounds a stretch as boundAhead does; `test(bound, place, point, random)` tests a
-/// tentative collision.
+/// Tracks through the walk's macrocell, from distance `past` after its entry to distance `end`, in stretches
+/// with bounds of their own. On entry and exit, `random` and `depth` belong to the next tentative collision.
+/// `boundOf(cell, point, least, &way)` bounds a stretch as boundAhead does; `test(bound, place, point,
+/// random)` tests a tentative collision.
 template <class Bound, class Test, class View>
 SCOLOPAX_HD CellOutcome trackCellClosely(const View& scene, const Ray& ray, const CellWalk& walk, float past,
                                          float end, Sampler& sampler, RandomBlock* random, float* depth,
@@ -180,7 +183,7 @@ SCOLOPAX_HD CellOutcome trackCellClosely(const View& scene, const Ray& ray, cons
     const float t = walk.enter() + past;
     const glm::vec3 point = walk.pointAt(t);
     const VoxelCell cell(ray, scene.dims, point);
-    // Shorter ones may get nowhere for rounding.
+    // Shorter stretches might make no progress because of rounding.
     const float least = maximum(t * 0x1p-21f, end * 0x1p-20f);
     way = minimum(maximum(minimum(4.0f * way, cell.way), least), end - past);
     const float bound = boundOf(cell, cell.inside(scene.dims, point), least, &way);
@@ -204,12 +207,13 @@ SCOLOPAX_HD CellOutcome trackCellClosely(const View& scene, const Ray& ray, cons
   return CellOutcome::nothing;
 }
 
-/// The number of tentative collisions at which a tracker asks whether to go on through a cell as before.
+/// Number of tentative collisions at which a tracker checks whether to switch to close tracking.
 SCOLOPAX_HD inline std::uint32_t patienceAfter(std::uint32_t tentative) {
   return tentative + kPatience < kMaxTentativeCollisions ? tentative + kPatience : kMaxTentativeCollisions;
 }
 
-/// Rays in whose interval some channels are clipped are tracked by the loop that looks closely.
+/// Which channels along<kClosely> considers. Only along<true> tests them: it also tracks all rays on which
+/// some channels are clipped.
 template <bool kClosely>
 SCOLOPAX_HD auto channelsFor([[maybe_unused]] const Interval& inside) {
   if constexpr (kClosely)
@@ -220,7 +224,7 @@ SCOLOPAX_HD auto channelsFor([[maybe_unused]] const Interval& inside) {
 
 struct CloselyTracked {
   std::optional<Collision> hit;
-  std::uint32_t blocks;  ///< random numbers that were drawn before and by it
+  std::uint32_t blocks;  ///< random blocks drawn before and during tracking
   SampleCost cost;
 };
 template <class Track, class View>
@@ -232,11 +236,11 @@ SCOLOPAX_APART CloselyTracked trackClosely(Track track, const View& scene, Ray r
   return {hit, sampler.blocks(), cost};
 }
 
-/// Track::along<kClosely> tracks along a ray. With kClosely false it sets `stuck` and stops where it should
-/// look closer, and takes all channels to be left. The ray is then tracked again from its start with the same
-/// random numbers, so that it comes to the same place. This keeps the close look out of the loop that most
-/// rays run, which is up to a fifth slower with it. A device, where both loops would be in one function and
-/// take registers and local memory for both, looks closer at once.
+/// Tracks a ray by Track::along<kClosely>. along<false> assumes that no channels are clipped; where it would
+/// switch to close tracking, it sets `stuck` and stops. along<true> then tracks the ray again from its start,
+/// with the same random numbers, so that it reaches the same point. This keeps close tracking out of the loop
+/// that most rays run, which would be up to a fifth slower with it. On a device, both loops would be in one
+/// function and take registers and local memory for both, so along<true> tracks all rays.
 template <class Track, class View>
 SCOLOPAX_HOT std::optional<Collision> trackWithPatience(const Track& track, const View& scene, const Ray& ray,
                                                         Interval inside, Sampler& sampler, SampleCost* cost) {

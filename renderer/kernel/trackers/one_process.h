@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tracking with one Poisson process for all channels: superposed and cumulative differ only in how a
+// Tracking with one Poisson process for all channels. Superposed and cumulative differ only in how a
 // tentative collision is tested.
 #pragma once
 #include <type_traits>
@@ -8,7 +8,7 @@
 
 namespace scolopax::kernel {
 
-/// Bound of several channels together ahead of a point, as boundAhead gives it of one.
+/// Combined bound of several channels ahead of a point; boundAhead() gives it for one channel.
 template <bool kSums, class View>
 SCOLOPAX_HD float boundAheadOf(SomeChannels channels, const View& scene, std::size_t macrocell,
                                const Ray& ray, const VoxelCell& cell, glm::vec3 point, float least,
@@ -22,7 +22,7 @@ SCOLOPAX_HD float boundAheadOf(SomeChannels channels, const View& scene, std::si
   return all;
 }
 
-/// Bound of several channels together in a macrocell.
+/// Combined bound of several channels in a macrocell.
 template <bool kSums>
 SCOLOPAX_HD float totalBound(const SceneView& scene, AllChannels, std::size_t cell) {
   return scene.majorants.total(cell);
@@ -39,9 +39,9 @@ SCOLOPAX_HD float totalBound(const SceneView& scene, SomeChannels channels, std:
   return some;
 }
 
-/// Independent Poisson processes add up to one: ONE optical depth is drawn per tentative collision and
-/// carried across macrocells, so that a cell costs a multiplication and no logarithm. Where a cell is looked
-/// at closely, TestClosely, which needs no bounds of single channels, takes the place of Test.
+/// The sum of independent Poisson processes is one Poisson process. One optical depth is drawn per tentative
+/// collision and carried across macrocells, so a cell costs a multiplication and no logarithm. In close
+/// tracking, TestClosely takes the place of Test: it needs no bounds of single channels.
 template <class Test, class TestClosely, bool kSums>
 struct OneProcess {
   template <bool kClosely, class View>
@@ -56,7 +56,7 @@ struct OneProcess {
       ++cost->cellSteps;
       const float bound = totalBound<kSums>(scene, channels, walk.index());
       if (!(bound > 0.0f)) continue;
-      // Optical depth since the cell's entry: kept instead of t, so that a step shorter than the resolution
+      // Optical depth since the cell's entry. Kept instead of t, so that a step shorter than the resolution
       // of t still makes progress.
       const float total = bound * (walk.exit() - walk.enter());
       float passed = 0.0f;
@@ -93,7 +93,7 @@ struct OneProcess {
                 });
             if (outcome == CellOutcome::exhausted) cost->truncated = 1;
             if (outcome != CellOutcome::nothing) return hit;
-            passed = total;  // what is left of `depth` lies behind the cell
+            passed = total;  // the rest of `depth` lies behind the cell
           }
         }
       }
@@ -103,7 +103,7 @@ struct OneProcess {
   }
 };
 
-/// A drawn channel is fetched and tested.
+/// Where extinctions add up, only one channel is drawn, fetched and tested.
 struct Superposed {
   template <class Blend, class View>
   SCOLOPAX_HD static std::optional<Collision> track(const View& scene, const Ray& ray, Interval inside,

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tracking with a Poisson process per channel, the paper's two methods: n-dda walks the macrocells once per
-// channel, sync-dda once for all. The nearest accepted collision wins.
+// Tracking with a Poisson process per channel, by the paper's two methods: n-dda walks the macrocells once
+// per channel, sync-dda once for all channels. The nearest accepted collision wins.
 #pragma once
 #include "renderer/kernel/trackers/close_look.h"
 
 namespace scolopax::kernel {
 
-/// Tracks channel n, if it is one of `channels`, through the walk's current cell, as far as `nearest`, which
-/// a hit replaces.
+/// Tracks channel n, if it is one of `channels`, through the walk's current cell, but not beyond `*nearest`.
+/// A hit replaces `*nearest`.
 template <bool kClosely, class Blend, class Channels, class View>
 SCOLOPAX_HD CellOutcome trackCell(const View& scene, Channels channels, int n,
                                   [[maybe_unused]] const Ray& ray, const CellWalk& walk, Sampler& sampler,
@@ -21,9 +21,9 @@ SCOLOPAX_HD CellOutcome trackCell(const View& scene, Channels channels, int n,
   for (std::uint32_t limit = patienceAfter(*tentative);;) {
     RandomBlock random = sampler.next();
     passed += opticalDepth(uniformOf(random.x));
-    // The cell's end first: a step that leaves a thin cell says nothing about what lies behind it, also when
-    // it overshoots the nearest collision so far. (Listing 3 prints the other order, and loses collisions by
-    // it.)
+    // The cell's end comes first: a step that leaves a thin cell says nothing about what lies behind it, even
+    // if it overshoots the nearest collision so far. (Listing 3 prints the opposite order, and loses
+    // collisions.)
     if (!(passed < total)) return CellOutcome::nothing;
     const Place place{walk.enter(), passed / bound};
     if (*nearest && !nearer(place, (*nearest)->place)) return CellOutcome::nothing;
@@ -54,7 +54,7 @@ SCOLOPAX_HD CellOutcome trackCell(const View& scene, Channels channels, int n,
   }
 }
 
-/// One channel, no further than `nearest`, which a hit replaces.
+/// Tracks one channel, but not beyond `nearest`. Returns its hit or, if there is none, `nearest`.
 template <class Blend>
 struct AlongChannel {
   int n;
@@ -79,7 +79,7 @@ struct AlongChannel {
   }
 };
 
-/// The nearest of `nearest` and what channel n meets along the ray.
+/// The nearer of `nearest` and the first collision of channel n along the ray.
 template <class Blend, class View>
 SCOLOPAX_HD std::optional<Collision> trackChannel(const View& scene, int n,
                                                   const std::optional<Collision>& nearest, const Ray& ray,
@@ -87,7 +87,7 @@ SCOLOPAX_HD std::optional<Collision> trackChannel(const View& scene, int n,
   return trackWithPatience(AlongChannel<Blend>{n, nearest}, scene, ray, inside, sampler, cost);
 }
 
-/// Listing 3, with the order of its two tests mended.
+/// Listing 3, with the order of its two tests corrected.
 struct NDda {
   template <class Blend, class View>
   SCOLOPAX_HD static std::optional<Collision> track(const View& scene, const Ray& ray, Interval inside,
@@ -99,7 +99,7 @@ struct NDda {
   }
 };
 
-/// All channels, macrocell by macrocell.
+/// Tracks all channels, macrocell by macrocell.
 template <class Blend>
 struct AlongCells {
   template <bool kClosely, class View>
