@@ -14,8 +14,7 @@ inline constexpr std::uint16_t kProtocolVersion = 1;
 
 enum class Codec : std::uint8_t { jpeg = 1, png = 2 };
 inline constexpr std::uint8_t kFlagInteractive = 1;  ///< lower resolution or quality while edits arrive
-inline constexpr std::uint8_t kFlagFinal =
-    2;  ///< the stop condition is met: no further frame follows unprompted
+inline constexpr std::uint8_t kFlagFinal = 2;  ///< the stop condition is met: nothing follows unprompted
 
 struct FrameHeader {
   std::uint16_t headerBytes = kFrameHeaderBytes;  ///< the image starts here
@@ -35,8 +34,8 @@ struct FrameHeader {
 /// Little-endian on every machine; headerBytes is written as kFrameHeaderBytes.
 std::array<std::byte, kFrameHeaderBytes> encodeFrameHeader(const FrameHeader& header);
 
-/// Reads the header at the start of a message. nullopt if the magic or version is not this one, if the codec
-/// is unknown, or if headerBytes is less than 48 or more than the message has.
+/// Reads the header at the start of a message. nullopt if the magic or version differs, if the codec is
+/// unknown, if headerBytes is less than 48, or if the message is shorter than 48 bytes or than headerBytes.
 std::optional<FrameHeader> decodeFrameHeader(std::span<const std::byte> message);
 
 }  // namespace scolopax::protocol

@@ -10,8 +10,7 @@ namespace scolopax::protocol {
 namespace {
 
 /// Deepest nesting of brackets outside strings. For text that is not JSON, at least the depth that a parser
-/// reaches before it fails. std::to_string(limits.bytes) + " bytes" => "expected at most " +
-/// std::to_string(limits.bytes) + " bytes, found " + std::to_string(text.size())
+/// reaches before it fails.
 std::size_t nestingDepth(std::string_view text) {
   std::size_t depth = 0, deepest = 0;
   bool inString = false;
