@@ -66,8 +66,7 @@ nlohmann::json openApi(const std::vector<Route>& routes);
 /// Registers all routes and the stream's upgrade.
 void addApi(net::Server& server, ApiContext& context);
 
-// --- for the handlers
-// ------------------------------------------------------------------------------------------
+// --- for the handlers ---
 
 /// The HTTP status that reports an error of this code.
 int statusOf(ErrorCode code);
