@@ -79,7 +79,7 @@ Message readMessage(nlohmann::json json) {
   return message;
 }
 
-/// Reads the message type of the variant that has this `type`.
+/// Reads the message as the alternative of the variant that has this `type`.
 template <class... Messages>
 ClientMessage readAny(const nlohmann::json& json, const std::string& type, std::variant<Messages...>*) {
   std::optional<ClientMessage> message;

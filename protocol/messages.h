@@ -54,7 +54,7 @@ std::string sceneText(std::uint32_t revision, const nlohmann::json& patch);
 std::string errorText(const ProtocolError& error, std::uint32_t patchId = 0);
 std::string noticeText(std::string_view text);
 std::string pongText(std::uint32_t id);
-/// `found`: the members of the answer, as in that of GET .../pick.
+/// `found`: the members of the answer, the same as for GET .../pick.
 std::string pickedText(std::uint32_t id, const nlohmann::json& found);
 std::string pickedText(std::uint32_t id, const ProtocolError& error);
 

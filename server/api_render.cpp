@@ -23,7 +23,7 @@ namespace {
 
 using protocol::ProtocolError;
 
-/// Seconds for which a pass runs before it is checked whether the picture is still wanted.
+/// Seconds that a pass runs before the next check whether the picture is still wanted.
 constexpr double kSlice = 0.1;
 /// A number of seconds that can safely be added to a clock's time.
 constexpr double kForever = 1e9;

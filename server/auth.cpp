@@ -95,7 +95,7 @@ Authorizer::Authorizer(std::string token, bool loopback, std::vector<std::string
 
 bool Authorizer::isHostAllowed(const net::Request& request) const {
   const std::string* host = request.header("Host");
-  if (!loopback_ || !host) return true;  // HTTP/1.0 without a Host is no browser
+  if (!loopback_ || !host) return true;  // no browser sends HTTP/1.0 without Host
   const auto authority = net::parseAuthority(*host);
   if (authority && isLoopback(authority->host)) return true;
   return std::any_of(allowedOrigins_.begin(), allowedOrigins_.end(),

@@ -18,7 +18,7 @@
 
 namespace {
 
-constexpr int kFailed = 1;    // the command could not be carried out
+constexpr int kFailed = 1;    // the command failed
 constexpr int kBadUsage = 2;  // the command line is invalid
 
 /// The word that stands where a command is expected; empty if something else is wrong.

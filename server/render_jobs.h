@@ -13,9 +13,9 @@
 
 namespace scolopax::server {
 
-/// The scene that is drawn, at 1 / `divisor` of the resolution. While edits arrive (`interactive`) and if the
-/// scene leaves the choice of method to the server, with the quickest method that looks like the picture at
-/// rest.
+/// The scene that is drawn, at 1 / `divisor` of the resolution. While edits arrive (`interactive`), and only
+/// if the scene leaves the choice of method to the server, it uses the quickest method that looks like the
+/// picture at rest.
 Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive);
 
 /// A scene on its way into the renderer.

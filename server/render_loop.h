@@ -24,7 +24,8 @@ class RenderLoop {
   /// Runs one turn of the next session that has work. First pictures after edits take precedence; between two
   /// of them, a session at rest gets a short turn, so that no session starves.
   std::optional<TimePoint> step();
-  /// Ends the running pass early unless it makes the first picture after an edit. From any thread.
+  /// Ends the running pass early, unless it makes the first picture after an edit or is a short turn between
+  /// two of those. From any thread.
   void interrupt() { interrupted_ = true; }
 
  private:

@@ -31,8 +31,8 @@ inline constexpr double kMostDivisor = 16;
 /// meets the target. `current` is the divisor of the previous pass (0: none). It is kept until another fits
 /// clearly better, since a resolution that changes back and forth is worse than a picture that is slightly
 /// late. No picture follows it that is much larger than the largest whose cost is known. If the fixed cost of
-/// a pass is most of the target (because other processes use the processors too), smaller pictures gain
-/// nothing, and the target is raised.
+/// a pass is most of the target (for example because other processes use the processors), smaller pictures
+/// gain nothing, and the target is raised.
 double divisorForTarget(std::uint64_t pixels, const PassCost& cost, double targetSeconds, double current = 0);
 
 /// The scene for a smaller picture of the same view. Its height is divided and rounded up; its width is the

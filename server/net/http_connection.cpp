@@ -211,7 +211,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     if (const auto refusal = readHead(parser.get(), core_.options.bodyLimit, request)) {
       co_return co_await refuse(refusal->status, refusal->detail);
     }
-    // From here on, only an unread body can prevent the connection from continuing with the next request.
+    // From here on, only an unread body can stand between this request and the next.
     const bool keepAlive = keepAlive_;
     keepAlive_ = keepAlive_ && !hasBody;
     if (full_)

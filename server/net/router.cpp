@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that uses cpp-httplib. It never opens a socket there: the request line is read from memory.
+// The only file that uses cpp-httplib. It opens no socket with it: the request line is read from memory.
 #include "server/net/router.h"
 
 #include <httplib.h>

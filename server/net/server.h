@@ -61,8 +61,8 @@ struct Options {
   std::function<void(const std::string&)> log;
 };
 
-/// Throws NetError unless the files can serve as Options::certificateFile and keyFile. To be called before
-/// work that takes long.
+/// Throws NetError unless the files can serve as Options::certificateFile and keyFile. Meant to be called
+/// before long work, such as loading data.
 void checkTlsFiles(const std::string& certificateFile, const std::string& keyFile);
 
 /// slow: handlers may wait or compute for long (long poll, render); they have threads of their own, so that
