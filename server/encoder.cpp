@@ -46,8 +46,8 @@ std::vector<std::uint8_t> encodeJpeg(const Image8& image, int quality, ChromaSam
   unsigned char* begin = bytes.data();
   auto size = static_cast<unsigned long>(bytes.size());
   const tjhandle handle = threadCompressor();
-  // NOREALLOC: the buffer has the library's own upper bound, so the result always fits and the buffer stays
-  // ours.
+  // NOREALLOC: the buffer has the library's own upper bound as its size, so the result always fits and is
+  // never moved to another buffer.
   if (tjCompress2(handle, image.rgb.data(), image.width, 0, image.height, TJPF_RGB, &begin, &size,
                   subsampling, quality, TJFLAG_NOREALLOC) != 0)
     throw Error(ErrorCode::io, std::string("JPEG encoder: ") + tjGetErrorStr2(handle));
