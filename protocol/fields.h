@@ -13,14 +13,14 @@
 
 namespace scolopax::protocol {
 
-/// What values a field takes, beyond what its C++ type says. Bounds are in the field's unit.
+/// Constraints on a field's values beyond its C++ type. Bounds are in the field's unit.
 struct Traits {
   std::string_view unit = "";
   std::optional<double> atLeast = {}, above = {};  ///< inclusive, exclusive
   std::optional<double> atMost = {}, below = {};
-  std::size_t maxItems = 0;                        ///< of a list
-  std::size_t maxLength = 0;                       ///< of a text, in code points; 0: colour or enum
-  std::vector<EnumEntry> Lists::*names = nullptr;  ///< the names that may stand here
+  std::size_t maxItems = 0;   ///< maximum length of a list
+  std::size_t maxLength = 0;  ///< maximum length of a text in code points; 0 for colours and enums
+  std::vector<EnumEntry> Lists::*names = nullptr;  ///< the allowed names
   bool color = false;                              ///< "#rrggbb"
 };
 
@@ -38,7 +38,7 @@ constexpr Field<Struct, Value> field(std::string_view name, Value Struct::*membe
   return {name, member, doc, traits};
 }
 
-/// Setting one of the two in a patch removes the other.
+/// Two fields that exclude each other: a patch that sets only one of them removes the other.
 struct Exclusive {
   std::string_view first, second;
   bool bothAreAnError;
@@ -277,7 +277,7 @@ constexpr void forEachField(F&& f) {
   std::apply([&](const auto&... fields) { (f(fields), ...); }, Table<Struct>::fields);
 }
 
-/// Calls f(exclusive) for every pair of which a patch sets one only.
+/// Calls f(exclusive) for every pair of fields that exclude each other.
 template <Described Struct, class F>
 constexpr void forEachExclusive(F&& f) {
   if constexpr (requires { Table<Struct>::exclusive; }) {

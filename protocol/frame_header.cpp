@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::uint32_t kMagic = 0x584C4353;  // the bytes "SCLX"
 
-/// The layout, once for both directions: calls f(offset, value) for every field but magic and version.
+/// The layout, shared by both directions: calls f(offset, value) for every field except magic and version.
 template <class Header, class F>
 void visitLayout(Header& h, F&& f) {
   f(6, h.headerBytes);

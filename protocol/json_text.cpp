@@ -9,8 +9,8 @@
 namespace scolopax::protocol {
 namespace {
 
-/// Deepest nesting of brackets outside of strings; of text that is not JSON at least as deep as a parser
-/// gets.
+/// Deepest nesting of brackets outside strings. For text that is not JSON, at least the depth that a parser
+/// reaches before it fails.
 std::size_t nestingDepth(std::string_view text) {
   std::size_t depth = 0, deepest = 0;
   bool inString = false;
@@ -35,8 +35,8 @@ std::size_t nestingDepth(std::string_view text) {
 nlohmann::json parseJson(std::string_view text, const Limits& limits) {
   if (text.size() > limits.bytes) {
     throw ProtocolError(413, "",
-                        "the document has " + std::to_string(text.size()) + " bytes, at most " +
-                            std::to_string(limits.bytes) + " are taken");
+                        "the document has " + std::to_string(text.size()) +
+                            " bytes, more than the limit of " + std::to_string(limits.bytes) + " bytes");
   }
   if (nestingDepth(text) > limits.depth) {
     throw ProtocolError(400, "",
@@ -47,7 +47,7 @@ nlohmann::json parseJson(std::string_view text, const Limits& limits) {
   } catch (const nlohmann::json::parse_error& error) {
     throw ProtocolError(400, "", "not valid JSON at byte " + std::to_string(error.byte));
   } catch (const nlohmann::json::exception&) {
-    throw ProtocolError(400, "", "not valid JSON: a number is beyond what a double holds");
+    throw ProtocolError(400, "", "not valid JSON: a number is out of the range of a double");
   }
 }
 

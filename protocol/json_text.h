@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text from a stranger to JSON: the only way in, with the limits checked before anything is built.
+// Parses untrusted text as JSON. All JSON text from clients comes in here; the limits are checked before it
+// is parsed.
 #pragma once
 #include <cstddef>
 #include <nlohmann/json_fwd.hpp>
@@ -9,11 +10,12 @@ namespace scolopax::protocol {
 
 struct Limits {
   std::size_t bytes = std::size_t{1} << 20;
-  std::size_t depth = 32;  ///< lists and objects within each other
+  std::size_t depth = 32;  ///< maximum nesting of lists and objects
 };
 
-/// Throws ProtocolError alone: 413 beyond `bytes`; 400 beyond `depth` or for what is not JSON in UTF-8 or
-/// holds a number that no double can hold. Of two equal keys in an object the last counts.
+/// Throws only ProtocolError: 413 for more than `bytes` bytes; 400 for nesting deeper than `depth`, for text
+/// that is not JSON in UTF-8, and for a number outside the range of a double. If an object repeats a key, the
+/// last value counts.
 nlohmann::json parseJson(std::string_view text, const Limits& limits = {});
 
 }  // namespace scolopax::protocol

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The names an enumerated field may take. The caller fills them (the server from the renderer's lists):
-// the protocol itself knows no renderer.
+// The names an enumerated field may take. The caller fills them in (the server from the renderer's lists):
+// the protocol does not depend on the renderer.
 #pragma once
 #include <string>
 #include <vector>

@@ -14,7 +14,7 @@ void readValue(const nlohmann::json& json, const Path& path, const Traits&, Read
   out = json;
 }
 
-// `type` and whether a field must be there are the messages' own; all else is as in a scene.
+// Messages have a `type` and required fields; everything else works as in a scene.
 template <>
 struct Table<PatchMessage> {
   static constexpr std::string_view type = "patch";
@@ -79,7 +79,7 @@ Message readMessage(nlohmann::json json) {
   return message;
 }
 
-/// The message of the variant whose type this is.
+/// Reads the message as the alternative of the variant that has this `type`.
 template <class... Messages>
 ClientMessage readAny(const nlohmann::json& json, const std::string& type, std::variant<Messages...>*) {
   std::optional<ClientMessage> message;
@@ -101,9 +101,9 @@ std::string written(const nlohmann::ordered_json& message) {
 
 ClientMessage parseClientMessage(std::string_view text, const Limits& limits) {
   const nlohmann::json json = parseJson(text, limits);
-  if (!json.is_object()) failExpected(Path(), "a message, an object with a type", json);
+  if (!json.is_object()) failExpected(Path(), "a message (an object with a type)", json);
   if (!json.contains("type")) fail(Path() / "type", "missing");
-  if (!json["type"].is_string()) failExpected(Path() / "type", "a text", json["type"]);
+  if (!json["type"].is_string()) failExpected(Path() / "type", "a string", json["type"]);
   return readAny(json, json["type"].get<std::string>(), static_cast<ClientMessage*>(nullptr));
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The text messages of a session's WebSocket: those of a client are read, those of the server written.
+// The text messages of a session's WebSocket: parses the client's and writes the server's.
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -14,16 +14,16 @@
 namespace scolopax::protocol {
 
 struct PatchMessage {
-  std::uint32_t id = 0;  ///< the client's own count, from 1 and rising; frames and errors name it
-  nlohmann::json patch;  ///< an object, otherwise unchecked: for applyPatch
+  std::uint32_t id = 0;  ///< chosen by the client, from 1 and increasing; frames and errors refer to it
+  nlohmann::json patch;  ///< an object; applyPatch checks what it contains
 };
 struct AckMessage {
   std::uint32_t frame = 0;  ///< this frame and all before it have arrived
 };
 struct PingMessage {
-  std::uint32_t id = 0;  ///< given back by pong
+  std::uint32_t id = 0;  ///< returned in the pong
 };
-/// What the client can show; every such message replaces the one before it.
+/// What the client can display; each of these messages replaces the one before it.
 struct ViewMessage {
   bool visible = true;  ///< false: no frames
   std::optional<std::uint32_t> maxWidth, maxHeight;
@@ -32,9 +32,10 @@ struct ViewMessage {
 struct ResumeMessage {
   std::string token;
 };
-/// Pixels of the session's picture from its top left corner; x2 and y2: the other corner of a rectangle.
+/// A position in the session's picture, in pixels from its top left corner. With x2 and y2, one corner of a
+/// rectangle and the opposite one.
 struct PickMessage {
-  std::uint32_t id = 0;  ///< given back by the answer
+  std::uint32_t id = 0;  ///< returned in the answer
   double x = 0, y = 0;
   std::optional<double> x2, y2;
 };
@@ -46,13 +47,14 @@ using ClientMessage =
 ClientMessage parseClientMessage(std::string_view text, const Limits& limits = {});
 
 std::string helloText(const nlohmann::json& capabilities, std::string_view session, std::string_view token);
-/// For the viewers that did not send the edit: what turns the resolved scene before it into the one after it.
+/// For the viewers that did not send the edit: `patch` turns the resolved scene before the edit into the one
+/// after it.
 std::string sceneText(std::uint32_t revision, const nlohmann::json& patch);
-/// `patchId` is that of the refused patch; 0 when it was something else.
+/// `patchId`: id of the refused patch; 0 if the error is about something else.
 std::string errorText(const ProtocolError& error, std::uint32_t patchId = 0);
 std::string noticeText(std::string_view text);
 std::string pongText(std::uint32_t id);
-/// `found`: the members of the answer, as GET .../pick has them.
+/// `found`: the members of the answer, the same as for GET .../pick.
 std::string pickedText(std::uint32_t id, const nlohmann::json& found);
 std::string pickedText(std::uint32_t id, const ProtocolError& error);
 

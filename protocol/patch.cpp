@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::json;
 
-/// "0", "7", "12"; nullopt for "", "-1", "07", "1e3" and what no list could hold.
+/// Reads a list index: "0", "7", "12". nullopt for "", "-1", "07", "1e3" and more than 9 digits.
 std::optional<std::size_t> indexOf(std::string_view key) {
   if (key.empty() || key.size() > 9 || (key.size() > 1 && key[0] == '0')) return std::nullopt;
   std::size_t index = 0;
@@ -27,13 +27,13 @@ std::size_t indexBelow(const std::string& key, std::size_t count, const Path& li
   return *index;
 }
 
-/// A value without a table: replaced, or, of a list, single entries that are there already.
+/// Patches a value without a table: replaces it or, in a list, replaces single entries that already exist.
 void patchLeaf(json& target, const json& patch, const Path& path) {
   if (!patch.is_object()) {
     target = patch;
     return;
   }
-  if (!target.is_array()) fail(path, "an object patches the entries of a list, and no list is set here");
+  if (!target.is_array()) fail(path, "an object patches the entries of a list, but no list is set here");
   for (const auto& [key, value] : patch.items()) {
     json& entry = target[indexBelow(key, target.size(), path)];
     if (value.is_null()) fail(path / key, "an entry of this list has no default");
@@ -59,7 +59,7 @@ struct PatchValue<T> {
   }
 };
 
-/// An object that may be absent; null has been seen to before.
+/// An object that may be absent; patchStruct has already handled null.
 template <Described T>
 struct PatchValue<std::optional<T>> : PatchValue<T> {};
 
@@ -94,7 +94,7 @@ struct PatchValue<std::vector<T>> {
   }
 };
 
-/// Of two fields that exclude each other, the one that alone is set removes the other.
+/// Of two fields that exclude each other, a patch that sets only one removes the other.
 template <Described T>
 void removeExcluded(json& target, const json& patch) {
   const auto sets = [&](std::string_view key) {
@@ -143,7 +143,7 @@ struct Between<std::optional<T>> : Between<T> {};
 template <Described T>
 struct Between<std::vector<T>> {
   static json of(const json& from, const json& to) {
-    if (to.size() < from.size()) return to;  // only a whole list makes one shorter
+    if (to.size() < from.size()) return to;  // only a whole list can shorten a list
     json patch = json::object();
     for (std::size_t i = 0; i < to.size(); ++i) {
       const json none = json::object();
@@ -168,7 +168,7 @@ json between(const json& from, const json& to) {
       patch[name] = Between<Value>::of(*before, *after);
     }
   });
-  // A partner that stays must be named, or the patch would remove it.
+  // A partner that stays must be named in the patch, or applying it would remove the partner.
   forEachExclusive<T>([&](const Exclusive& pair) {
     const std::string names[] = {std::string(pair.first), std::string(pair.second)};
     for (const int i : {0, 1}) {

@@ -8,7 +8,7 @@
 namespace scolopax::protocol {
 namespace {
 
-/// What was found, short enough for one line.
+/// Describes what was found, on one short line.
 std::string describe(const nlohmann::json& found) {
   if (found.is_object()) return "an object";
   if (found.is_array()) return "a list of " + std::to_string(found.size());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where in a document one is, as a chain on the stack that becomes a JSON pointer only when something is
-// wrong there; and the errors that name it. Internal to protocol/.
+// A position in a document, as a linked list on the stack that becomes a JSON pointer only when there is an
+// error to report; and the functions that throw such errors. Internal to protocol/.
 #pragma once
 #include <cstddef>
 #include <nlohmann/json_fwd.hpp>
@@ -16,7 +16,7 @@ class Path {
   /// The parent and the key must outlive the child.
   Path operator/(std::string_view key) const { return Path(this, key, std::nullopt); }
   Path operator/(std::size_t index) const { return Path(this, {}, index); }
-  /// RFC 6901.
+  /// JSON pointer (RFC 6901).
   std::string pointer() const;
 
  private:
@@ -29,7 +29,7 @@ class Path {
 
 /// Throws ProtocolError(422): "/channels/0/gamma: expected a number > 0, found -1".
 [[noreturn]] void failExpected(const Path& path, std::string_view expected, const nlohmann::json& found);
-/// Throws ProtocolError(422): pointer, colon, message.
+/// Throws ProtocolError(422) whose detail is the pointer, a colon and the message.
 [[noreturn]] void fail(const Path& path, std::string_view message);
 
 }  // namespace scolopax::protocol

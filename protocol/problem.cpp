@@ -61,7 +61,7 @@ std::string_view statusTitle(int status) {
 }
 
 std::string problemJson(int status, std::string_view detail, std::string_view pointer) {
-  // The order is the reader's, not the alphabet's.
+  // In the order that suits a reader, not in alphabetical order.
   nlohmann::ordered_json body{
       {"type", "about:blank"}, {"title", statusTitle(status)}, {"status", status}, {"detail", detail}};
   if (!pointer.empty()) body["pointer"] = pointer;

@@ -9,27 +9,29 @@ namespace scolopax::protocol {
 
 inline constexpr std::string_view kProblemType = "application/problem+json";
 
-/// A stranger's text for a message: no longer than `most` bytes, cut between two characters of UTF-8. Every
-/// text of a request that a detail repeats goes through this.
+/// Untrusted text made fit for a message: at most `most` bytes, cut between two UTF-8 characters and ended by
+/// "..." if it is longer. Every part of a request that a detail quotes goes through this.
 std::string shortened(std::string_view text, std::size_t most = 200);
 
-/// What a client did wrong. `what()` is the detail: one line with what was expected and what was found.
+/// A request or message that the server refuses. `what()` is the detail: one line with what was expected and
+/// what was found.
 struct ProtocolError : std::runtime_error {
-  /// Both texts are cut: what they echo of a client's request may be as long as it.
+  /// Both texts are shortened: they may quote parts of a request, which can be long.
   ProtocolError(int statusCode, std::string_view jsonPointer, std::string_view detail)
       : std::runtime_error(shortened(detail, kMostDetail)),
         status(statusCode),
         pointer(shortened(jsonPointer, kMostPointer)) {}
   static constexpr std::size_t kMostDetail = 1000, kMostPointer = 400;
-  int status;           ///< HTTP status: 400 not JSON, 413 too large, 422 not a scene, patch or message
+  int status;  ///< HTTP status; from protocol/ itself 400 (not JSON), 413 (too large) or 422 (not a scene,
+               ///< patch or message)
   std::string pointer;  ///< RFC 6901 pointer to the bad field; "" for the whole document
 };
 
-/// The phrase that belongs to an HTTP status: "Unprocessable Content".
+/// The reason phrase of an HTTP status: "Unprocessable Content" for 422; "Error" for an unknown status.
 std::string_view statusTitle(int status);
 
-/// Body of kProblemType; members type, title, status, detail and, where it is not "", pointer.
-/// Bytes that are not UTF-8 are replaced: this never throws because of what `detail` holds.
+/// Body of type kProblemType with the members type, title, status, detail and, unless empty, pointer. Bytes
+/// that are not UTF-8 are replaced, so whatever `detail` holds, this does not throw because of it.
 std::string problemJson(int status, std::string_view detail, std::string_view pointer = "");
 std::string problemJson(const ProtocolError& error);
 

@@ -111,7 +111,7 @@ void readValue(const nlohmann::json& json, const Path& path, const Traits& trait
 void readValue(const nlohmann::json& json, const Path& path, const Traits& traits, ReadContext context,
                std::string& out) {
   if (traits.color) return readColor(json, path, out);
-  if (!json.is_string()) failExpected(path, "a text", json);
+  if (!json.is_string()) failExpected(path, "a string", json);
   const auto& text = json.get_ref<const std::string&>();
   if (traits.names != nullptr && !isName(context.lists.*traits.names, text)) {
     failExpected(path, "one of " + quotedNames(context.lists.*traits.names), json);

@@ -16,7 +16,7 @@
 
 namespace scolopax::protocol {
 
-/// Where reading stands: what to look names up in.
+/// What readValue needs besides the JSON: the lists to look names up in.
 struct ReadContext {
   const Lists& lists;
 };
@@ -26,7 +26,7 @@ std::string expectedNumber(std::string_view kind, const Traits& traits);
 bool isColor(std::string_view text);
 bool within(double value, const Traits& traits);
 
-// One per type of value; each throws through failExpected.
+// One overload per type of value; each reports errors with failExpected.
 void readValue(const nlohmann::json& json, const Path& path, const Traits& traits, ReadContext context,
                bool& out);
 void readValue(const nlohmann::json& json, const Path& path, const Traits& traits, ReadContext context,
@@ -94,7 +94,7 @@ void readValue(const nlohmann::json& json, const Path& path, const Traits& trait
   for (std::size_t i = 0; i < json.size(); ++i) readStruct(json[i], path / i, context, out[i]);
 }
 
-/// Throws for a member of the object that the table does not have.
+/// Throws ProtocolError(422) if the object has a member that is not in the table.
 template <Described T>
 void refuseUnknown(const nlohmann::json& object, const Path& path) {
   for (auto member = object.begin(); member != object.end(); ++member) {
@@ -152,7 +152,7 @@ nlohmann::json writeValue(const std::vector<T>& value) {
   return list;
 }
 
-/// Leaves out what has no value, so that nothing written is null.
+/// Omits fields without a value: the result contains no null.
 template <Described T>
 nlohmann::json writeValue(const T& value) {
   nlohmann::json object = nlohmann::json::object();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scene as it is on the wire: all that a client can edit. Comes from JSON (scene_json.h, described by
-// fields.h); the server resolves it into what the renderer takes. An empty optional means automatic, or that
-// there is none.
+// The scene in its wire form: everything that a client can edit. It is read from JSON (scene_json.h,
+// described by fields.h), and the server resolves it into the renderer's scene. An empty optional means
+// "automatic" or "none".
 #pragma once
 #include <array>
 #include <cstdint>
@@ -73,7 +73,7 @@ struct Camera {
   std::optional<double> orthoHeight;  ///< when set, fovY is not used
 };
 
-/// Kept is dot(normal, x - point) >= 0.
+/// Keeps the points x with dot(normal, x - point) >= 0.
 struct ClipPlane {
   std::optional<std::array<double, 3>> point;
   std::array<double, 3> normal{0, 0, 1};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON to the wire's scene and back, as the table of fields says.
+// Converts JSON to the wire scene and back, as the table of fields describes.
 #pragma once
 #include <cstddef>
 #include <nlohmann/json_fwd.hpp>
@@ -9,11 +9,12 @@
 
 namespace scolopax::protocol {
 
-/// Validates and reads a whole scene; what is absent, or null where null means automatic, takes its default.
-/// Throws ProtocolError(422) with the pointer of the first bad or unknown field, what was expected and found.
+/// Validates and reads a whole scene. Fields that are absent, or null where null means automatic, take their
+/// defaults. Throws ProtocolError(422) with the pointer of the first bad or unknown field, what was expected
+/// and what was found.
 Scene parseScene(const nlohmann::json& json, const Lists& lists);
 
-/// Every field that has a value; an empty optional is left out. So there is no null in it, and
+/// Writes every field that has a value and omits empty optionals. The result therefore contains no null, and
 /// parseScene(toJson(scene)) is the same scene.
 nlohmann::json toJson(const Scene& scene);
 

@@ -11,7 +11,7 @@ using Json = nlohmann::ordered_json;
 template <class T>
 struct Tag {};
 
-/// Where a type is described: the definitions collected so far, and the names for enums.
+/// What the functions below share: the definitions collected so far, and the names for enums.
 struct Writer {
   const Lists& lists;
   Json definitions = Json::object();
@@ -19,7 +19,7 @@ struct Writer {
 
 std::string text(std::string_view view) { return std::string(view); }
 
-/// Whole numbers without a decimal point, as people write them.
+/// Writes whole numbers without a decimal point.
 Json tidyNumber(double value) {
   constexpr double kExact = 9007199254740992.0;  // 2^53
   if (value == std::floor(value) && std::abs(value) < kExact) return static_cast<std::int64_t>(value);
@@ -57,7 +57,7 @@ Json pointList(std::string_view title, const Traits& traits) {
   return {{"type", "array"}, {"items", reference(title)}, {"minItems", 1}, {"maxItems", traits.maxItems}};
 }
 
-// One per type that a field can have: its schema, and below its words.
+// One overload per type of field: first its schema, further below its description in words.
 Json valueSchema(Tag<bool>, const Traits&, Writer&) { return {{"type", "boolean"}}; }
 Json valueSchema(Tag<double>, const Traits& traits, Writer&) { return numberSchema("number", traits); }
 Json valueSchema(Tag<std::uint32_t>, const Traits& traits, Writer&) {
@@ -85,7 +85,7 @@ Json valueSchema(Tag<std::vector<ControlPoint>>, const Traits& traits, Writer& w
       {"minItems", 2},           {"maxItems", 2}};
   return pointList("ControlPoint", traits);
 }
-// tsType is for json-schema-to-typescript, which knows no prefixItems.
+// tsType is for json-schema-to-typescript, which does not support prefixItems.
 Json valueSchema(Tag<Colormap>, const Traits& traits, Writer& writer) {
   const Json position{{"type", "number"}, {"minimum", 0}, {"maximum", 1}};
   writer.definitions["ColorPoint"] = {{"title", "ColorPoint"},
@@ -135,7 +135,7 @@ Json structSchema(Writer& writer) {
   Json properties = Json::object();
   forEachField<T>([&]<class Value>(const Field<T, Value>& field) {
     Json schema = valueSchema(Tag<Value>{}, field.traits, writer);
-    // A reference stands alone: what is referred to has its own description, and {} as its default.
+    // A $ref stands alone: the definition that it refers to has its own description, and its default is {}.
     if (!schema.contains("$ref")) {
       schema["description"] = description(field.doc, field.traits, writer.lists);
       schema["default"] = tidy(writeValue(T{}.*field.member));
@@ -149,7 +149,8 @@ Json structSchema(Writer& writer) {
               {"properties", properties}};
   forEachExclusive<T>([&](const Exclusive& pair) {
     if (!pair.bothAreAnError) return;
-    // In this form because generators of types understand no more than that there is a `not`.
+    // In this form because generators of types understand only that there is a `not`, and ignore what it
+    // holds.
     const Json isSet{{"not", {{"type", "null"}}}};
     schema["not"] = {{"required", Json::array({pair.first, pair.second})},
                      {"properties", {{text(pair.first), isSet}, {text(pair.second), isSet}}}};

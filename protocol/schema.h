@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What else the table of fields becomes: the JSON Schema that is checked in as schema.json and served, and
-// the section on fields of PROTOCOL.md.
+// Two more things made from the table of fields: the JSON Schema, which is checked in as schema.json and
+// served to clients, and the section of PROTOCOL.md about fields.
 #pragma once
 #include <string>
 

@@ -32,7 +32,8 @@ void forEachPart(std::string_view text, char separator, F&& f) {
   }
 }
 
-/// What Accept gives a media type, by the most specific range that holds it (RFC 9110, 12.5.1).
+/// The quality that Accept gives to a media type, by the most specific range that matches it (RFC 9110,
+/// 12.5.1).
 double qualityOf(std::string_view accept, std::string_view mediaType) {
   double quality = 0;
   int bestSpecificity = -1;
@@ -49,8 +50,7 @@ double qualityOf(std::string_view accept, std::string_view mediaType) {
   return quality;
 }
 
-/// Every handler runs in this: what it throws becomes a problem, and the cause of a 500 goes to the log
-/// alone.
+/// Wraps every handler: what it throws becomes a problem, and the cause of a 500 only goes into the log.
 net::Handler guarded(const ApiContext& context, const net::Handler& handler) {
   return [handler, &context](const net::Request& request) -> net::Response {
     try {
@@ -174,7 +174,8 @@ const ImageType* acceptedImageType(const std::string* accept) {
 
 std::uint64_t imageMemory(std::uint64_t pixels, std::string_view format) {
   if (format == "jpeg") return jpegMemory(pixels);
-  // 8 bits a component before and after; or floats, and two copies of what becomes of them.
+  // png: 8 bits per component, before and after encoding. exr: the floats, and two copies of the encoded
+  // picture.
   return pixels * (format == "png" ? 4 * 3 : 3 * sizeof(glm::vec4)) + (1 << 20);
 }
 

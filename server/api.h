@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The HTTP interface: one table of routes, from which the server's routing and openapi.json are made.
-// Between net::Server and data sets, sessions, renderer.
+// The HTTP interface: one table of routes, from which the server's routing and openapi.json are made. It
+// connects net::Server with the data sets, the sessions and the renderer.
 #pragma once
 #include <atomic>
 #include <functional>
@@ -20,39 +20,39 @@
 
 namespace scolopax::server {
 
-/// What the handlers work with. Outlives the server.
+/// What the handlers work with. Must outlive the server.
 struct ApiContext {
   const Config& config;
   const DatasetStore& datasets;
-  const SceneResolver& renderResolver;  ///< for POST /render, with its default sample count
+  const SceneResolver& renderResolver;  ///< for POST /render, with that call's default sample count
   SessionStore& sessions;
   StreamHub& streams;
   Metrics& metrics;
   MakeRenderer makeRenderer;
-  std::shared_ptr<MemoryBudget> memory;  ///< of makeRenderer's renderers too
+  std::shared_ptr<MemoryBudget> memory;  ///< also charged by the renderers that makeRenderer returns
   Log log;
-  std::atomic<bool>& stopping;  ///< ends what waits
-  std::stop_token cutting;      ///< ends what renders, after the grace
+  std::atomic<bool>& stopping;  ///< ends requests that wait
+  std::stop_token cutting;      ///< ends requests that render, after two thirds of Config::stopGrace
   std::function<nlohmann::json()> capabilities;
 };
 
 struct Parameter {
   std::string name;
   std::string in;    ///< "path", "query" or "header"
-  std::string type;  ///< of JSON Schema: "string", "integer", "number", "boolean"
+  std::string type;  ///< JSON Schema type: "string", "integer", "number" or "boolean"
   std::string doc;
 };
 
 struct Route {
   std::string method;
-  std::string path;  ///< from the root; {name} stands for one segment and is a group of Request::matches
+  std::string path;  ///< from the root; {name} matches one segment and becomes a group of Request::matches
   std::string summary;
   std::vector<Parameter> parameters;
-  std::string requestType;                 ///< media type of the body; empty: none
-  std::vector<std::string> responseTypes;  ///< of the good answers; the first is the usual
+  std::string requestType;                 ///< media type of the body; empty: no body
+  std::vector<std::string> responseTypes;  ///< media types of successful answers; the first is the usual one
   net::RouteKind kind = net::RouteKind::quick;
   net::Handler handler;
-  std::vector<int> statuses = {};  ///< of the good answers where they are not 200, or 204 without a body
+  std::vector<int> statuses = {};  ///< statuses of successful answers; empty: 200, or 204 without a body
 };
 
 std::vector<Route> datasetRoutes(ApiContext& context);
@@ -66,24 +66,25 @@ nlohmann::json openApi(const std::vector<Route>& routes);
 /// Registers all routes and the stream's upgrade.
 void addApi(net::Server& server, ApiContext& context);
 
-// --- for the handlers
-// ------------------------------------------------------------------------------------------
+// --- for the handlers ---
 
-/// The HTTP status that tells of an error.
+/// The HTTP status that reports an error of this code.
 int statusOf(ErrorCode code);
 net::Response jsonResponse(int status, const nlohmann::json& body);
 net::Response errorResponse(const protocol::ProtocolError& error);
-/// The body as JSON; throws ProtocolError, 415 unless Content-Type is application/json or `alsoType`.
+/// The body as JSON. Throws ProtocolError: 415 unless Content-Type is application/json or `alsoType`, and
+/// what parseJson throws.
 nlohmann::json jsonBody(const net::Request& request, const Config& config, std::string_view alsoType = "");
-/// A number from the query; `fallback` when absent; throws ProtocolError(422) for anything else.
+/// A whole number from the query, `fallback` if absent. Throws ProtocolError(422) for anything else.
 std::uint32_t queryUnsigned(const net::Request& request, std::string_view name, std::uint32_t fallback);
-/// Throws ProtocolError(422) also when absent.
+/// A finite number from the query. Throws ProtocolError(422) for anything else, and if absent.
 double queryNumber(const net::Request& request, std::string_view name);
-/// true or false; false when absent.
+/// true or false from the query, false if absent. Throws ProtocolError(422) for anything else.
 bool queryFlag(const net::Request& request, std::string_view name);
 
-/// What work(stop) returns, which takes long: throws net::TakesLong where nothing may wait. `stop` is
-/// requested when the client has gone or the server ends; then Error(cancelled) becomes ProtocolError(503).
+/// Returns work(stop), which may take long; throws net::TakesLong where the handler may not wait. `stop` is
+/// requested when the client has disconnected or the server cuts its requests; Error(cancelled) then becomes
+/// ProtocolError(503).
 template <class Work>
 auto inLongRequest(const ApiContext& context, const net::Request& request, Work&& work) {
   if (!request.mayWait) throw net::TakesLong();
@@ -96,10 +97,11 @@ auto inLongRequest(const ApiContext& context, const net::Request& request, Work&
   } catch (const Error& error) {
     if (error.code() != ErrorCode::cancelled) throw;
     throw protocol::ProtocolError(
-        503, "", request.gone.stop_requested() ? "the client has gone" : "the server is stopping");
+        503, "", request.gone.stop_requested() ? "the client has disconnected" : "the server is stopping");
   }
 }
-/// What work() returns; where it throws Unmeasured, in a long request, once that is measured.
+/// Returns work(). If it throws Unmeasured, measures what is missing in a long request and calls work()
+/// again.
 template <class Work>
 auto measuredIn(const ApiContext& context, const net::Request& request, Work&& work) {
   try {
@@ -116,11 +118,13 @@ struct ImageType {
 };
 inline constexpr ImageType kImageTypes[] = {
     {"jpeg", "image/jpeg"}, {"png", "image/png"}, {"exr", "image/x-exr"}};
-/// The type of image that an Accept header likes best, the first of equals; nullptr: none.
+/// The image type that an Accept header prefers, the first of those it prefers equally; nullptr if it accepts
+/// none. Without a header, the first of kImageTypes.
 const ImageType* acceptedImageType(const std::string* accept);
-/// Memory that imageBytes takes for so many pixels.
+/// Memory, in bytes, that imageBytes needs for `pixels` pixels.
 std::uint64_t imageMemory(std::uint64_t pixels, std::string_view format);
-/// The bytes of a picture: jpeg at quality 95, 4:4:4; png; exr as float32 linear premultiplied RGBA.
+/// The picture as a file: jpeg with quality 95 and 4:4:4 sampling; png; exr with float32 linear premultiplied
+/// RGBA.
 std::string imageBytes(const Image& image, glm::vec3 background, std::string_view format);
 
 }  // namespace scolopax::server

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Routes that tell what data there is.
+// Routes that describe the data sets.
 #include <nlohmann/json.hpp>
 
 #include "protocol/problem.h"
@@ -55,7 +55,8 @@ std::vector<Route> datasetRoutes(ApiContext& context) {
        "Histogram of the magnitude of one channel's gradient",
        {id,
         {"channel", "query", "integer", "Index of the channel, from 0 (default)"},
-        {"joint", "query", "boolean", "Whether to tell it for every bin of values too; false when absent"}},
+        {"joint", "query", "boolean",
+         "Whether to return it for every bin of values as well; false if absent"}},
        "",
        kJson,
        {},

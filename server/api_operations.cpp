@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Routes for those who run or discover the server.
+// Routes for operating the server and for discovering what it can do.
 #include <nlohmann/json.hpp>
 
 #include "protocol/problem.h"
@@ -16,7 +16,7 @@ std::vector<Route> operationRoutes(ApiContext& context) {
   return {
       {"GET",
        "/healthz",
-       "Whether the process lives",
+       "Whether the process is running",
        {},
        "",
        kText,
@@ -24,7 +24,7 @@ std::vector<Route> operationRoutes(ApiContext& context) {
        [text](const net::Request&) { return text("ok\n"); }},
       {"GET",
        "/readyz",
-       "Whether it takes requests; 503 while it stops",
+       "Whether the server accepts requests; 503 while it is stopping",
        {},
        "",
        kText,

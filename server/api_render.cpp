@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// POST /render: scene in, picture out, nothing kept.
+// POST /render: takes a scene, returns a picture, and keeps nothing.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -23,19 +23,20 @@ namespace {
 
 using protocol::ProtocolError;
 
-/// Seconds that a pass goes on before it is asked whether anybody still waits for the picture.
+/// Seconds that a pass runs before the next check whether the picture is still wanted.
 constexpr double kSlice = 0.1;
-/// Seconds that a clock can still add to its time.
+/// A number of seconds that can safely be added to a clock's time.
 constexpr double kForever = 1e9;
 
-/// A place among the renders that may run at once.
+/// One of the places for renders that run at once; the constructor throws ProtocolError(503) if all are
+/// taken.
 class RenderPlace {
  public:
   RenderPlace(std::atomic<int>& running, int limit) : running_(running) {
     if (++running_ <= limit) return;
     --running_;
     throw ProtocolError(503, "",
-                        "expected at most " + std::to_string(limit) + " renders at once, found another");
+                        "the limit of " + std::to_string(limit) + " renders at once is reached; retry later");
   }
   ~RenderPlace() { --running_; }
   RenderPlace(const RenderPlace&) = delete;
@@ -47,7 +48,7 @@ class RenderPlace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Whether a render is to end early: its client has gone, the server stops, or its time is over.
+/// Ends a render early: when its client disconnects, the server stops, or its time is over.
 class Ending {
  public:
   Ending(const std::stop_token& gone, const std::stop_token& cutting, double seconds)
@@ -80,7 +81,7 @@ class Ending {
   std::jthread timer_;
 };
 
-/// What `work` returns; none when it was stopped.
+/// Returns work(), or nullopt if it was cancelled.
 template <class Work>
 auto unlessStopped(Work work) -> std::optional<decltype(work())> {
   try {
@@ -91,26 +92,27 @@ auto unlessStopped(Work work) -> std::optional<decltype(work())> {
   }
 }
 
-/// Its estimated error; NaN when it was stopped before that was known.
+/// The renderer's estimated error; NaN if `stop` was requested before it was known.
 double errorOf(const Renderer& renderer, const std::stop_token& stop) {
   return unlessStopped([&] { return renderer.estimatedError(stop); })
       .value_or(std::numeric_limits<double>::quiet_NaN());
 }
 
 void checkWanted(const ApiContext& context, const net::Request& request) {
-  if (request.gone.stop_requested()) throw ProtocolError(503, "", "the client has gone");
+  if (request.gone.stop_requested()) throw ProtocolError(503, "", "the client has disconnected");
   if (context.cutting.stop_requested()) throw ProtocolError(503, "", "the server is stopping");
 }
 
-/// A picture that depends on the machine's speed is only for those who asked for it.
+/// The render is too slow. A picture that depends on the machine's speed is returned only if the scene asks
+/// for it.
 ProtocolError tooLate(double limit, std::uint32_t samples) {
-  return ProtocolError(422, "/stop",
-                       "expected to end within " + shortText(limit) + " seconds, found " +
-                           std::to_string(samples) +
-                           " samples done by then; ask for less, or set stop.seconds");
+  return ProtocolError(
+      422, "/stop",
+      "the render did not end within " + shortText(limit) + " seconds; " + std::to_string(samples) +
+          " samples were done by then; request fewer samples or pixels, or set stop.seconds");
 }
 
-/// The scene of the body, once what it needs of the data is measured; that takes no longer than a render may.
+/// The scene of the body, after measuring the data that it needs, which may take no longer than a render.
 std::shared_ptr<const ResolvedScene> sceneOf(const ApiContext& context, const net::Request& request) {
   const auto body = jsonBody(request, context.config);
   const Ending ending(request.gone, context.cutting, context.config.maxRenderSeconds);
@@ -133,7 +135,7 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
   const ImageType* type = acceptedImageType(request.header("accept"));
   if (!type)
     throw ProtocolError(406, "",
-                        "expected Accept to hold image/jpeg, image/png or image/x-exr, found " +
+                        "expected Accept to include image/jpeg, image/png or image/x-exr, found " +
                             protocol::shortened(*request.header("accept")));
   const double limit = context.config.maxRenderSeconds;
   const auto scene = sceneOf(context, request);
@@ -152,11 +154,11 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
     throw tooLate(limit, 0);
   }
   while (!stopMet(scene->stop, *renderer, seconds())) {
-    // A rule of time may end a pass in the middle; the first sample is given more, up to the server's own
-    // limit.
+    // A time limit may end a pass in the middle, but not the first sample: that may take up to the server's
+    // own limit.
     const bool timed = scene->stop.seconds > 0 && renderer->samples() > 0;
     const double until = timed ? std::min(scene->stop.seconds, limit) : limit;
-    // In this order: no duration but a short one becomes one of whole nanoseconds.
+    // In this order, because only a short duration fits into whole nanoseconds.
     const auto budget = std::chrono::duration<double>(std::clamp(until - seconds(), 0.0, kSlice));
     const auto slice = std::chrono::duration_cast<std::chrono::nanoseconds>(budget);
     if (renderer->renderSample(ending.flag(), slice)) {

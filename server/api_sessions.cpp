@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Routes of sessions: a script can do with them all that a stream can.
+// Routes of sessions, with which a script can do everything that a stream can.
 #include <algorithm>
 #include <charconv>
 #include <nlohmann/json.hpp>
@@ -45,7 +45,7 @@ net::Response sceneResponse(const Session::SceneState& state) {
   return response;
 }
 
-/// Makes the edit, once what it needs of the data is measured.
+/// Makes the edit, after measuring the data that it needs.
 template <class Edit>
 net::Response edited(const ApiContext& context, const net::Request& request, Edit&& edit) {
   const auto session = sessionOf(context, request);
@@ -94,7 +94,7 @@ std::chrono::milliseconds pollTimeout(const Config& config, const net::Request& 
   const double most = std::chrono::duration<double>(config.pollTimeout).count();
   const double seconds = queryNumber(request, "timeout");
   if (seconds < 0)
-    throw ProtocolError(422, "", "query parameter timeout: expected seconds from 0, found less");
+    throw ProtocolError(422, "", "query parameter timeout: expected a number of seconds >= 0, found less");
   return std::chrono::milliseconds(std::int64_t(std::min(seconds, most) * 1000));
 }
 
@@ -160,7 +160,7 @@ net::Response pick(ApiContext& context, const net::Request& request) {
   const auto session = sessionOf(context, request);
   const auto found = session->waitForPick(pickQuery(request), context.config.pollTimeout, request.gone);
   if (!found && context.stopping) throw ProtocolError(503, "", "the server is stopping");
-  if (!found) throw ProtocolError(503, "", "the scene was not ready in time to be picked from");
+  if (!found) throw ProtocolError(503, "", "the scene was not ready for picking in time");
   return jsonResponse(200, *found);
 }
 
@@ -168,7 +168,8 @@ net::Response pick(ApiContext& context, const net::Request& request) {
 
 std::vector<Route> sessionRoutes(ApiContext& context) {
   const Parameter id{"id", "path", "string", "Id of the session"};
-  const Parameter ifMatch{"If-Match", "header", "string", "Revision that is edited; 409 when it is another"};
+  const Parameter ifMatch{"If-Match", "header", "string",
+                          "Revision that the edit is meant for; 409 if the scene is at another"};
   const std::vector<std::string> kJson{"application/json"};
   const std::string scenePath = "/api/v1/sessions/{id}/scene";
   std::vector<std::string> imageTypes;
@@ -177,7 +178,7 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
   return {
       {"POST",
        "/api/v1/sessions",
-       "Begins a session with the scene of the body's field scene, or the default's",
+       "Begins a session with the scene in the body's field scene, or with the default scene",
        {},
        "application/json",
        kJson,
@@ -241,12 +242,13 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
        }},
       {"GET",
        "/api/v1/sessions/{id}/frame",
-       "Waits for a picture of the scene as it is now; 204 when none came in time",
+       "Waits for a picture of the scene as it is now; 204 if none came in time",
        {id,
-        {"after", "query", "integer", "Number of the last frame seen; a newer one is waited for"},
-        {"minSamples", "query", "integer", "Samples per pixel that it has at least, unless it is final"},
+        {"after", "query", "integer", "Number of the last frame seen; waits for a newer one"},
+        {"minSamples", "query", "integer", "Least number of samples per pixel, unless the frame is final"},
         {"format", "query", "string", "jpeg (default), png or exr"},
-        {"aov", "query", "string", "Instead of the colours: depth, transmittance, channel or cost"},
+        {"aov", "query", "string",
+         "What to return instead of colours: depth, transmittance, channel or cost"},
         {"timeout", "query", "number", "Seconds to wait, at most 25, which is the default"}},
        "",
        imageTypes,
@@ -258,7 +260,7 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
        "What is visible at a pixel of the picture, or in a rectangle of it",
        {id,
         {"x", "query", "number", "Pixels from the picture's left edge"},
-        {"y", "query", "number", "Pixels from the picture's upper edge"},
+        {"y", "query", "number", "Pixels from the picture's top edge"},
         {"x2", "query", "number", "With y2: the rectangle's other corner"},
         {"y2", "query", "number", "With x2: the rectangle's other corner"}},
        "",

@@ -30,7 +30,7 @@ using nlohmann::json;
 constexpr std::string_view kNoPage =
     "Scolopax is running, but its page is not built.\n\n"
     "Build it with:  cd client_web && npm ci && npm run build\n"
-    "and load this address again, or use the interface under api/v1/ (see api/v1/openapi.json).\n";
+    "and reload this address, or use the HTTP interface under api/v1/ (see api/v1/openapi.json).\n";
 
 json named(const std::vector<protocol::EnumEntry>& entries) {
   json list = json::array();
@@ -89,7 +89,7 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
 
 }  // namespace
 
-// The order of members is the order of life: what is used stands before what uses it.
+// Members are in the order of their construction: what is used comes before what uses it.
 struct Application::Impl {
   Config config;
   Log log;
@@ -193,8 +193,8 @@ std::string Application::url() const {
 
 void Application::stop() {
   impl_->stopping = true;
-  // What waits is released at once; what renders has the grace to end by itself, since the network waits for
-  // its last handler.
+  // Requests that wait are released at once. Those that render get part of the grace to end by themselves,
+  // since the network waits for its last handler.
   std::jthread cut([this](const std::stop_token& stopped) {
     std::mutex mutex;
     std::unique_lock lock(mutex);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The server as a whole: owns data sets, sessions, both loops and the network, and starts and stops them in
-// order.
+// The server as a whole: owns the data sets, the sessions, both loops and the network, and starts and stops
+// them in order.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -15,18 +15,19 @@ namespace scolopax::server {
 
 class Application {
  public:
-  /// An empty token in `config` is replaced by a new one. `memory` must be the budget that the renderers
-  /// charge, too.
+  /// An empty token in `config` is replaced by a new random one. `memory` must be the budget that the
+  /// renderers of `makeRenderer` charge as well.
   Application(Config config, std::vector<Dataset> datasets, MakeRenderer makeRenderer,
               std::shared_ptr<MemoryBudget> memory, Log log);
   ~Application();  ///< stops at once
 
-  /// Throws net::NetError when the port cannot be had.
+  /// Throws net::NetError, for example when the port is taken.
   void start();
   std::uint16_t port() const;
-  /// Where the page is, with the token that opens it.
+  /// Address of the page, including the token that opens it.
   std::string url() const;
-  /// Takes no more, ends what waits and renders, closes streams, then returns. Safe to call twice.
+  /// Accepts no more connections, ends requests that wait and, after a grace period, those that render,
+  /// closes streams, then returns. Safe to call twice.
   void stop();
 
  private:

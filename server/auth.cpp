@@ -20,13 +20,13 @@ constexpr std::size_t kTokenBytes = 32;
 constexpr std::size_t kTokenMin = 16;
 constexpr std::size_t kTokenMax = 512;
 
-/// RFC 6750's b64token: what a Bearer header and a cookie can both carry.
+/// RFC 6750's b64token: characters that both a Bearer header and a cookie can carry.
 bool isTokenCharacter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
          std::string_view("-._~+/=").find(c) != std::string_view::npos;
 }
 
-/// An IPv4 address of this machine's own net, and not a name that only begins like one.
+/// An IPv4 loopback address, and not a name that only begins like one.
 bool isLoopbackAddress(std::string_view host) {
   return host.substr(0, 4) == "127." && host.find_first_not_of("0123456789.") == std::string_view::npos;
 }
@@ -36,9 +36,9 @@ bool isLoopbackAddress(std::string_view host) {
 std::string createToken() {
   std::array<unsigned char, kTokenBytes> bytes{};
   if (RAND_bytes(bytes.data(), static_cast<int>(bytes.size())) != 1) {
-    throw TokenError("cannot create a token: the system has no random numbers");
+    throw TokenError("cannot create a token: the system provides no random numbers");
   }
-  // Base64url (RFC 4648, 5): six bits a character, the last two bytes fill three.
+  // Base64url (RFC 4648, 5): six bits per character; the last two bytes fill three characters.
   constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
   std::string token;
   unsigned bits = 0;
@@ -95,7 +95,7 @@ Authorizer::Authorizer(std::string token, bool loopback, std::vector<std::string
 
 bool Authorizer::isHostAllowed(const net::Request& request) const {
   const std::string* host = request.header("Host");
-  if (!loopback_ || !host) return true;  // HTTP/1.0 without a Host is no browser
+  if (!loopback_ || !host) return true;  // no browser sends HTTP/1.0 without Host
   const auto authority = net::parseAuthority(*host);
   if (authority && isLoopback(authority->host)) return true;
   return std::any_of(allowedOrigins_.begin(), allowedOrigins_.end(),
@@ -155,7 +155,7 @@ bool Authorizer::knows(const net::Request& request) const {
 
 std::optional<net::Response> Authorizer::operator()(const net::Request& request) const {
   if (!isHostAllowed(request)) {
-    return problemResponse(421, "This server answers to localhost only; found another name in Host.");
+    return problemResponse(421, "This server answers to localhost only, but Host names another host.");
   }
   const bool reading = request.method == "GET" || request.method == "HEAD";
   if (reading && (request.path == "/healthz" || request.path == "/readyz")) return std::nullopt;
@@ -165,13 +165,14 @@ std::optional<net::Response> Authorizer::operator()(const net::Request& request)
     return std::nullopt;
   }
   if (hasCookie(request)) {
-    // The browser adds the cookie by itself, so that a write must also show that our own page made it.
+    // The browser adds the cookie by itself, so a write must also prove that it comes from the server's own
+    // page.
     if (reading || (request.header("Origin") && net::originAllowed(request, allowedOrigins_)))
       return std::nullopt;
-    return problemResponse(403, "A write with the cookie needs the Origin of this page.");
+    return problemResponse(403, "A write that is authorised by the cookie needs the Origin of this page.");
   }
-  net::Response response =
-      problemResponse(401, "A token is needed: open the URL that the server printed, or send it as Bearer.");
+  net::Response response = problemResponse(
+      401, "A token is needed: open the URL that the server printed, or send Authorization: Bearer TOKEN.");
   response.headers.emplace_back("WWW-Authenticate", "Bearer");
   return response;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who may use the server: one token per start, shown by header, cookie or URL. Put before every request and
-// upgrade as net::Options::authorize.
+// Access control: one token per start of the server, presented in a header, a cookie or the URL. Checked
+// before every request and upgrade, as net::Options::authorize.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -13,17 +13,20 @@
 
 namespace scolopax {
 
-/// A token file that cannot be used: the message names it and says why.
+/// A token file that cannot be used, or a token that cannot be created: the message says why, and names the
+/// file.
 class TokenError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// 256 random bits as 43 URL-safe characters.
+/// 256 random bits, encoded as 43 URL-safe characters. Throws TokenError when the system has no random
+/// numbers.
 std::string createToken();
-/// The file's one line; throws TokenError unless it is 16 to 512 letters, digits and -._~+/= (RFC 6750).
+/// The single line of the file. Throws TokenError unless it consists of 16 to 512 letters, digits and -._~+/=
+/// (RFC 6750).
 std::string readTokenFile(const std::string& path);
-/// In a time that depends on the lengths alone.
+/// Compares in a time that depends only on the lengths.
 bool sameToken(std::string_view a, std::string_view b);
 
 /// A refusal as application/problem+json (RFC 9457).
@@ -32,16 +35,17 @@ net::Response problemResponse(int status, const std::string& detail);
 /// Immutable and thread-safe.
 class Authorizer {
  public:
-  /// `loopback`: the server is bound to this machine only, so that a Host that is neither this machine nor
-  /// that of an allowed origin (a proxy in front) is DNS rebinding. `tls`: the cookie travels over nothing
-  /// else.
+  /// `loopback`: the server can be reached from this machine only. A Host header that names neither this
+  /// machine nor an allowed origin (of a proxy in front) is then taken for DNS rebinding and refused. `tls`:
+  /// the cookie is sent over https only.
   Authorizer(std::string token, bool loopback, std::vector<std::string> allowedOrigins = {},
              bool tls = false);
 
-  /// nullopt: go on. Otherwise 401, 403, 421, or the 303 that turns `GET /?token=` into a cookie.
+  /// nullopt: the request may proceed. Otherwise the answer: 401, 403 or 421, or, to `GET /?token=`, a 303
+  /// that sets the cookie.
   std::optional<net::Response> operator()(const net::Request& request) const;
 
-  /// Whether the request shows the token, in whatever way.
+  /// Whether the request carries the token, in any of the three ways.
   bool knows(const net::Request& request) const;
 
   const std::string& cookieName() const { return cookieName_; }
@@ -54,15 +58,15 @@ class Authorizer {
   net::Response cookieAndRedirect(const net::Request& request) const;
 
   std::string token_;
-  std::string cookieName_;  ///< cookies ignore ports: a hash of the token keeps two servers apart
+  std::string cookieName_;  ///< with a hash of the token, since cookies do not distinguish ports
   bool loopback_;
   std::vector<std::string> allowedOrigins_;
   bool tls_;
 };
 
-/// Whether `host` (an option's value) can be reached from this machine only.
+/// Whether a server bound to `host` (an option's value) can be reached only from this machine.
 bool isLoopback(std::string_view host);
-/// The URL that opens the page, for the ready line; a wildcard address becomes this machine's own.
+/// The URL that opens the page, for the ready line. A wildcard address is replaced by 127.0.0.1.
 std::string tokenUrl(std::string_view host, std::uint16_t port, std::string_view token, bool tls);
 
 }  // namespace scolopax

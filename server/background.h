@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Work that would hold up the thread of a loop: building scenes, encoding large pictures.
+// Jobs that would hold up the thread of a loop: building scenes, encoding large pictures.
 #pragma once
 #include <atomic>
 #include <functional>
@@ -20,11 +20,12 @@ class Background {
    public:
     explicit Job(Work work) : work_(std::move(work)) {}
     bool done() const;
-    /// Asks it to end early.
+    /// Requests an early end.
     void cancel() { stop_.request_stop(); }
-    /// Throws what the work threw. Once, and only when it is done.
+    /// Throws what the work threw, if anything. To be called once, when done().
     void rethrow() { result_.get(); }
-    /// For those who run it, once: what the work holds is gone before done() tells of it.
+    /// For implementations of Background, to be called once. Destroys the work, with all that it holds,
+    /// before done() becomes true.
     void run();
 
    private:
@@ -38,12 +39,12 @@ class Background {
   Background(const Background&) = delete;
   Background& operator=(const Background&) = delete;
   virtual ~Background() = default;
-  /// `ended` is called, on whatever thread, after done() has become true.
+  /// `ended` is called, on any thread, after done() has become true.
   virtual std::shared_ptr<Job> start(Work work, std::function<void()> ended) = 0;
 };
 
-/// Every job at once, on a thread of its own and of low priority: none waits for another's end. Where the
-/// system gives no thread, start() does the work itself.
+/// Starts every job at once, on its own thread of low priority: no job waits for another. If the system
+/// cannot create a thread, start() runs the job itself.
 class BackgroundThreads : public Background {
  public:
   ~BackgroundThreads() override;  ///< cancels the jobs and waits for them

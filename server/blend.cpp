@@ -8,13 +8,14 @@
 namespace scolopax::server {
 namespace {
 
-/// Two neighbours on a side and the share of the second.
+/// Two neighbouring pixels along an axis, and the weight of the second.
 struct Between {
   int first, second;
   float share;
 };
 
-/// Where pixel `i` of `full` lies among `count` pixels, each as large as `1 / scale` of the full ones.
+/// The position of pixel `i` of `full` among `count` pixels, each `1 / scale` times as large as the full
+/// ones.
 Between between(int i, int full, int count, double scale) {
   const double at = std::clamp((i + 0.5 - 0.5 * full) * scale + 0.5 * count - 0.5, 0.0, double(count - 1));
   const int first = std::min(int(at), std::max(0, count - 2));

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a picture at rest, noisy at first, takes over from the small one that was shown while edits arrived:
-// mixed in the proportion of least error, so that no picture looks worse than the one before. Between
+// Blends the picture at rest, which is noisy at first, with the reduced picture that was shown while edits
+// arrived. The weights minimise the error, so no picture looks worse than the one before it. Comes between
 // Film's image and the encoder.
 #pragma once
 #include "renderer/data/image.h"
 
 namespace scolopax::server {
 
-/// The same view at another size: same centre and vertical angle; linear between the centres of pixels,
-/// constant beyond the outer ones.
+/// The same view at another size, with the same centre and vertical angle of view. Linear interpolation
+/// between pixel centres, constant beyond the outer ones.
 Image enlarged(const Image& image, int width, int height);
 
-/// Mixes `before`, of the same size, into `image` and returns the share that `image` has in it, in [0, 1].
-/// The errors of the two are taken to be independent: their squares add up to the mean squared difference, so
-/// with `error`, the RMSE of `image`, that of `before` is known as well, and with it the proportion of least
-/// error.
+/// Mixes `before`, of the same size, into `image` and returns the weight of `image` in the result, in [0, 1].
+/// The errors of both pictures are assumed to be independent, so the sum of their squares is the mean squared
+/// difference of the pictures. Given `error`, the RMSE of `image`, that of `before` follows, and with it the
+/// weights of least error.
 double mixIn(const Image& before, double error, Image* image);
 
 }  // namespace scolopax::server

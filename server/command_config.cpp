@@ -5,7 +5,7 @@
 
 namespace scolopax {
 
-// CLI11's own set_config lets the file win over the environment.
+// CLI11's own set_config gives the file precedence over the environment.
 void applyConfigFile(CLI::App& command, const std::string& file) {
   for (const CLI::ConfigItem& item : CLI::ConfigTOML().from_file(file)) {
     if (item.name == "++" || item.name == "--") continue;  // begin and end of a section

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// All that can be set when the server starts, with its defaults. Filled by commands/serve.
+// Everything that can be set when the server starts, with its defaults. Filled in by commands/serve.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -13,7 +13,7 @@ struct Config {
   std::string host = "127.0.0.1";
   std::uint16_t port = 8080;                ///< 0: any free one
   std::string certificateFile, keyFile;     ///< PEM; empty: no TLS
-  std::string token;                        ///< empty: a new one each start
+  std::string token;                        ///< empty: a new random one at each start
   int threads = 0;                          ///< for rendering; 0: all
   std::string webRoot;                      ///< folder of the built page; empty: none
   std::vector<std::string> allowedOrigins;  ///< other than the server's own
@@ -21,14 +21,14 @@ struct Config {
   std::size_t maxSessions = 32;
   std::size_t maxClients = 64;                            ///< streams at once
   std::uint64_t maxPixels = 16'777'216;                   ///< of one picture
-  std::uint64_t maxMemoryBytes = std::uint64_t{4} << 30;  ///< of all that requests make the server take
+  std::uint64_t maxMemoryBytes = std::uint64_t{4} << 30;  ///< for everything that requests allocate
   double maxRenderSeconds = 60;                           ///< of one POST /render
   int maxRenders = 2;                                     ///< POST /render at once
   std::size_t maxBodyBytes = std::size_t{1} << 20;
   std::size_t maxMessageBytes = std::size_t{1} << 20;
   std::size_t maxJsonDepth = 32;
-  std::uint32_t sessionSamples = 4096;  ///< of a session without a stop rule
-  std::uint32_t renderSamples = 64;     ///< of a POST /render without one
+  std::uint32_t sessionSamples = 4096;  ///< for a session without a stop rule
+  std::uint32_t renderSamples = 64;     ///< for a POST /render without a stop rule
   std::chrono::milliseconds keepSession{300'000};
   std::chrono::milliseconds pollTimeout{25'000};
   std::chrono::milliseconds stopGrace{3'000};

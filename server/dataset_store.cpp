@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Throws ProtocolError(422) when there is none.
+/// Throws ProtocolError(422) if there is no such channel.
 const Channel& channelOf(const Dataset& dataset, int channel) {
   const auto channels = dataset.volume->channels();
   if (channel < 0 || std::size_t(channel) >= channels.size())
@@ -35,7 +35,7 @@ double voxelValue(const Channel& channel, std::size_t index) {
   return channel.slope * stored + channel.intercept;
 }
 
-/// Trilinear at a voxel position inside the outer voxel centres.
+/// Interpolates trilinearly at a voxel position between the outer voxel centres.
 double interpolate(const Channel& channel, const glm::ivec3& dims, const glm::dvec3& voxel) {
   double sum = 0;
   for (int corner = 0; corner < 8; ++corner) {
@@ -48,7 +48,7 @@ double interpolate(const Channel& channel, const glm::ivec3& dims, const glm::dv
       index += std::size_t(std::min(int(low) + upper, dims[axis] - 1)) * stride;
       stride *= std::size_t(dims[axis]);
     }
-    // Also with weight 0, as in the renderer: one corner that is not finite makes the sample so.
+    // Even with weight 0, as in the renderer: one corner that is not finite makes the sample not finite.
     sum += weight * voxelValue(channel, index);
   }
   return sum;
@@ -88,7 +88,7 @@ DatasetStore::Gradients DatasetStore::measuredGradients(const Dataset& dataset, 
   if (Gradients known = gradients(dataset, channel)) return known;
   Gradients measured = sharedGradientHistogram(dataset.volume, channel, stop, memory_);
   const std::lock_guard lock(mutex_);
-  if (Gradients known = kept(dataset, channel)) return known;  // another has waited for the same
+  if (Gradients known = kept(dataset, channel)) return known;  // another thread measured the same
   gradients_.push_front({&dataset, channel, measured});
   if (gradients_.size() > kMostGradients) gradients_.pop_back();
   return measured;
@@ -102,7 +102,7 @@ std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesys
   if (error) throw Error(ErrorCode::notFound, "--data-root " + root.string() + ": " + error.message());
   std::vector<std::filesystem::path> below;
   for (const auto& path : paths) {
-    // Links are followed first, so that none leads out.
+    // Symbolic links are resolved first, so that none leads outside.
     const auto whole = std::filesystem::weakly_canonical(base / path);
     const auto relative = whole.lexically_relative(base);
     if (relative.empty() || *relative.begin() == "..")

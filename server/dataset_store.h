@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The data sets named on the command line, loaded once, and what clients may ask about them.
+// The data sets named on the command line, which are loaded once, and the answers to requests about them.
 #pragma once
 #include <filesystem>
 #include <list>
@@ -23,26 +23,28 @@ using Dataset = io::LoadedDataset;
 /// Every function may be called from any thread.
 class DatasetStore {
  public:
-  /// At least one. What is measured later is of `memory`, if that is given.
+  /// `datasets` must not be empty: otherwise throws Error(badInput). Memory for later measurements is charged
+  /// to `memory`, if given.
   explicit DatasetStore(std::vector<Dataset> datasets, std::shared_ptr<MemoryBudget> memory = nullptr);
 
   const std::shared_ptr<const Dataset>& first() const { return datasets_.front(); }
-  /// nullptr when there is none of that id.
+  /// nullptr if no data set has this id.
   std::shared_ptr<const Dataset> find(std::string_view id) const;
   const std::vector<std::shared_ptr<const Dataset>>& all() const { return datasets_; }
 
   using Gradients = std::shared_ptr<const GradientHistogram>;
-  /// 64 MiB; more than several scenes of 32 channels need at once.
+  /// Histograms kept: 64 MiB, enough for several scenes of 32 channels at once.
   static constexpr std::size_t kMostGradients = 128;
-  /// Of a channel of a data set of the store; nullptr where they are yet to be measured. Throws
-  /// ProtocolError(422) when there is no such channel.
+  /// The gradient histogram of a channel of one of the store's data sets; nullptr if it has not been measured
+  /// yet. Throws ProtocolError(422) if there is no such channel.
   Gradients gradients(const Dataset& dataset, int channel) const;
-  /// The same, which waits until they are measured. The last kMostGradients that were asked for are kept.
-  /// Throws also Error: cancelled once `stop` is requested, busy and tooLarge where there is no memory.
+  /// The same, but measures it first if necessary. The kMostGradients histograms requested last are kept.
+  /// Also throws Error: cancelled once `stop` is requested, busy and tooLarge when there is not enough
+  /// memory.
   Gradients measuredGradients(const Dataset& dataset, int channel, const std::stop_token& stop) const;
 
  private:
-  /// With the mutex held; nullptr where they are not kept.
+  /// Requires the mutex. nullptr if this histogram is not kept.
   Gradients kept(const Dataset& dataset, int channel) const;
 
   std::vector<std::shared_ptr<const Dataset>> datasets_;
@@ -53,25 +55,25 @@ class DatasetStore {
     Gradients gradients;
   };
   mutable std::mutex mutex_;               ///< never held while measuring
-  mutable std::list<Measured> gradients_;  ///< the last asked for in front
+  mutable std::list<Measured> gradients_;  ///< the most recently requested first
 };
 
-/// The files to load: each path as it is, or, with a data root, below it. Throws Error when one leaves the
-/// root.
+/// The files to load: each path unchanged or, with a data root, relative to and below it. Throws Error if a
+/// path leads outside the root.
 std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesystem::path>& paths,
                                                   const std::filesystem::path& root);
 
-/// Grid and channels of one data set, as GET /datasets/{id} answers.
+/// Grid and channels of one data set, as in the answer to GET /datasets/{id}.
 nlohmann::json describeJson(const Dataset& dataset);
-/// 256 bins over the finite values. Throws ProtocolError(422) when there is no such channel.
+/// Histogram with 256 bins over the finite values. Throws ProtocolError(422) if there is no such channel.
 nlohmann::json histogramJson(const Dataset& dataset, int channel);
-/// The same of |gradient|, from 0 on; with `joint` also for every bin of values.
+/// The same for |gradient|, from 0 up; with `joint`, additionally for every bin of values.
 nlohmann::json gradientHistogramJson(const Dataset& dataset, int channel, const GradientHistogram& gradients,
                                      bool joint);
-/// Data values of all channels at a voxel position in the box, trilinear between voxel centres as the
-/// renderer interpolates; null where a corner is not finite.
+/// Data values of all channels at a voxel position inside the box, interpolated trilinearly between voxel
+/// centres as the renderer does; null where any of the eight voxels is not finite.
 nlohmann::json valuesJson(const Volume& volume, const glm::dvec3& voxel);
-/// The same at a world point; a channel is null outside the box too.
+/// The same at a world point; outside the box all values are null.
 nlohmann::json probeJson(const Dataset& dataset, double x, double y, double z);
 
 }  // namespace scolopax::server

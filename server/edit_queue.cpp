@@ -13,9 +13,9 @@ void EditQueue::push(Edit edit) {
     const std::lock_guard lock(mutex_);
     if (!roomFor(edit))
       throw protocol::ProtocolError(429, "",
-                                    "expected at most " + std::to_string(kMaxEdits) + " edits or " +
+                                    "the limit of " + std::to_string(kMaxEdits) + " edits or " +
                                         std::to_string(kMaxBytes) +
-                                        " bytes of them to wait in a stream, found more");
+                                        " bytes of them waiting in one stream is reached; retry later");
     bytes_ += edit.bytes;
     ++count_;
     waiting_.push_back(std::move(edit));
@@ -39,7 +39,7 @@ void EditQueue::end() {
 
 void EditQueue::abandon(const Edit& edit) {
   edit.failed(std::make_exception_ptr(
-      protocol::ProtocolError(409, "", "the stream has left the session in which this edit had to wait")));
+      protocol::ProtocolError(409, "", "the stream left the session while this edit was waiting")));
   done(edit);
 }
 
@@ -64,7 +64,7 @@ std::optional<EditQueue::Edit> EditQueue::next() {
   return edit;
 }
 
-/// False when the first that is left has to wait.
+/// False if the next edit has to wait.
 bool EditQueue::applyAll() {
   while (auto edit = next()) {
     const std::lock_guard applying(applying_);

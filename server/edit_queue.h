@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One client's edits in their order. Those that need data measured wait for it, and hold up neither a thread
-// of the network nor the messages that come behind them.
+// One client's edits, in order. An edit that needs measurements of the data waits for them, but blocks
+// neither a network thread nor the client's other messages.
 #pragma once
 #include <cstddef>
 #include <deque>
@@ -18,23 +18,24 @@ namespace scolopax::server {
 
 class EditQueue : public std::enable_shared_from_this<EditQueue> {
  public:
-  /// Edits that may wait at once, and their bytes, unless there is but one.
+  /// Limits on the edits that may wait at once, and on their total bytes. A single edit may exceed the
+  /// latter.
   static constexpr std::size_t kMaxEdits = 256, kMaxBytes = 256 << 10;
 
   struct Edit {
-    std::function<void()> apply;                     ///< throws Unmeasured as long as it has to wait
-    std::function<void(std::exception_ptr)> failed;  ///< told what else it throws; must not throw
-    std::size_t bytes = 0;                           ///< as it came
+    std::function<void()> apply;                     ///< throws Unmeasured while it has to wait
+    std::function<void(std::exception_ptr)> failed;  ///< gets apply()'s other exceptions; must not throw
+    std::size_t bytes = 0;                           ///< size of the edit's message
   };
 
-  /// `background` must outlive what the queue does.
+  /// `background` must outlive all work of the queue.
   explicit EditQueue(Background& background) : background_(background) {}
 
-  /// Applies the edit, here, unless it or one before it has to wait; then it is applied later, in the
-  /// background. Throws ProtocolError(429) when too many wait.
+  /// Applies the edit on the calling thread, unless it or one before it has to wait; it is then applied
+  /// later, in the background. Throws ProtocolError(429) when too many edits wait.
   void push(Edit edit);
-  /// Fails what waits and stops its measuring. No edit is applied after this returns, and nothing may be
-  /// pushed.
+  /// Fails the edits that wait and cancels their measurement. After this returns, no edit is applied and none
+  /// may be pushed.
   void end();
 
  private:
@@ -49,10 +50,10 @@ class EditQueue : public std::enable_shared_from_this<EditQueue> {
   std::stop_source ended_;
   std::mutex applying_;  ///< held while an edit is applied; taken before mutex_
 
-  std::mutex mutex_;                   ///< of what follows
-  std::deque<Edit> waiting_;           ///< the oldest first, but for the one that is being applied
-  std::size_t count_ = 0, bytes_ = 0;  ///< of all that were pushed and are not done
-  bool atWork_ = false;                ///< one thread is applying edits; it owns missing_
+  std::mutex mutex_;                   ///< guards the members below
+  std::deque<Edit> waiting_;           ///< oldest first, without the one being applied
+  std::size_t count_ = 0, bytes_ = 0;  ///< of all edits pushed and not yet done
+  bool atWork_ = false;                ///< a thread is applying edits; it owns missing_
   std::optional<Unmeasured> missing_;
 };
 

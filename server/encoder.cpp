@@ -11,13 +11,13 @@
 namespace scolopax::server {
 namespace {
 
-constexpr int kMaxSide = 65500;  // of libjpeg's JPEG_MAX_DIMENSION
+constexpr int kMaxSide = 65500;  // libjpeg's JPEG_MAX_DIMENSION
 
 struct DestroyHandle {
   void operator()(void* handle) const { tjDestroy(handle); }
 };
 
-// A handle may be used by one thread at a time and is costly to make: one per thread.
+// A handle may be used by only one thread at a time and is costly to create, hence one per thread.
 tjhandle threadCompressor() {
   thread_local const std::unique_ptr<void, DestroyHandle> handle(tjInitCompress());
   if (!handle) throw Error(ErrorCode::io, std::string("JPEG encoder: ") + tjGetErrorStr2(nullptr));
@@ -27,8 +27,8 @@ tjhandle threadCompressor() {
 }  // namespace
 
 std::uint64_t jpegMemory(std::uint64_t pixels) {
-  // The library's bound is 6 bytes a pixel of a picture whose sides are rounded up, and what is made of it is
-  // copied.
+  // 3 bytes a pixel for the 8-bit picture, 6 for the library's upper bound (which rounds the sides up), and 2
+  // for the copy of the result.
   return pixels * (3 + 6 + 2) + (1 << 16);
 }
 
@@ -46,11 +46,12 @@ std::vector<std::uint8_t> encodeJpeg(const Image8& image, int quality, ChromaSam
   unsigned char* begin = bytes.data();
   auto size = static_cast<unsigned long>(bytes.size());
   const tjhandle handle = threadCompressor();
-  // NOREALLOC: the buffer is the library's own upper bound, so it always fits and stays ours.
+  // NOREALLOC: the buffer has the library's own upper bound as its size, so the result always fits and is
+  // never moved to another buffer.
   if (tjCompress2(handle, image.rgb.data(), image.width, 0, image.height, TJPF_RGB, &begin, &size,
                   subsampling, quality, TJFLAG_NOREALLOC) != 0)
     throw Error(ErrorCode::io, std::string("JPEG encoder: ") + tjGetErrorStr2(handle));
-  return {bytes.begin(), bytes.begin() + std::ptrdiff_t(size)};  // the bound is many times as large
+  return {bytes.begin(), bytes.begin() + std::ptrdiff_t(size)};  // the bound is many times larger
 }
 
 }  // namespace scolopax::server

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// 8-bit pictures to JPEG by libjpeg-turbo. Comes after Film and toSrgb8; goes to frames and responses.
+// Encodes 8-bit pictures as JPEG with libjpeg-turbo. Comes after Film and toSrgb8; the result goes into
+// frames and responses.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -10,11 +11,12 @@ namespace scolopax::server {
 
 enum class ChromaSampling { full444, half420 };
 
-/// Memory that encoding a picture of so many pixels takes, its 8-bit form included.
+/// Memory, in bytes, that encoding a picture of `pixels` pixels takes, including the 8-bit picture.
 std::uint64_t jpegMemory(std::uint64_t pixels);
 
-/// JPEG bytes (JFIF, sRGB values as given). `quality` in [1,100]. The same picture gives the same bytes.
-/// Throws Error(badInput) for an empty picture and Error(tooLarge) for one JPEG cannot hold (65500 a side).
+/// A JPEG file (JFIF, sRGB values as given). `quality` is in [1, 100]. The same picture always gives the same
+/// bytes. Throws Error: badInput for an empty picture, tooLarge for one that JPEG cannot hold (more than
+/// 65500 pixels on a side).
 std::vector<std::uint8_t> encodeJpeg(const Image8& image, int quality, ChromaSampling sampling);
 
 }  // namespace scolopax::server

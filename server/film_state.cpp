@@ -7,7 +7,7 @@
 namespace scolopax::server {
 
 bool FilmState::stale(const RenderRequest& request) const {
-  // Back to full resolution when edits have stopped, in steps; a film that already has it goes on.
+  // When edits have stopped, the resolution returns to full in steps; a film that already has it continues.
   const bool finerDue = divisor != 1 && (small || restShown || !request.pollSamples.empty());
   return !scene || request.revision != revision || (!request.interactive && finerDue) ||
          (request.aovs && !recording);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What one session's film shows, how far its pass is, and what of it has been shown: from these and the clock
-// it follows what is to be done next. Kept by ProgressiveRender.
+// State of one session's film: the scene that it shows, how far its pass has come, and the last frame shown.
+// Together with the clock, it determines what to do next. Kept by ProgressiveRender.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -18,32 +18,33 @@ struct FilmProgress {
 };
 
 struct FilmState {
-  std::shared_ptr<const ResolvedScene> scene;  ///< that the film shows; null before the first
+  std::shared_ptr<const ResolvedScene> scene;  ///< the scene that the film shows; null before the first
   std::uint32_t revision = 0;                  ///< of that scene
   double divisor = 1;                          ///< of width and height
   bool recording = false;                      ///< the renderer keeps AOVs
   bool small = false;                          ///< the film was begun while edits arrived
-  bool restShown = false;                      ///< the film has been shown since they stopped
+  bool restShown = false;                      ///< the film has been shown since edits stopped
 
-  bool unfinished = false;  ///< a pass has begun and was interrupted, or has used up its slice
-  bool abandoned = false;   ///< the pass before it was given up for a newer scene
+  bool unfinished = false;  ///< a pass was interrupted or has used up its slice
+  bool abandoned = false;   ///< the previous pass was abandoned for a newer scene
   TimePoint passBegan;
   double passSeconds = 0;  ///< spent on the pass so far
 
   FrameInfo shown;                  ///< the last frame handed in; revision 0 before the first
-  std::uint32_t shownFailures = 0;  ///< of the session, when it was made
+  std::uint32_t shownFailures = 0;  ///< the session's failures when that frame was made
   TimePoint shownAt;
 
-  /// Whether the film is not, or no longer, the one to go on with.
+  /// Whether the request needs a new film: for another scene, a finer resolution, or AOVs.
   bool stale(const RenderRequest& request) const;
-  /// Whether a pass whose scene is stale goes on all the same, for a while: the first of a small picture, and
-  /// of one that follows an abandoned pass. However fast edits come, pictures are shown between them.
+  /// Whether a pass whose scene is stale continues, up to RenderPolicy::shield: the first pass of a film
+  /// begun while edits arrived, and the first after an abandoned pass. So pictures are shown however fast
+  /// edits come.
   bool keepsPass(const RenderRequest& request, const RenderPolicy& policy, TimePoint now) const;
-  /// Whether somebody waits for the first picture that has an edit in it.
+  /// Whether edits arrive and the newest one has not been shown yet.
   bool firstOfEdit(const RenderRequest& request) const;
-  /// Whether that picture turns out to cost much more than the passes before it.
+  /// Whether that picture takes longer than RenderPolicy::tooLate and can be restarted at a lower resolution.
   bool lateForEdit(const RenderRequest& request, const RenderPolicy& policy) const;
-  /// Whether the film as it stands is worth a frame.
+  /// Whether a frame should be made of the film in its present state.
   bool showDue(const RenderRequest& request, const FilmProgress& film, const RenderPolicy& policy,
                TimePoint now) const;
 };

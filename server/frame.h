@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A session's picture on its way out: rendered (float), then encoded (JPEG beside the float image).
+// A session's picture on its way to the viewers: first rendered (float), then encoded (JPEG, which the float
+// image accompanies).
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -17,18 +18,18 @@ using TimePoint = std::chrono::steady_clock::time_point;
 /// The steady clock, or a test's own.
 using Now = std::function<TimePoint()>;
 
-/// What is known of a frame; the wire's header says the same.
+/// Metadata of a frame; most of it is also in the frame header on the wire.
 struct FrameInfo {
-  std::uint32_t number = 0;           ///< counts a session's encoded frames from 1; 0 until it is encoded
-  std::uint32_t revision = 0;         ///< of the scene it shows: one, never a mixture
+  std::uint32_t number = 0;           ///< counts a session's encoded frames from 1; 0 before encoding
+  std::uint32_t revision = 0;         ///< of the scene that it shows; a frame never mixes two scenes
   std::uint32_t samples = 0;          ///< per pixel
   Method method = Method::automatic;  ///< that was used
   float error = 0;  ///< estimated RMSE over linear premultiplied RGBA; NaN below two samples
   std::uint32_t rebuildUs = 0, renderUs = 0,
                 encodeUs = 0;  ///< the last rebuild, the last pass, this encoding
-  bool interactive = false;    ///< made while edits arrive, or soon after: maybe smaller
+  bool interactive = false;    ///< made while edits arrive or soon after; may be reduced
   bool reduced = false;        ///< smaller than the scene's picture; to be enlarged
-  bool mixed = false;          ///< with the reduced picture before it, see blend.h; not for scripts
+  bool mixed = false;          ///< blended with the reduced picture before it (blend.h); not given to scripts
   bool final = false;          ///< the stop rule is met: nothing better follows at this revision
 };
 
@@ -37,7 +38,7 @@ struct RenderedFrame {
   FrameInfo info;
   std::shared_ptr<const Image> image;
   glm::vec3 background{0};
-  std::shared_ptr<const std::vector<AovValues>> aovs;  ///< in the list's order; null where nobody has asked
+  std::shared_ptr<const std::vector<AovValues>> aovs;  ///< in the order of kAovs; null if not requested
 };
 
 /// One encoding serves every viewer of a session.

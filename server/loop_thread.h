@@ -13,14 +13,14 @@ namespace scolopax::server {
 
 class LoopThread {
  public:
-  /// Returns when it wants to run again: a past time is at once, nothing is when it is woken.
+  /// Returns when to run again: a time in the past means at once, nullopt means when woken.
   using Step = std::function<std::optional<TimePoint>()>;
 
   ~LoopThread() { stop(); }
   void start(Step step);
-  /// From any thread; a call during a step makes it run once more.
+  /// From any thread. A call during a step makes the loop run another one.
   void wake();
-  /// Ends after the step that runs. Safe to call twice.
+  /// Ends the loop after the current step and waits for its thread. Safe to call twice.
   void stop();
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// scolopax: the program. Each command is a file of commands/; this one maps failures to exit statuses.
+// scolopax: the program. Each command is a file in commands/; this file maps failures to exit statuses.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -18,10 +18,10 @@
 
 namespace {
 
-constexpr int kFailed = 1;    // what was asked for could not be done
-constexpr int kBadUsage = 2;  // what was asked for is not clear
+constexpr int kFailed = 1;    // the command failed
+constexpr int kBadUsage = 2;  // the command line is invalid
 
-/// The word that stands where a command is expected; empty when that is not what is wrong.
+/// The word that stands where a command is expected; empty if something else is wrong.
 std::string unknownCommand(const CLI::App& app) {
   const CLI::App* last = &app;
   while (!last->get_subcommands().empty()) last = last->get_subcommands().front();
@@ -29,7 +29,7 @@ std::string unknownCommand(const CLI::App& app) {
   return last->get_require_subcommand_min() == 0 || words.empty() ? "" : words.front();
 }
 
-/// Which variable of the environment a bad value came from; empty for none.
+/// The environment variable that a bad value came from; empty if it came from elsewhere.
 std::string variableAtFault(const CLI::App& app, const std::string& message) {
   for (const CLI::App* command : app.get_subcommands()) {
     for (const CLI::Option* option : command->get_options()) {
@@ -51,7 +51,7 @@ int main(int argc, char** argv) {
       "scolopax"};
   app.set_version_flag("--version", SCOLOPAX_VERSION);
   app.require_subcommand(1);
-  app.footer("scolopax COMMAND --help tells more. Start with: scolopax generate orbitals orbitals.nrrd");
+  app.footer("Run scolopax COMMAND --help for details. Start with: scolopax generate orbitals orbitals.nrrd");
   scolopax::addServeCommand(app);
   scolopax::addRenderCommand(app);
   scolopax::addInfoCommand(app);

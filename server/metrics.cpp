@@ -37,13 +37,14 @@ struct Metrics::Impl {
   Counter& renderSeconds = counter("scolopax_render_seconds_total", "Time spent in sample passes");
   Counter& rebuildSeconds = counter("scolopax_rebuild_seconds_total", "Time spent taking over edited scenes");
   Counter& built = counter("scolopax_builds_total", "Scenes built off the render thread");
-  Counter& abandoned = counter("scolopax_builds_abandoned_total", "Of which given up before their end");
+  Counter& abandoned =
+      counter("scolopax_builds_abandoned_total", "Scenes built off the render thread, but abandoned");
   Gauge& sessions = gauge("scolopax_sessions", "Sessions");
   Gauge& clients = gauge("scolopax_clients", "Open streams");
-  Gauge& memoryLimit = gauge("scolopax_memory_limit_bytes", "What requests may take of memory");
+  Gauge& memoryLimit = gauge("scolopax_memory_limit_bytes", "Limit on the memory that requests use");
   prometheus::Family<Gauge>& memory = prometheus::BuildGauge()
                                           .Name("scolopax_memory_bytes")
-                                          .Help("What they take, by use")
+                                          .Help("Memory that requests use, by kind of use")
                                           .Register(registry);
 };
 

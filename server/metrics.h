@@ -15,7 +15,7 @@ class Metrics {
   ~Metrics();
   void requestAnswered(int status);
   void passEnded(const PassResult& pass);
-  /// A stream's own counts since it was asked last.
+  /// Adds a stream's counts since they were last collected.
   void framesSent(std::uint64_t sent, std::uint64_t replaced);
   void setSessions(std::size_t count);
   void setClients(std::size_t count);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a pass over a picture costs by its size, learnt from the passes before it. Used by ResolutionPolicy.
+// The cost of a sample pass as a function of the picture's size, learnt from earlier passes. Used by
+// ResolutionPolicy.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -8,22 +9,24 @@
 
 namespace scolopax::server {
 
-/// seconds = fixed + perPixel * pixels: a line through recent passes, neither part negative. A pass that was
-/// disturbed hardly moves it; two in a row that agree and contradict older ones replace them.
+/// seconds = fixed + perPixel * pixels: a line fitted to recent passes, neither part negative. A single pass
+/// that was disturbed hardly moves it; two consecutive passes that agree replace the older ones that they
+/// contradict.
 class PassCost {
  public:
   /// A pass over `pixels` (above 0) took `seconds` (0 or more).
   void add(std::uint64_t pixels, double seconds);
-  /// A pass was given up after `seconds`. Longer than expected: it is taken to have been half done, until the
-  /// next pass that ends tells.
+  /// A pass was abandoned after `seconds`. If that is longer than expected, the pass is assumed to have been
+  /// half done, until the next complete pass.
   void addUnfinished(std::uint64_t pixels, double seconds);
-  /// Whether seconds() says anything.
+  /// Whether anything has been learnt yet.
   bool known() const { return count_ > 0 || late_; }
-  /// What is to be expected of a pass over `pixels`; 0 where nothing is known.
+  /// The expected time of a pass over `pixels`; 0 if nothing is known.
   double seconds(std::uint64_t pixels) const;
-  /// Of the largest recent picture; 0 where there is none. Beyond it the line is a guess.
+  /// Pixels of the largest recent picture, 0 if there is none. For larger pictures the line is an
+  /// extrapolation.
   double largestPixels() const;
-  /// Whether all passes that are remembered, as many as can be, were of one size: the fixed part is not
+  /// Whether as many passes are remembered as possible and all were of one size: then the fixed part is not
   /// known.
   bool oneSize() const;
   double fixedSeconds() const { return fixed_; }
@@ -42,7 +45,7 @@ class PassCost {
 
   std::array<Pass, kRecent> passes_{};  ///< the newest last
   std::size_t count_ = 0;
-  std::optional<Pass> late_;  ///< given up, and slower than the line
+  std::optional<Pass> late_;  ///< an abandoned pass that was slower than the line
   double fixed_ = 0, perPixel_ = 0;
 };
 

@@ -17,7 +17,7 @@ namespace {
 using nlohmann::json;
 using protocol::ProtocolError;
 
-/// The pixel that a coordinate lies in.
+/// The pixel that a coordinate lies in. Throws ProtocolError(422) outside the picture.
 int pixelOf(const std::string& name, double coordinate, int size) {
   if (!(coordinate >= 0 && coordinate < size))
     throw ProtocolError(422, "/" + name,
@@ -85,7 +85,7 @@ void PickTurn::run(const PendingPick& pick, const ResolvedScene& scene, std::uin
   PickAnswer answer;
   try {
     if (!picking_ || id_ != pick.id) {
-      // The picture may have become smaller since the question was put.
+      // The picture may have become smaller since the query came.
       const PixelArea area = areaOf(pick.query, scene.render.width, scene.render.height);
       picking_ = renderer.pick(scene.render, area);
       id_ = pick.id;

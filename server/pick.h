@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is visible at a pixel or in a rectangle of a session's picture: the question, and its answer by the
-// render thread. Between Session, which keeps the questions, and Renderer.
+// Picking: what is visible at a pixel or in a rectangle of a session's picture. Session keeps the queries,
+// and the render thread answers them with the Renderer.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -22,21 +22,23 @@ namespace scolopax::server {
 
 class Session;
 
-/// Pixels of the session's picture from its top left corner; with x2 and y2 the rectangle from one to the
-/// other, in any order, both included.
+/// A position in the session's picture, in pixels from its top left corner. With x2 and y2, the rectangle
+/// between the two corners, given in any order and both included.
 struct PickQuery {
   double x = 0, y = 0;
   std::optional<double> x2 = {}, y2 = {};
 };
 
-/// Throws ProtocolError(422) with the pointer of a coordinate that is missing or outside of the picture.
+/// The pixels that a query covers. Throws ProtocolError(422) with the pointer of a coordinate that is missing
+/// or outside the picture.
 PixelArea areaOf(const PickQuery& query, int width, int height);
 
-/// An answer as the protocol has it: of a pixel, or a list of a rectangle's, each voxel once.
+/// The answer in the protocol's form: one hit for a pixel, or a list of hits for a rectangle, each voxel
+/// once.
 nlohmann::json pickedJson(const ResolvedScene& scene, std::uint32_t revision, const PickQuery& query,
                           const std::vector<Picked>& found);
 
-/// What was found, or why nothing could be: an Error or a ProtocolError.
+/// What was found, or why the pick failed: an Error or a ProtocolError.
 struct PickAnswer {
   nlohmann::json found = {};
   std::exception_ptr failure = {};
@@ -49,13 +51,15 @@ struct PendingPick {
   PickQuery query;
 };
 
-/// The pick that a session's renderer is at.
+/// The pick that a session's renderer is working on.
 class PickTurn {
  public:
-  /// Goes on with a pick, or begins it, and tells the session when it is done. The renderer has the scene.
+  /// Begins or continues a pick for at most `slice`, and gives the session the answer when it is complete.
+  /// The renderer must have the scene.
   void run(const PendingPick& pick, const ResolvedScene& scene, std::uint32_t revision,
            const Renderer& renderer, std::chrono::nanoseconds slice, Session& session);
-  /// Before the renderer takes another scene, or goes: what was begun begins anew.
+  /// To be called before the renderer takes another scene or is destroyed: a pick in progress will start
+  /// over.
   void forget() { picking_.reset(); }
 
  private:

@@ -36,7 +36,7 @@ ProgressiveRender::~ProgressiveRender() {
   dropRenderer();
 }
 
-/// Memory of large films takes its time to be given back.
+/// Releasing the memory of a large film takes time, so it is done in the background.
 void ProgressiveRender::dropRenderer() {
   pick_.forget();
   film_.scene.reset();
@@ -47,7 +47,7 @@ void ProgressiveRender::dropRenderer() {
   renderer_.reset();
 }
 
-/// Whether the renderer has the scene that a pick asks about, and is not at work on another.
+/// Whether there is a pick and the renderer has its scene and is not building another.
 bool ProgressiveRender::pickable(const RenderRequest& request) const {
   return request.pick && film_.scene && !taking_ && film_.revision == request.revision;
 }
@@ -75,10 +75,10 @@ bool ProgressiveRender::edited() const {
 }
 
 std::optional<TimePoint> ProgressiveRender::dueAt() const {
-  if (job_) return std::nullopt;  // whose end wakes the loop
+  if (job_) return std::nullopt;  // its end wakes the loop
   const RenderRequest request = session_->request();
   if (!request.wanted || request.retryAt) return request.retryAt;
-  // Also when the end has just passed, between work() and here: then it is due at once.
+  // Even if the end has just passed, between work() and here: it is then due at once.
   if (request.interactive || film_.shown.interactive) return request.interactiveEnd;
   return std::nullopt;
 }
@@ -165,7 +165,7 @@ void ProgressiveRender::sceneTaken(PassResult& result) {
   renderer_ = taking->renderer;
   if (taking->record) {
     film_.recording = true;
-    film_.shown = {};  // the frames so far do not count: they hold no AOVs
+    film_.shown = {};  // the frames so far do not count: they have no AOVs
   }
   if (taking->stats.filmReset || taking->record) filmSeconds_ = 0;
   if (request.interactive || film_.revision != request.revision) reduced_.reset();
@@ -182,7 +182,8 @@ void ProgressiveRender::sceneTaken(PassResult& result) {
 void ProgressiveRender::addSample(bool urgent, bool othersUrgent, PassResult& result) {
   const TimePoint begin = context_.now();
   if (!film_.unfinished) film_.passBegan = begin, film_.passSeconds = 0;
-  // The turn between two urgent ones is short, and its own: however fast edits come, it gets on.
+  // A turn between two urgent ones is short but not interrupted, so it makes progress however fast edits
+  // come.
   const bool whole = urgent || othersUrgent;
   const RenderPolicy& policy = context_.policy;
   const auto slice = urgent ? policy.tooLate : othersUrgent ? policy.politeSlice : policy.slice;
@@ -193,7 +194,7 @@ void ProgressiveRender::addSample(bool urgent, bool othersUrgent, PassResult& re
   if (!complete) return;
   const auto add = [renderer = renderer_, estimate = film_.scene->stop.error > 0](const std::stop_token&) {
     renderer->addPixels();
-    // So that it is known when it is asked for; what takes long is left to show().
+    // So that the error is known when it is needed; if estimating it takes long, show() does it.
     if (estimate && !renderer->errorTakesLong()) renderer->estimatedError();
   };
   perform(largeFilm(), add, &ProgressiveRender::sampleAdded, result);
@@ -224,7 +225,7 @@ void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
   showing_->frame.background = film_.scene->render.background;
   showing_->interactive = request.interactive;
   showing_->aovs = film_.recording && !request.interactive;
-  // The reduced picture that is on screen, into the one that takes its place.
+  // The reduced picture on screen is blended into the one that replaces it.
   if (!request.interactive && !info.final && request.pollSamples.empty()) showing_->reduced = reduced_;
   showing_->sampleError = sampleError_;
   const auto make = [showing = showing_, renderer = renderer_, pixels = filmSize(), memory = context_.memory](
@@ -247,7 +248,7 @@ void ProgressiveRender::pictureMade(PassResult&) {
   session_->submit(std::move(showing->frame));
 }
 
-/// A slice of a pick, if there is one and the last turn was not for one.
+/// Runs a slice of a pick, if there is one and the last turn was not a pick's.
 bool ProgressiveRender::pickIn(const RenderRequest& request) {
   pickedLast_ = pickable(request) && !pickedLast_;
   if (pickedLast_)
@@ -269,8 +270,8 @@ void ProgressiveRender::turn(const RenderRequest& request, const Others& others,
     took = true;
   }
   if (job_ || !film_.scene) return;
-  if (took && pickIn(request)) return;  // who waits for it need not wait for a pass
-  // What was added in the background is shown before the next pass begins.
+  if (took && pickIn(request)) return;  // so the pick need not wait for a pass
+  // A sample added in the background is shown before the next pass begins.
   if (collected && !film_.unfinished && showDue(request)) return show(request, result);
   const bool othersWait = others.urgent || request.pick;
   if (!finished(request)) addSample(film_.firstOfEdit(request), othersWait, result);
@@ -289,18 +290,18 @@ PassResult ProgressiveRender::run(const Others& others) {
     fail(request, Error(ErrorCode::tooLarge, "not enough memory to render this scene"));
   } catch (const std::exception& error) {
     context_.log(std::string("session ") + session_->id() + ": the renderer failed: " + error.what());
-    fail(request, Error(ErrorCode::unsupported, "the renderer failed"));  // the cause is not for a client
+    fail(request, Error(ErrorCode::unsupported, "the renderer failed"));  // clients must not see the cause
   }
   return result;
 }
 
 void ProgressiveRender::fail(const RenderRequest& request, const Error& error) {
-  // What failed may be of a scene that an edit has replaced in the meantime.
+  // The failure may concern a scene that an edit has replaced in the meantime.
   const std::uint32_t revision = taking_       ? taking_->request.revision
                                  : film_.scene ? film_.revision
                                                : request.revision;
   session_->fail(revision, error);
-  // What an error has left behind is not worth keeping.
+  // The state that an error leaves behind is not worth keeping.
   taking_.reset();
   showing_.reset();
   dropRenderer();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One session's renderer and film, and what is done with them next. Used by the render thread alone; takes
-// scenes from Session and hands pictures back to it.
+// One session's renderer and film, and the decisions about what to do with them next. Used only by the render
+// thread; takes scenes from Session and hands pictures back to it.
 #pragma once
 #include <atomic>
 #include <functional>
@@ -17,20 +17,20 @@
 namespace scolopax::server {
 
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(std::shared_ptr<const Volume>)>;
-/// Takes one line that a client must not see.
+/// Receives one line that clients must not see.
 using Log = std::function<void(const std::string&)>;
 
-/// Filled by each turn, for the metrics.
+/// The outcome of one turn, for the metrics.
 struct PassResult {
   bool rendered = false;  ///< a sample was added to every pixel
   bool cancelled = false;
-  bool built = false;      ///< a scene was taken over that had been built in the background
-  bool abandoned = false;  ///< such a build was given up
+  bool built = false;      ///< a scene that was built in the background was taken over
+  bool abandoned = false;  ///< such a build was abandoned
   std::uint64_t pixels = 0;
   double renderSeconds = 0, rebuildSeconds = 0;
 };
 
-/// What all sessions are rendered with. `wake` makes the render loop look at its sessions again.
+/// What the renders of all sessions share. `wake` makes the render loop check its sessions again.
 struct RenderContext {
   MakeRenderer makeRenderer;
   RenderPolicy policy;
@@ -38,7 +38,7 @@ struct RenderContext {
   Log log;
   Background& background;
   std::function<void()> wake;
-  std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for pictures; null: as much as there is
+  std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for pictures; null: no limit
 };
 
 struct SceneTaking;
@@ -46,19 +46,19 @@ struct PictureMaking;
 
 class ProgressiveRender {
  public:
-  /// What its pass must leave to the other sessions.
+  /// What the other sessions need, which limits this session's pass.
   struct Others {
-    int edited = 0;       ///< those that edits arrive at
+    int edited = 0;       ///< number of those at which edits arrive
     bool urgent = false;  ///< one of them has urgent work
   };
-  /// What there is to do, the least important first.
+  /// Kinds of work, the least important first.
   enum class Work {
     none,
-    refine,  ///< a better picture while edits arrive, which the next will replace
+    refine,  ///< a better picture while edits arrive, which the next edit will replace
     still,   ///< the picture at rest
-    urgent   ///< the first picture after an edit
+    urgent   ///< the first picture after an edit, or a pick
   };
-  /// `interrupted` ends passes early that are not urgent; they go on in their next turn.
+  /// `interrupted` ends passes early unless they are urgent; they continue in their next turn.
   ProgressiveRender(std::shared_ptr<Session> session, const RenderContext& context,
                     const std::atomic<bool>& interrupted);
   ~ProgressiveRender();
@@ -66,17 +66,17 @@ class ProgressiveRender {
   ProgressiveRender& operator=(const ProgressiveRender&) = delete;
 
   const std::shared_ptr<Session>& session() const { return session_; }
-  /// What run() would do now; nothing while work goes on in the background.
+  /// What run() would do now; none while a background job is running, unless a pick can be answered.
   Work work() const;
   /// Whether edits arrive.
   bool edited() const;
-  /// When there may be work without being woken.
+  /// When there may be work again even if nothing wakes the loop.
   std::optional<TimePoint> dueAt() const;
-  /// Gives up what is built or measured in the background, once nobody wants it any more.
+  /// Cancels the background job once its result is no longer wanted.
   void supervise();
-  /// A part of a pick, or one sample pass at most, with the rebuild before it and the submission after it, of
-  /// which what takes long goes on in the background until a later turn. Never throws: what cannot be
-  /// rendered is told to the session.
+  /// One turn: a slice of a pick, or at most one sample pass with the rebuild before it and the submission
+  /// after it. Steps that take long run in the background and are completed in a later turn. Never throws:
+  /// failures to render are reported to the session.
   PassResult run(const Others& others);
 
  private:
@@ -93,7 +93,7 @@ class ProgressiveRender {
 
   bool pickIn(const RenderRequest& request);
   void turn(const RenderRequest& request, const Others& others, PassResult& result);
-  /// Does the work, here or in the background, and then what is next, here.
+  /// Runs `work`, on this thread or in the background, and then `next` on this thread.
   void perform(bool inBackground, Background::Work work, Next next, PassResult& result);
   void collect(PassResult& result);
   void takeScene(const RenderRequest& request, const Others& others, PassResult& result);
@@ -107,13 +107,13 @@ class ProgressiveRender {
   const RenderContext& context_;
   const std::atomic<bool>& interrupted_;
 
-  std::shared_ptr<Background::Job> job_;    ///< while there is one, the renderer is its alone
-  Next next_ = nullptr;                     ///< what follows it
+  std::shared_ptr<Background::Job> job_;    ///< while it exists, it owns the renderer, except for picks
+  Next next_ = nullptr;                     ///< to be called when the job is done
   std::shared_ptr<SceneTaking> taking_;     ///< the scene that is being built; else null
   std::shared_ptr<PictureMaking> showing_;  ///< the picture that is being made; else null
 
   PickTurn pick_;
-  bool pickedLast_ = false;  ///< the last turn was for a pick: the picture has the next
+  bool pickedLast_ = false;  ///< the last turn was a pick's, so the next is the picture's
 
   std::shared_ptr<const Volume> volume_;
   std::shared_ptr<Renderer> renderer_;
@@ -121,7 +121,7 @@ class ProgressiveRender {
   ResolutionPolicy resolution_;
   double filmSeconds_ = 0;  ///< spent on the film's samples
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
-  std::shared_ptr<const Image> reduced_;  ///< the last reduced picture of this revision, while it is of use
+  std::shared_ptr<const Image> reduced_;  ///< this revision's last reduced picture, while it is needed
   double sampleError_ = 0;                ///< estimated RMSE of one sample while edits arrived; 0: not known
 };
 

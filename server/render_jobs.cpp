@@ -11,7 +11,7 @@
 namespace scolopax::server {
 namespace {
 
-/// Of quadrature, in voxels, while edits arrive.
+/// Step of quadrature while edits arrive, in smallest voxel spacings.
 constexpr double kInteractiveStep = 2;
 
 }  // namespace
@@ -32,7 +32,7 @@ void PictureMaking::make(const Renderer& renderer, std::uint64_t pixels,
   const auto take = [&](std::size_t pixelBytes) {
     return MemoryBudget::take(memory, MemoryUse::pictures, pixels * pixelBytes);
   };
-  // Mixing makes another one of the reduced picture.
+  // Blending makes a second image from the reduced picture.
   auto imageMemory = take(sizeof(glm::vec4) * (reduced ? 2 : 1));
   auto aovMemory = take(aovs ? std::size(kAovs) * sizeof(float) : 0);
   Image picture = renderer.image();

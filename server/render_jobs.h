@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What ProgressiveRender hands over, here or to the background: a scene on its way into the renderer, and a
-// picture on its way out of the film.
+// The jobs of ProgressiveRender, run on its own thread or in the background: bringing a scene into the
+// renderer, and making a picture from the film.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -13,8 +13,9 @@
 
 namespace scolopax::server {
 
-/// What is drawn while edits arrive, or soon after. The method is ours to choose only where the scene leaves
-/// it to the server: then the quickest that looks like the picture at rest.
+/// The scene that is drawn, at 1 / `divisor` of the resolution. While edits arrive (`interactive`), and only
+/// if the scene leaves the choice of method to the server, it uses the quickest method that looks like the
+/// picture at rest.
 Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive);
 
 /// A scene on its way into the renderer.
@@ -23,7 +24,7 @@ struct SceneTaking {
   TimePoint begin;
   double divisor = 1;
   Scene scene;
-  bool record = false;  ///< from this scene on, AOVs are recorded
+  bool record = false;  ///< AOVs are recorded from this scene on
   bool inBackground = false;
   std::shared_ptr<Renderer> renderer;
   RebuildStats stats;
@@ -39,12 +40,12 @@ struct SceneTaking {
 struct PictureMaking {
   RenderedFrame frame;
   bool interactive = false;              ///< made while edits arrive
-  bool aovs = false;                     ///< made with them
-  std::shared_ptr<const Image> reduced;  ///< to be mixed in; null: nothing is
+  bool aovs = false;                     ///< includes AOVs
+  std::shared_ptr<const Image> reduced;  ///< picture to blend in; null: none
   double sampleError = 0;
-  double share = 0;  ///< of the new picture in the mixture
+  double share = 0;  ///< weight of the new picture in the blend
 
-  /// Throws Error(cancelled) when it is stopped while the error is measured.
+  /// Throws Error(cancelled) if `stop` is requested while the error is measured.
   void make(const Renderer& renderer, std::uint64_t pixels, const std::shared_ptr<MemoryBudget>& memory,
             const std::stop_token& stop);
 };

@@ -54,10 +54,10 @@ std::optional<TimePoint> RenderLoop::step() {
   std::optional<TimePoint> next = store_.expire();
   followStore();
   for (const auto& render : renders_) render->supervise();
-  interrupted_ = false;  // an edit from here on interrupts the pass; those before are seen by nextTurn()
+  interrupted_ = false;  // an edit from here on interrupts the pass; nextTurn() sees those before
   const auto turn = nextTurn();
   if (turn != renders_.end()) {
-    // Behind all others before it runs: a session of slow passes gets one turn in the round as well.
+    // Moved behind all others before it runs: a session with slow passes gets one turn per round as well.
     std::rotate(turn, turn + 1, renders_.end());
     ProgressiveRender::Others others;
     others.urgent = othersUrgent_;
@@ -76,7 +76,8 @@ EncodedFrame encodeFrame(const RenderedFrame& rendered, const Now& now,
                          const std::shared_ptr<MemoryBudget>& memory) {
   const TimePoint begin = now();
   const Image& image = *rendered.image;
-  // A picture that will be enlarged has few bytes, and its compression would show enlarged as well.
+  // A picture that will be enlarged has few bytes, and enlarging would make its compression artefacts
+  // visible.
   const int quality = rendered.info.reduced ? 95 : rendered.info.interactive ? 80 : 90;
   EncodedFrame frame;
   frame.info = rendered.info;

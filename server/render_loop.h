@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The two loops that serve all sessions: one renders a sample pass at a time, in turn; the other encodes and
-// hands out. Each is a step that says when it wants to run again, for a LoopThread or a test.
+// The two loops that serve all sessions: one renders them in turn, one sample pass at a time; the other
+// encodes frames and delivers them. Each is a step that returns when to run again, driven by a LoopThread or
+// by a test.
 #pragma once
 #include <atomic>
 #include <functional>
@@ -20,10 +21,11 @@ class RenderLoop {
   using OnPass = std::function<void(const PassResult&)>;
   RenderLoop(SessionStore& store, RenderContext context, OnPass onPass)
       : store_(store), context_(std::move(context)), onPass_(std::move(onPass)) {}
-  /// One pass of the next session that has work. The first pictures after edits come first; between two of
-  /// them, sessions at rest have a short turn: none starves another.
+  /// Runs one turn of the next session that has work. First pictures after edits take precedence; between two
+  /// of them, a session at rest gets a short turn, so that no session starves.
   std::optional<TimePoint> step();
-  /// Ends the running pass early unless it makes the first picture after an edit. From any thread.
+  /// Ends the running pass early, unless it makes the first picture after an edit or is a short turn between
+  /// two of those. From any thread.
   void interrupt() { interrupted_ = true; }
 
  private:
@@ -34,10 +36,10 @@ class RenderLoop {
   SessionStore& store_;
   const RenderContext context_;
   const OnPass onPass_;
-  Renders renders_;  ///< whose turn is next stands first
+  Renders renders_;  ///< in the order of their next turns
   std::atomic<bool> interrupted_{false};
-  bool othersUrgent_ = false;  ///< at the turn that was chosen
-  bool lastUrgent_ = false;    ///< the last turn was for the first picture after an edit
+  bool othersUrgent_ = false;  ///< the chosen turn is not urgent, but another session's is
+  bool lastUrgent_ = false;    ///< the last turn was urgent
 };
 
 class EncodeLoop {
@@ -51,8 +53,8 @@ class EncodeLoop {
         background_(background),
         wake_(std::move(wake)),
         memory_(std::move(memory)) {}
-  /// Encodes every picture that waits, one a session, and hands out the frames that are due. Large pictures
-  /// are encoded in the background, one a session at a time.
+  /// Encodes the pictures that wait, at most one per session, and delivers the frames that are due. Large
+  /// pictures are encoded in the background, one per session at a time.
   std::optional<TimePoint> step();
 
  private:
@@ -65,8 +67,9 @@ class EncodeLoop {
   std::map<const Session*, std::shared_ptr<Background::Job>> jobs_;
 };
 
-/// JPEG of a rendered picture, 4:4:4: quality 90; while edits arrive 80, and 95 where it is smaller than the
-/// scene's. Its memory is of the budget until nobody holds it any more.
+/// Encodes a rendered picture as JPEG with 4:4:4 sampling: quality 95 if it is reduced, otherwise 80 if it
+/// was made while edits arrive, and 90 at rest. The memory of the result is charged to the budget until the
+/// result is released.
 EncodedFrame encodeFrame(const RenderedFrame& rendered, const Now& now,
                          const std::shared_ptr<MemoryBudget>& memory = nullptr);
 

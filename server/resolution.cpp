@@ -9,11 +9,12 @@ namespace scolopax::server {
 namespace {
 
 constexpr double kDivisors[] = {1, 1.5, 2, 2.5, 3, 4, 6, 8, 12, kMostDivisor};
-/// Before anything is known, while edits arrive: a small pass tells.
+/// The first divisor while edits arrive, when nothing is known: a small pass is quick and gives a
+/// measurement.
 constexpr double kProbeDivisor = 4;
-/// Pixels of a picture over those of the next coarser one, at most; and a little.
+/// Largest ratio of the pixels of a picture to those of the next coarser one, plus a margin.
 constexpr double kLargestStep = 2.3;
-/// A picture may take so much longer than the smallest could.
+/// How many times the fixed cost a picture may take.
 constexpr double kOverFixed = 1.6;
 constexpr double kFiner = 0.8, kKept = 1.2;  ///< shares of the target at which the divisor changes
 
@@ -52,8 +53,8 @@ void ResolutionPolicy::forget() {
   untilProbe_ = probeWait_ = kLeastWait;
 }
 
-/// Passes of one size do not tell what part of their cost is fixed. Then a finer one now and then does, ever
-/// more seldom while it turns out not to fit.
+/// Passes of a single size do not show what part of their cost is fixed. A finer picture now and then does;
+/// these trials become rarer while they turn out not to fit.
 bool ResolutionPolicy::probes(const PassCost& cost) {
   if (current_ <= 1 || !cost.oneSize() || --untilProbe_ > 0) return false;
   untilProbe_ = probeWait_ = std::min(2 * probeWait_, kMostWait);
@@ -63,7 +64,8 @@ bool ResolutionPolicy::probes(const PassCost& cost) {
 double ResolutionPolicy::whileEdited(std::uint64_t pixels, int editedOthers) {
   const PassCost& cost = costOf(true);
   if (!cost.known()) return kProbeDivisor;
-  // All that are edited together have two targets a round, so that the picture stays sharp when they are few.
+  // All edited sessions together have two targets a round, so that the picture stays sharp while they are
+  // few.
   const auto target = std::max(2 * policy_.frameTarget / std::max(2, 1 + editedOthers), policy_.leastTarget);
   const double divisor = divisorForTarget(pixels, cost, secondsOf(target), current_);
   if (divisor < current_) untilProbe_ = probeWait_ = kLeastWait;

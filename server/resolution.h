@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How small a picture must be to be there in time: while edits arrive, and on the way back to the whole one.
-// Asked by ProgressiveRender before each film; knows passes by what they took, and no clock.
+// Chooses the resolution at which a picture is ready in time: while edits arrive, and on the way back to full
+// resolution. Used by ProgressiveRender before each film; knows how long passes took, but reads no clock.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -11,52 +11,55 @@
 
 namespace scolopax::server {
 
-/// When passes are cut, and what is done elsewhere.
+/// The time limits of rendering.
 struct RenderPolicy {
   std::chrono::microseconds frameTarget{25'000};      ///< for one pass while edits arrive
-  std::chrono::microseconds leastTarget{4'000};       ///< that many edited sessions leave each other
+  std::chrono::microseconds leastTarget{4'000};       ///< least target when many sessions are edited
   std::chrono::milliseconds interactiveInterval{33};  ///< between frames while edits arrive
-  std::chrono::milliseconds stillInterval{500};       ///< between frames once samples are many
-  std::chrono::milliseconds tooLate{75};              ///< the first picture of an edit is begun anew, coarser
-  int restFactor = 12;                   ///< a pass may last so much longer at each step from small to whole
-  std::chrono::milliseconds slice{100};  ///< of a slow pass, before other sessions have their turn
-  std::chrono::milliseconds politeSlice{8};  ///< when one of them waits for an edit's first picture
-  std::chrono::milliseconds shield{300};     ///< for so long a pass goes on when its scene is stale
+  std::chrono::milliseconds stillInterval{500};       ///< between frames at rest, once there are many samples
+  std::chrono::milliseconds tooLate{75};              ///< an edit's first picture is then restarted, coarser
+  int restFactor = 12;                   ///< how much longer a pass may take at each step to full resolution
+  std::chrono::milliseconds slice{100};  ///< of a slow pass, before the next session's turn
+  std::chrono::milliseconds politeSlice{8};  ///< the same, while an edit's first picture or a pick waits
+  std::chrono::milliseconds shield{300};     ///< for so long a pass with a stale scene continues
 };
 
 /// The largest divisor of width and height.
 inline constexpr double kMostDivisor = 16;
 
 /// The smallest of 1, 1.5, 2, 2.5, 3, 4, 6, 8, ... by which width and height must be divided so that a pass
-/// fits the target. `current`, that of the pass before (0: none), is kept until another fits clearly better:
-/// a picture that changes its resolution to and fro is worse than one that is a little late. It is followed
-/// by none that is much larger than the largest whose cost is known. Where what all sizes cost alike is most
-/// of the target (the processors are others' too), small pictures bring nothing, and the target is more.
+/// meets the target. `current` is the divisor of the previous pass (0: none). It is kept until another fits
+/// clearly better, since a resolution that changes back and forth is worse than a picture that is slightly
+/// late. No picture follows it that is much larger than the largest whose cost is known. If the fixed cost of
+/// a pass is most of the target (for example because other processes use the processors), smaller pictures
+/// gain nothing, and the target is raised.
 double divisorForTarget(std::uint64_t pixels, const PassCost& cost, double targetSeconds, double current = 0);
 
-/// The scene for a smaller picture of the same view: its height divided and rounded up, its width the least
-/// that shows as much as the whole picture. One sample at the centre of a pixel says more of a small picture,
-/// which is smoothly enlarged, than one anywhere in the pixel.
+/// The scene for a smaller picture of the same view. Its height is divided and rounded up; its width is the
+/// least that shows as much as the whole picture. Samples go through pixel centres: the small picture is
+/// enlarged smoothly, and a sample at the centre of a pixel represents it better than one anywhere in the
+/// pixel.
 Scene atDivisor(Scene scene, double divisor);
 
-/// One session's choice of resolutions. `edited` tells passes while edits arrive from those at rest, which
-/// are drawn otherwise and cost otherwise.
+/// One session's choice of resolutions. `edited` distinguishes passes while edits arrive from passes at rest,
+/// which are drawn differently and have different costs.
 class ResolutionPolicy {
  public:
   explicit ResolutionPolicy(const RenderPolicy& policy) : policy_(policy) {}
 
   void passDone(bool edited, std::uint64_t pixels, double seconds) { cost_[edited].add(pixels, seconds); }
-  /// A pass was given up after so long.
+  /// A pass was abandoned after `seconds`.
   void passGivenUp(bool edited, std::uint64_t pixels, double seconds) {
     cost_[edited].addUnfinished(pixels, seconds);
   }
-  /// Another data set: what was learnt is of no use.
+  /// To be called for another data set: discards what was learnt.
   void forget();
 
-  /// While edits arrive, at `editedOthers` other sessions too; the whole picture has `pixels`.
+  /// The divisor while edits arrive, here and at `editedOthers` other sessions; `pixels` is the size of the
+  /// whole picture.
   double whileEdited(std::uint64_t pixels, int editedOthers);
-  /// At rest. `shown`: the divisor of the reduced picture of this scene that is on screen, which the next is
-  /// to be better than.
+  /// The divisor at rest. `shown` is that of the reduced picture of this scene on screen, if there is one:
+  /// the result is smaller.
   double atRest(std::uint64_t pixels, std::optional<double> shown) const;
 
  private:
@@ -66,9 +69,9 @@ class ResolutionPolicy {
   const RenderPolicy& policy_;
   PassCost cost_[2];
   static constexpr int kLeastWait = 8,
-                       kMostWait = 64;  ///< pictures from one that is finer on trial to the next
+                       kMostWait = 64;  ///< pictures between two trials of a finer one
 
-  double current_ = 0;  ///< the last one while edits arrived, but on trial; 0 before
+  double current_ = 0;  ///< the last divisor while edits arrived, without trials; 0 before
   int untilProbe_ = kLeastWait, probeWait_ = kLeastWait;
 };
 

@@ -35,7 +35,7 @@ std::vector<protocol::EnumEntry> entries(std::span<const NamedValue> values) {
   return list;
 }
 
-/// The value of that wire name; parseScene has made sure that there is one.
+/// The value with this wire name; parseScene has checked that there is one.
 template <class Enum, std::size_t N>
 Enum valueOf(const NamedValue (&list)[N], std::string_view name) {
   return Enum(std::find_if(list, list + N, [&](const NamedValue& value) { return value.name == name; }) -
@@ -45,7 +45,7 @@ Enum valueOf(const NamedValue (&list)[N], std::string_view name) {
 glm::dvec3 vectorOf(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 std::array<double, 3> arrayOf(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
 
-/// "#rrggbb", checked before, to linear RGB.
+/// Converts "#rrggbb", which has been checked, to linear RGB.
 glm::dvec3 linearOf(const std::string& hex) {
   const auto part = [&](std::size_t at) {
     return double(linearFromSrgb(float(std::stoi(hex.substr(at, 2), nullptr, 16)) / 255.0f));
@@ -67,7 +67,8 @@ std::vector<ColorKnot> knotsOf(const protocol::Colormap& colormap) {
   return knots;
 }
 
-/// What the renderer would refuse later is refused with the patch.
+/// Turns an Error of `check` into a ProtocolError(422), so that what the renderer would refuse later is
+/// refused with the edit.
 template <class Check>
 void refuseAt(const std::string& pointer, Check&& check) {
   try {
@@ -109,14 +110,14 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
   }
 }
 
-/// Share of what has opacity whose gradients the automatic range holds.
+/// Share of the voxels with opacity whose gradients the automatic range includes.
 constexpr double kWithinRange = 0.995;
 
-/// Whether a patch, which has been applied, asks for a channel's automatic range of gradients anew.
+/// Whether a patch, which was applied successfully, asks for a new automatic range of a channel's gradients.
 bool resetsGradientRange(const json& patch, std::size_t channel) {
   const auto channels = patch.find("channels");
   if (channels == patch.end()) return false;
-  if (!channels->is_object()) return true;  // other channels as a whole
+  if (!channels->is_object()) return true;  // all channels are replaced
   const auto entry = channels->find(std::to_string(channel));
   if (entry == channels->end()) return false;
   if (!entry->is_object()) return true;
@@ -125,7 +126,7 @@ bool resetsGradientRange(const json& patch, std::size_t channel) {
   return !curve->is_object() || (curve->contains("range") && (*curve)["range"].is_null());
 }
 
-/// Whether a patch asks for the view that is chosen automatically.
+/// Whether a patch asks for a new automatic view.
 bool resetsView(const json& patch) {
   if (!patch.is_object()) return false;
   const auto camera = patch.find("camera");
@@ -196,7 +197,7 @@ void resolveLights(const protocol::Scene& scene, Scene& render) {
   }
 }
 
-/// Small macrocells of a large volume cost much and bring little. Those of the default size are taken always.
+/// Small macrocells of a large volume cost much and gain little. The default size is always accepted.
 void checkMacrocell(int size, const Volume& volume, std::size_t mostIntervals) {
   const auto tooMany = [&](int one) { return intervalCount(volume, one) > mostIntervals; };
   int least = size;
@@ -207,7 +208,7 @@ void checkMacrocell(int size, const Volume& volume, std::size_t mostIntervals) {
       "expected at least " + std::to_string(least) + " for this data set, found " + std::to_string(size));
 }
 
-/// What of the resolved scene decides the picture at a sample count.
+/// The part of the resolved scene that determines the picture at a given number of samples.
 json pictureOf(json resolved, const Scene& render) {
   resolved.erase("stop");
   resolved["targetError"] = render.targetError;
@@ -239,7 +240,7 @@ void SceneResolver::frame(const protocol::Scene& scene, ResolvedScene& result) c
   std::vector<glm::vec3> hull;
   try {
     hull = visibleHull(*result.dataset->volume, coarse_.at(result.dataset.get()), result.render.channels);
-  } catch (const Error&) {  // what cannot be rendered is told when it is to be
+  } catch (const Error&) {  // rendering reports what cannot be rendered
   }
   result.chosen.framed = std::make_shared<const std::vector<glm::vec3>>(std::move(hull));
 }
@@ -255,7 +256,7 @@ std::array<double, 2> SceneResolver::gradientRange(const ResolvedScene& scene, i
     most = gradientQuantile(*gradients, scene.dataset->volume->channels()[std::size_t(channel)],
                             scene.render.channels[std::size_t(channel)], kWithinRange);
   });
-  return {0, most > 0 ? most : 1};  // flat: every range shows the same
+  return {0, most > 0 ? most : 1};  // flat: all ranges give the same picture
 }
 
 void SceneResolver::resolveGradientOpacity(protocol::Scene& scene, ResolvedScene& result) const {
@@ -280,7 +281,7 @@ void SceneResolver::resolveGradientOpacity(protocol::Scene& scene, ResolvedScene
 
 std::shared_ptr<const Dataset> SceneResolver::datasetOf(const json& scene) const {
   const auto id = scene.is_object() ? scene.find("dataset") : scene.end();
-  // What is no name at all is refused by parseScene, which says it better.
+  // parseScene refuses what is not a name, with a better message.
   if (id == scene.end() || !id->is_string()) return datasets_->first();
   auto dataset = datasets_->find(id->get_ref<const std::string&>());
   if (!dataset) {
@@ -350,7 +351,7 @@ SceneResolver::Resolved SceneResolver::resolve(json sparse, const Chosen& chosen
   render.height = int(scene.image.height);
   render.background = glm::vec3(linearOf(scene.image.background));
   render.filter = valueOf<PixelFilter>(kPixelFilters, scene.image.filter);
-  resolveGradientOpacity(scene, *result);  // late: what is refused anyway needs no measuring
+  resolveGradientOpacity(scene, *result);  // late: refused scenes need no measuring
   refuseAt("", [&] { checkScene(render, volume); });
   if (!scene.stop.samples && !scene.stop.seconds && !scene.stop.error)
     scene.stop.samples = options_.defaultSamples;

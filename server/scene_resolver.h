@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The wire's sparse scene and a volume to a scene with every value: for the renderer and for the client.
+// Resolves a sparse wire scene for a volume into a scene in which every value is set, for the renderer and
+// for the client.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -21,20 +22,22 @@
 
 namespace scolopax::server {
 
-/// What was chosen by the curves of a scene, and stays while they are edited, so that nothing jumps.
+/// Values that were chosen automatically from a scene's curves. They stay while the curves are edited, so
+/// that nothing jumps.
 struct Chosen {
-  std::shared_ptr<const Dataset> dataset;  ///< of which it was chosen
-  /// What the automatic view frames (renderer/data/visible_hull.h); null: no scene so far has needed it.
+  std::shared_ptr<const Dataset> dataset;  ///< the data set that they were chosen for
+  /// What the automatic view frames (renderer/data/visible_hull.h); null: not needed so far.
   std::shared_ptr<const std::vector<glm::vec3>> framed;
-  /// Per channel the automatic range of gradientOpacity; none where the scene has none that is automatic.
+  /// For each channel, the automatic range of its gradientOpacity; empty where it has none or the range is
+  /// set.
   std::vector<std::optional<std::array<double, 2>>> gradientRanges;
 };
 
-/// A scene in the forms the server needs it in. Immutable once made.
+/// A scene in the forms that the server needs. Immutable once made.
 struct ResolvedScene {
   nlohmann::json sparse;    ///< what the user set
-  nlohmann::json resolved;  ///< every value filled in; `auto` stays
-  nlohmann::json picture;   ///< `resolved` without what leaves the picture as it is
+  nlohmann::json resolved;  ///< with every value filled in; method `auto` remains
+  nlohmann::json picture;   ///< `resolved` without what does not affect the picture
   Scene render;
   StopRule stop;
   std::shared_ptr<const Dataset> dataset;
@@ -47,23 +50,24 @@ protocol::Lists rendererLists();
 class SceneResolver {
  public:
   struct Options {
-    std::uint32_t defaultSamples = 64;     ///< when the scene has no stop rule
+    std::uint32_t defaultSamples = 64;     ///< if the scene has no stop rule
     std::uint64_t maxPixels = 16'777'216;  ///< width x height
-    std::size_t maxIntervals = 1 << 25;    ///< macrocells x channels, where the size is not the default
+    std::size_t maxIntervals = 1 << 25;    ///< macrocells x channels, for macrocells below the default size
   };
   SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options);
 
   using Resolved = std::shared_ptr<const ResolvedScene>;
-  /// The scene of a document. What is automatic, the view and ranges of gradients, is chosen by its curves;
-  /// what that needs of the data is waited for. Throws ProtocolError(422) with the pointer of the bad field,
-  /// Error(cancelled) once `stop` is requested, and Error(busy, tooLarge) where memory is missing.
+  /// Resolves a whole scene. Automatic values (the view and the ranges of gradients) are chosen from its
+  /// curves; waits until the data that this needs has been measured. Throws ProtocolError(422) with the
+  /// pointer of the bad field, Error(cancelled) once `stop` is requested, and Error(busy or tooLarge) if
+  /// there is not enough memory.
   Resolved replace(const nlohmann::json& scene, const std::stop_token& stop = {}) const;
-  /// `base` with a patch applied to its sparse form. What was chosen by its curves stays, unless the patch
-  /// asks for it anew (a null camera, eye or target; a null range of gradientOpacity, or one that comes back)
-  /// or names another data set. Waits and throws as above.
+  /// Applies a patch to the sparse form of `base`. Values chosen from its curves stay, unless the patch asks
+  /// for new ones (a camera, eye or target that is null; a channel, gradientOpacity or range that is null;
+  /// all channels replaced) or names another data set. Waits and throws as replace() does.
   Resolved patch(const ResolvedScene& base, const nlohmann::json& patch,
                  const std::stop_token& stop = {}) const;
-  /// The same for those who must not wait: throw Unmeasured instead.
+  /// The same for callers that must not wait: throw Unmeasured instead.
   Resolved replaceNow(const nlohmann::json& scene) const;
   Resolved patchNow(const ResolvedScene& base, const nlohmann::json& patch) const;
   const protocol::Lists& lists() const { return lists_; }
@@ -76,7 +80,7 @@ class SceneResolver {
   std::shared_ptr<const Dataset> datasetOf(const nlohmann::json& scene) const;
 
   std::shared_ptr<const DatasetStore> datasets_;
-  std::map<const Dataset*, MacrocellGrid> coarse_;  ///< of each, for frame()
+  std::map<const Dataset*, MacrocellGrid> coarse_;  ///< of each data set, for frame()
   Options options_;
   protocol::Lists lists_;
 };

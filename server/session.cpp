@@ -10,8 +10,8 @@
 namespace scolopax::server {
 namespace {
 
-// A viewer that gets no frames keeps at most so many of its patches' ids; beyond, the oldest are forgotten,
-// which only makes the header's patch id lag.
+// A viewer that gets no frames keeps at most this many ids of its patches. Beyond that the oldest are
+// forgotten, which only makes the header's patch id lag behind.
 constexpr std::size_t kMaxPendingPatches = 1024;
 
 }  // namespace
@@ -52,7 +52,7 @@ void Session::checkRevision(const EditOrigin& origin) const {
 
 Session::SceneState Session::edit(std::shared_ptr<const ResolvedScene> next, const EditOrigin& origin) {
   const bool pictureChanges = next->picture != scene_->picture;
-  nlohmann::json change;  // for the others; most sessions have one viewer
+  nlohmann::json change;  // for other viewers; most sessions have only one
   if (viewers_.size() > viewers_.count(origin.viewer))
     change = protocol::mergePatchBetween(scene_->resolved, next->resolved);
   scene_ = std::move(next);
@@ -92,7 +92,7 @@ void Session::removeViewer(ViewerId id) {
   const std::lock_guard lock(mutex_);
   viewers_.erase(id);
   lastUsed_ = hooks_.now();
-  hooks_.wakeRender();  // which also counts the time to the session's end
+  hooks_.wakeRender();  // which also times the session's end
 }
 
 void Session::setView(ViewerId id, bool visible, double maxFps) {
@@ -101,7 +101,7 @@ void Session::setView(ViewerId id, bool visible, double maxFps) {
   if (viewer == viewers_.end()) return;
   viewer->second.visible = visible;
   if (visible) retryIfBusy();
-  // Within an hour: a smaller rate than that overflows a duration.
+  // At most an hour: a longer period overflows a duration.
   const auto seconds = maxFps > 0 ? std::min(1 / maxFps, 3600.0) : 0.0;
   viewer->second.period =
       std::chrono::duration_cast<TimePoint::duration>(std::chrono::duration<double>(seconds));
@@ -119,10 +119,10 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
   std::unique_lock lock(mutex_);
   if (pollSamples_.size() >= kMaxPolls)
     throw protocol::ProtocolError(429, "",
-                                  "expected at most " + std::to_string(kMaxPolls) +
-                                      " requests to wait for a session's frames, found another");
+                                  "the limit of " + std::to_string(kMaxPolls) +
+                                      " requests waiting for a session's frames is reached; retry later");
   if (query.aovs && !aovs_) {
-    // The picture begins anew, so nobody may take it for the one that was there.
+    // The picture starts over, so it must not be confused with the one before.
     aovs_ = true;
     ++revision_;
     for (auto& [id, viewer] : viewers_) viewer.sink->sceneChanged(revision_, nlohmann::json::object());
@@ -158,7 +158,7 @@ PickId Session::addPick(const PickQuery& query, OnPicked answered) {
   if (picks_.size() >= kMaxPicks)
     throw protocol::ProtocolError(
         429, "",
-        "expected at most " + std::to_string(kMaxPicks) + " picks to wait in a session, found another");
+        "the limit of " + std::to_string(kMaxPicks) + " picks waiting in a session is reached; retry later");
   retryIfBusy();
   if (failedRevision_ == revision_) throw Error(*failure_);
   lastUsed_ = hooks_.now();
@@ -228,7 +228,7 @@ RenderRequest Session::request() const {
 void Session::submit(RenderedFrame frame) {
   const std::lock_guard lock(mutex_);
   if (closed_) return;
-  if (retryAt_ && frame.info.revision == failedRevision_) failedRevision_ = 0;  // the retry went well
+  if (retryAt_ && frame.info.revision == failedRevision_) failedRevision_ = 0;  // the retry succeeded
   rendered_ = std::move(frame);
   hooks_.wakeEncoder();
 }
@@ -237,10 +237,10 @@ void Session::fail(std::uint32_t revision, const Error& error) {
   const std::lock_guard lock(mutex_);
   ++failures_;
   const bool busy = error.code() == ErrorCode::busy;
-  const bool known = busy && retryAt_ && failedRevision_ == revision;  // a retry that was in vain
+  const bool known = busy && retryAt_ && failedRevision_ == revision;  // a retry that failed again
   if (!known)
     for (auto& [id, viewer] : viewers_) viewer.sink->renderFailed(error);
-  if (revision != revision_) return;  // the scene of now may well be rendered
+  if (revision != revision_) return;  // the current scene may well render
   failedRevision_ = revision;
   failure_ = error;
   retryAt_.reset();

@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// One session: scene, revision, viewers and latest frame. Edits come in from network threads, the render
-// thread takes the newest scene and hands in pictures, the encoder thread hands the frames out.
+// One session: its scene, revision, viewers and latest frame. Network threads edit the scene, the render
+// thread takes the newest one and submits pictures, and the encoder thread delivers the frames.
 //
 // Threads and locks:
-//  1. Network threads edit, read, poll, join and leave; ONE render thread and ONE encoder thread serve all
-//  sessions.
-//  2. All that they share is in Session, behind its one mutex; each public function locks it once.
+//  1. Network threads edit, read, poll, join and leave; one render thread and one encoder thread serve all
+//     sessions.
+//  2. Everything that they share is in Session, guarded by its one mutex; each public function locks it once.
 //  3. The mutex is never held while rendering or encoding: both work on snapshots (shared_ptr to const).
 //  4. The renderer and its film belong to the render thread (ProgressiveRender) or, while there is one, to
-//  the
-//     background job that it began; no lock guards them. Beside a job that builds no scene, picks go on.
-//  5. Only the encoder thread offers frames to viewers, and a frame of an older scene is not published,
-//  whoever
-//     encoded it, so that none can replace a newer one.
-//  6. Viewers are called with the mutex held, so that they see edits in order: a ViewerSink only queues, it
-//     neither blocks nor calls back.
-//  7. An edit interrupts the running pass after it has changed the scene; RenderLoop takes the interruption
-//     back before it looks at any scene, so no edit is lost between the two.
-//  8. Nobody measures data with the mutex held: an edit that needs that throws Unmeasured and changes
-//  nothing.
-//  9. Waking a loop takes the loop's own, innermost mutex. The store's mutex is never held with a session's.
+//     the background job that it started; no lock guards them. While a job runs that does not build a scene,
+//     picks continue.
+//  5. Only the encoder thread offers frames to viewers. A frame of an older scene is not published, whoever
+//     encoded it, so none can replace a newer one.
+//  6. Viewers are called with the mutex held, so that they see edits in order. A ViewerSink therefore only
+//     queues: it neither blocks nor calls back.
+//  7. An edit interrupts the running pass after it has changed the scene. RenderLoop clears the interruption
+//     before it looks at any scene, so no edit is lost between the two.
+//  8. No thread measures data with the mutex held: an edit that needs a measurement throws Unmeasured and
+//     changes nothing.
+//  9. Waking a loop locks that loop's own mutex, which is the innermost. The store's mutex is never held
+//     together with a session's.
 #pragma once
 #include <condition_variable>
 #include <deque>
@@ -38,16 +38,17 @@
 
 namespace scolopax::server {
 
-/// A client that sees the session's pictures. Calls queue and return; they come with the session's mutex
-/// held.
+/// A client that receives the session's pictures. Its functions are called with the session's mutex held:
+/// they queue and return.
 class ViewerSink {
  public:
   virtual ~ViewerSink() = default;
   /// `patch`: id of this viewer's last patch that the frame contains, 0 for none.
   virtual void offerFrame(const EncodedFrame& frame, std::uint32_t patch) = 0;
-  /// Another client edited the scene: `patch` turns the resolved scene before into that of `revision`.
+  /// Another client edited the scene, or a query for AOVs began a revision: `patch` turns the previous
+  /// resolved scene into that of `revision`.
   virtual void sceneChanged(std::uint32_t revision, const nlohmann::json& patch) = 0;
-  /// The scene cannot be rendered, or not now.
+  /// The scene cannot be rendered, or not at present.
   virtual void renderFailed(const Error& error) = 0;
   /// The session has ended.
   virtual void sessionClosed(const std::string& reason) = 0;
@@ -55,34 +56,33 @@ class ViewerSink {
 
 using ViewerId = std::uint64_t;  ///< 0: nobody
 
-/// Who edits, and on which condition.
+/// Who makes an edit, and under which condition.
 struct EditOrigin {
   ViewerId viewer = 0;
   std::uint32_t patchId = 0;                ///< the viewer's own number for the edit
-  std::optional<std::uint32_t> ifRevision;  ///< throws 409 when the scene is at another revision
+  std::optional<std::uint32_t> ifRevision;  ///< throws ProtocolError(409) if the scene is at another revision
 };
 
 /// What a script waits for.
 struct FrameQuery {
   std::uint32_t after = 0;       ///< a frame with a larger number
-  std::uint32_t minSamples = 1;  ///< with so many samples at least, or the final one
-  bool aovs =
-      false;  ///< that holds AOVs; the first such query makes a revision, from which they are recorded
-  std::stop_token gone = {};  ///< nobody waits any more
+  std::uint32_t minSamples = 1;  ///< with at least so many samples per pixel, or the final frame
+  bool aovs = false;             ///< with AOVs; the first such query begins a revision that records them
+  std::stop_token gone = {};     ///< requested when nobody waits any more
 };
 
-/// What the render thread should do for a session; a snapshot.
+/// A snapshot of what the render thread should do for a session.
 struct RenderRequest {
   std::shared_ptr<const ResolvedScene> scene;
   std::uint32_t revision = 0;
-  bool wanted = false;                     ///< somebody looks on or waits, and the scene can be rendered
-  bool interactive = false;                ///< edits arrive
-  TimePoint interactiveEnd;                ///< when that ends, if no edit comes
+  bool wanted = false;       ///< a viewer or a script wants pictures, and the scene can be rendered
+  bool interactive = false;  ///< edits arrive
+  TimePoint interactiveEnd;  ///< when that ends if no further edit comes
   std::vector<std::uint32_t> pollSamples;  ///< sample counts that scripts wait for
-  bool aovs = false;                       ///< somebody has asked for AOVs
-  std::optional<TimePoint> retryAt;        ///< when to try again what others' memory has refused
-  std::uint32_t failures = 0;              ///< so far; after another one, the last picture may be lost
-  std::optional<PendingPick> pick;         ///< the first that waits for its answer
+  bool aovs = false;                       ///< a script has asked for AOVs
+  std::optional<TimePoint> retryAt;        ///< when to retry after a lack of memory
+  std::uint32_t failures = 0;              ///< number so far; another one may have lost the last picture
+  std::optional<PendingPick> pick;         ///< the oldest one without an answer
 };
 
 /// Functions that act on the loops; called with or without the session's mutex held.
@@ -98,85 +98,83 @@ class Session {
   /// The time after an edit during which speed counts more than quality.
   static constexpr std::chrono::milliseconds kInteractiveTime{200};
 
-  /// After which what failed because others held the memory is tried again.
+  /// Time after which rendering is tried again when it failed because others held the memory.
   static constexpr std::chrono::milliseconds kRetryTime{1000};
 
-  /// Scripts that may wait at once.
+  /// Maximum number of scripts that wait at once.
   static constexpr std::size_t kMaxPolls = 8;
-  /// Picks that may wait at once.
+  /// Maximum number of picks that wait at once.
   static constexpr std::size_t kMaxPicks = 8;
 
   Session(std::string id, std::string token, std::shared_ptr<const SceneResolver> resolver,
           std::shared_ptr<const ResolvedScene> scene, SessionHooks hooks);
 
   const std::string& id() const { return id_; }
-  const std::string& token() const { return token_; }  ///< secret: whoever has it may resume
+  const std::string& token() const { return token_; }  ///< secret: whoever has it may resume the session
 
-  // --- network threads
-  // ---------------------------------------------------------------------------------------
+  // --- network threads ---
   struct SceneState {
     std::shared_ptr<const ResolvedScene> scene;
     std::uint32_t revision;
   };
   SceneState scene() const;
-  /// Applies a patch (a whole scene) at once and returns the new revision. Throws and leaves the scene as it
-  /// was: ProtocolError when the result is not a scene, Unmeasured until what it needs of the data is
-  /// measured.
+  /// Applies a patch, or replaces the whole scene, and returns the new scene and revision. Throws and leaves
+  /// the scene unchanged: ProtocolError if the result is not a valid scene, Unmeasured until the data that it
+  /// needs has been measured.
   SceneState patch(const nlohmann::json& patch, const EditOrigin& origin);
   SceneState replace(const nlohmann::json& scene, const EditOrigin& origin);
 
   /// The viewer gets the latest frame soon, then every new one.
   ViewerId addViewer(std::shared_ptr<ViewerSink> sink);
   void removeViewer(ViewerId id);
-  /// `maxFps` 0: as fast as they come.
+  /// `maxFps` 0: no limit.
   void setView(ViewerId id, bool visible, double maxFps);
   std::size_t viewerCount() const;
 
-  /// Waits for a full-resolution frame of the scene as it is now or newer; nullptr when none came in time or
-  /// the session was closed. Throws ProtocolError(429) when too many wait already, and the Error with which
-  /// the scene could not be rendered.
+  /// Waits for a full-resolution frame of the current scene or a newer one; nullptr if none came in time or
+  /// the session was closed. Throws ProtocolError(429) if too many scripts wait already, and the renderer's
+  /// Error if the scene cannot be rendered.
   std::shared_ptr<const EncodedFrame> waitForFrame(const FrameQuery& query,
                                                    std::chrono::milliseconds timeout);
   std::shared_ptr<const EncodedFrame> latestFrame() const;
-  /// Asks what is visible in the scene as it is now or newer. `answered` is called once, on whatever thread,
-  /// with the session's mutex held: it only queues; never, when the session is closed before. Throws
-  /// ProtocolError: areaOf()'s, and 429 when too many wait already; and the Error with which the scene could
-  /// not be rendered.
+  /// Requests what is visible in the current scene or a newer one. `answered` is called once, on any thread
+  /// and with the session's mutex held, so it must only queue; it is never called if the session is closed
+  /// first. Throws ProtocolError: 404 if the session has ended, 422 as areaOf(), 429 if too many picks wait
+  /// already; and the renderer's Error if the scene cannot be rendered.
   PickId pick(const PickQuery& query, OnPicked answered);
-  /// The same, and waits; nothing when no answer came in time or the session was closed. Throws what failed.
+  /// The same, but waits for the answer; nullopt if none came in time or the session was closed. Throws what
+  /// made the pick fail.
   std::optional<nlohmann::json> waitForPick(const PickQuery& query, std::chrono::milliseconds timeout,
                                             const std::stop_token& gone = {});
-  /// Ends waiting and viewing; nothing is rendered any more.
+  /// Ends all waiting and viewing; nothing is rendered afterwards.
   void close(const std::string& reason);
-  /// When somebody last looked, edited or asked; now while there is a viewer or a waiting script.
+  /// Time of the last view, edit or query; the present while there is a viewer or a waiting script.
   TimePoint lastUsed() const;
 
-  // --- render thread
-  // -----------------------------------------------------------------------------------------
+  // --- render thread ---
   RenderRequest request() const;
-  /// Takes the one waiting place of the encoder, replacing what is there.
+  /// Puts the frame in the encoder's one waiting place, replacing what is there.
   void submit(RenderedFrame frame);
-  /// Nothing is rendered until the next edit; what failed because others held the memory, for kRetryTime or
-  /// until somebody comes and asks for it. Viewers hear of it once.
+  /// The scene of `revision` failed to render. Nothing is rendered until the next edit or, if others held the
+  /// memory (Error(busy)), until kRetryTime has passed or a client asks again. Viewers are told once.
   void fail(std::uint32_t revision, const Error& error);
-  /// Nobody may wait any more for the answer.
+  /// Does nothing if nobody waits for the answer any more.
   void answerPick(PickId id, const PickAnswer& answer);
 
-  // --- encoder thread
-  // ----------------------------------------------------------------------------------------
-  /// The picture that waits, unless it has more pixels.
+  // --- encoder thread ---
+  /// Takes the waiting picture, unless it has more than `mostPixels` pixels.
   std::optional<RenderedFrame> takeRendered(std::uint64_t mostPixels);
-  /// From any thread. A frame that shows an older scene than the latest has come too late.
+  /// From any thread. Drops a frame whose scene is older than the latest frame's.
   void publish(EncodedFrame frame);
-  /// Offers the latest frame to every viewer that has not had it and may have it now; returns when the next
-  /// viewer's turn comes.
+  /// Offers the latest frame to every viewer that has not received it and is due; returns when the next
+  /// viewer will be due.
   std::optional<TimePoint> deliver();
 
  private:
   struct Viewer {
     std::shared_ptr<ViewerSink> sink;
     bool visible = true;
-    TimePoint::duration period{0};  ///< between two offers, at least
+    TimePoint::duration period{0};  ///< least time between two offers
     TimePoint lastOffer;
     std::uint32_t lastNumber = 0;
     std::uint32_t containedPatch = 0;
@@ -200,15 +198,15 @@ class Session {
   const SessionHooks hooks_;
 
   mutable std::mutex mutex_;
-  std::condition_variable_any frameCame_;  ///< a frame, a failure, an edit or the end
+  std::condition_variable_any frameCame_;  ///< a frame, a pick's answer, a failure, an edit or the end
   std::shared_ptr<const ResolvedScene> scene_;
   std::uint32_t revision_ = 1;
-  std::optional<TimePoint> lastEdit_;  ///< that changed the picture
+  std::optional<TimePoint> lastEdit_;  ///< the last edit that changed the picture
   TimePoint lastUsed_;
   bool closed_ = false;
   std::uint32_t failedRevision_ = 0;
   std::optional<Error> failure_;
-  std::optional<TimePoint> retryAt_;  ///< of a failure because others held the memory
+  std::optional<TimePoint> retryAt_;  ///< set if it failed because others held the memory
   std::uint32_t failures_ = 0;
   std::map<ViewerId, Viewer> viewers_;
   ViewerId nextViewer_ = 1;

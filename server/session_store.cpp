@@ -22,7 +22,7 @@ std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene) {
         503, "",
         "there are " + std::to_string(sessions_.size()) + " sessions, as many as this server allows");
   sessions_.push_back(session);
-  hooks_.wakeRender();  // which ends it when nobody comes
+  hooks_.wakeRender();  // which ends the session if nobody uses it
   return session;
 }
 
@@ -51,7 +51,7 @@ bool SessionStore::remove(std::string_view id) {
     sessions_.erase(found);
   }
   session->close("the session was deleted");
-  hooks_.wakeRender();  // which lets go of its renderer
+  hooks_.wakeRender();  // which releases the session's renderer
   return true;
 }
 

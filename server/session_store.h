@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sessions there are. A session outlives its viewers for a while and then ends.
+// All sessions. A session outlives its last viewer for a while and then ends.
 #pragma once
 #include <functional>
 #include <map>
@@ -22,17 +22,17 @@ class SessionStore {
   };
   SessionStore(std::shared_ptr<const SceneResolver> resolver, Options options, SessionHooks hooks);
 
-  /// Throws ProtocolError: 503 when there are as many as there may be, 422 for a scene that is none; and
-  /// Unmeasured until what the scene needs of the data is measured.
+  /// Throws ProtocolError: 503 if the maximum number of sessions is reached, 422 for an invalid scene; and
+  /// Unmeasured until the data that the scene needs has been measured.
   std::shared_ptr<Session> create(const nlohmann::json& scene);
-  /// nullptr when there is none.
+  /// nullptr if there is none.
   std::shared_ptr<Session> find(std::string_view id) const;
   std::shared_ptr<Session> findByToken(std::string_view token) const;
-  /// Ends it; false when there is none.
+  /// Ends the session; false if there is none with this id.
   bool remove(std::string_view id);
   /// In the order of their creation.
   std::vector<std::shared_ptr<Session>> all() const;
-  /// Ends the sessions whose time is over; returns when the next one's may be.
+  /// Ends the sessions that have expired; returns when the next one may expire.
   std::optional<TimePoint> expire();
   void closeAll(const std::string& reason);
 

@@ -18,7 +18,7 @@ namespace scolopax::server {
 
 using protocol::ProtocolError;
 
-/// Text messages come one at a time, on any thread; frames from the encoder thread alone.
+/// Text messages come one at a time, on any thread; frames come only from the encoder thread.
 class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
  public:
   Stream(SessionStore& store, Background& background, const protocol::Limits& limits,
@@ -102,7 +102,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   void handle(const protocol::PatchMessage& message) {
     const EditOrigin origin{viewer_, message.id, std::nullopt};
     EditQueue::Edit edit;
-    // Kept as text: parsed, it takes many times the memory while it waits.
+    // Kept as text, since parsed it would take many times the memory while it waits.
     edit.apply = [session = session_, text = *received_, origin, &limits = limits_] {
       session->patch(std::get<protocol::PatchMessage>(protocol::parseClientMessage(text, limits)).patch,
                      origin);
@@ -120,8 +120,8 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   void handle(const protocol::AckMessage& message) {
     if (const auto socket = socket_.lock()) socket->acknowledge(message.frame);
   }
-  /// In its turn among the edits, so that a pong tells that those before it are made or refused. Number 0
-  /// asks only whether there is somebody.
+  /// Answered in order with the edits, so that a pong shows that those before it have been applied or
+  /// refused. Number 0 only asks whether the server responds.
   void handle(const protocol::PingMessage& message) {
     if (message.id == 0) return sendText(protocol::pongText(0));
     const auto answer = [stream = weak_from_this(), id = message.id] {
@@ -146,13 +146,14 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   }
   void handle(const protocol::ResumeMessage& message) {
     auto session = store_.findByToken(message.token);
-    if (!session) throw ProtocolError(404, "/token", "there is no session of this token; it may have ended");
-    if (session == session_) return;  // joined by the stream's address already
+    if (!session)
+      throw ProtocolError(404, "/token", "there is no session with this token; it may have ended");
+    if (session == session_) return;  // the stream's address has already joined it
     leave();
     join(std::move(session));
   }
 
-  /// Tells why an edit was not made.
+  /// Reports why an edit was refused.
   void refuse(std::uint32_t id, const std::exception_ptr& failure) {
     try {
       std::rethrow_exception(failure);
@@ -187,8 +188,8 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   const std::weak_ptr<net::WebSocket> socket_;
   std::shared_ptr<Session> session_;
   ViewerId viewer_ = 0;
-  std::shared_ptr<EditQueue> edits_;       ///< of this session
-  const std::string* received_ = nullptr;  ///< the message that is handled
+  std::shared_ptr<EditQueue> edits_;       ///< for edits to session_
+  const std::string* received_ = nullptr;  ///< the message being handled
   bool sizeNoticeSent_ = false;
   std::atomic<std::uint32_t> frameNumber_{0};
 

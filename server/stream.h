@@ -17,7 +17,7 @@ namespace scolopax::server {
 
 class Stream;
 
-/// The streams that are open. Must outlive the connections.
+/// All open streams. Must outlive the connections.
 class StreamHub {
  public:
   struct Options {
@@ -25,15 +25,15 @@ class StreamHub {
     protocol::Limits limits;
     nlohmann::json capabilities;  ///< for hello
   };
-  /// `background` measures what edits wait for.
+  /// `background` runs the measurements that edits wait for.
   StreamHub(SessionStore& store, Background& background, Metrics& metrics, Options options);
   ~StreamHub();
 
-  /// Joins the socket to the session as a viewer and returns what its events do. Throws ProtocolError(503)
-  /// when there are as many streams as there may be.
+  /// Joins the socket to the session as a viewer and returns the handlers of its events. Throws
+  /// ProtocolError(503) if the maximum number of streams is reached.
   net::WebSocketEvents join(const std::shared_ptr<Session>& session,
                             const std::shared_ptr<net::WebSocket>& socket);
-  /// Brings the frame counts of the open streams into the metrics.
+  /// Adds the frame counts of the open streams to the metrics.
   void countFrames();
   std::size_t count() const;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nothing is fast or accurate alone: every method becomes a list of points (time, error), measured in one
-// run, taking turns, against the double-precision reference.
+// Speed and accuracy mean nothing without each other: every method becomes a list of points (time, error).
+// All are measured in turns, in one run, against the double-precision reference.
 #include "server/commands/bench.h"
 
 #include <fmt/core.h>
@@ -51,7 +51,7 @@ double secondsSince(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-/// Rising, each number once.
+/// In ascending order, without duplicates.
 template <class Number>
 std::vector<Number> ordered(std::vector<Number> numbers) {
   std::sort(numbers.begin(), numbers.end());
@@ -59,14 +59,14 @@ std::vector<Number> ordered(std::vector<Number> numbers) {
   return numbers;
 }
 
-/// All settings asked for, without samples; those of one method stand together.
+/// All settings requested, without numbers of samples; those of one method are adjacent.
 std::vector<Setting> settingsOf(const Options& options) {
   std::vector<Setting> settings;
   for (std::size_t i = 0; i < std::size(kMethods); ++i) {
     const auto method = Method(i);
     const bool named =
         std::find(options.methods.begin(), options.methods.end(), nameOf(method)) != options.methods.end();
-    // `auto` is one of the others, and not measured twice unless asked for.
+    // `auto` chooses one of the others, and is measured only on request.
     if (options.methods.empty() ? method == Method::automatic : !named) continue;
     for (const int macrocell : ordered(options.macrocells))
       for (const int threads : ordered(options.threads))
@@ -92,9 +92,9 @@ Renderers renderersFor(const std::shared_ptr<const Volume>& volume, const Option
   return renderers;
 }
 
-/// The settings with every number of samples that stays within the longest time, as one sample, which also
-/// warms up, foretells it. At least the fewest samples are kept. Costs are counted by other renderers, since
-/// counting slows down.
+/// The settings with every number of samples that stays within the longest time, as predicted by one sample,
+/// which also warms up. The smallest number is always kept. Costs are counted by separate renderers, since
+/// counting slows them down.
 std::vector<Point> pointsOf(const Options& options, const Renderers& renderers, const Renderers& counting,
                             const Scene& scene) {
   std::vector<Point> points;
@@ -126,7 +126,7 @@ std::vector<Point> pointsOf(const Options& options, const Renderers& renderers, 
   return points;
 }
 
-/// The pixels whose centres are those of a picture `factor` (odd) times smaller.
+/// The pixels whose centres are also pixel centres of a picture `factor` (odd) times smaller.
 Image thinned(const Image& image, int factor) {
   Image small{image.width / factor, image.height / factor, {}};
   for (int y = factor / 2; y < image.height; y += factor)
@@ -149,13 +149,13 @@ void measure(Point& point, Renderer& renderer, const Scene& scene, const std::op
   for (std::size_t i = 0; i < image.pixels.size(); ++i) point.sum[i] += glm::dvec4(image.pixels[i]);
 }
 
-/// What is allocated in all of the program.
+/// Bytes allocated in the whole program.
 std::size_t heapBytes() {
   const struct mallinfo2 info = mallinfo2();
   return info.uordblks + info.hblkhd;
 }
 
-/// Bytes of the data and of what is made from them, as the heap grows by each.
+/// Bytes of the data and of what is made from it, measured by the growth of the heap.
 ordered_json memoryOf(const std::shared_ptr<const Volume>& volume, Scene scene, int macrocell) {
   std::size_t data = 0;
   for (const Channel& channel : volume->channels())
@@ -193,7 +193,7 @@ std::optional<Image> truthOf(const Options& options, const Volume& volume, const
   const int factor = scene.width / std::max(truth.width, 1);
   if (factor % 2 == 0 || truth.width * factor != scene.width || truth.height * factor != scene.height)
     throw Error(ErrorCode::badInput,
-                fmt::format("{}: expected {}x{} pixels or an odd number of times less, found {}x{}",
+                fmt::format("{}: expected {}x{} pixels, or fewer by an odd factor, found {}x{}",
                             options.truth.string(), scene.width, scene.height, truth.width, truth.height));
   return truth;
 }
@@ -217,12 +217,12 @@ void run(Options options) {
   ordered_json memory = ordered_json::array();
   for (const int macrocell : ordered(options.macrocells))
     memory.push_back(memoryOf(volume, scene, macrocell));
-  std::vector<std::shared_ptr<const MacrocellGrid>> held;  // so that a change of size builds majorants only
+  std::vector<std::shared_ptr<const MacrocellGrid>> held;  // so that only majorants are rebuilt
   for (const int macrocell : options.macrocells) held.push_back(sharedMacrocells(volume, macrocell));
   const Renderers renderers = renderersFor(volume, options), counting = renderersFor(volume, options);
   for (const auto& [threads, renderer] : counting) renderer->countCosts();
   std::vector<Point> points = pointsOf(options, renderers, counting, scene);
-  // A seed of its own for every picture: none goes on with the samples of the one before.
+  // A separate seed for every picture, so that none continues the samples of the previous one.
   scene.seed = resolved->render.seed;
   for (int repetition = 0; repetition < options.repetitions; ++repetition)
     for (Point& point : points) {
@@ -249,45 +249,45 @@ CLI::App* addBenchCommand(CLI::App& root) {
   const auto o = std::make_shared<Options>();
   addSceneArguments(*command, o->scene);
   command
-      ->add_option("--methods", o->methods,
-                   "Methods to measure, separated by commas; all but auto without this")
+      ->add_option("--methods", o->methods, "Methods to measure, separated by commas; default: all but auto")
       ->delimiter(',');
-  command->add_option("--samples", o->samples, "Sample counts; 1,4,16,64 without this")
+  command->add_option("--samples", o->samples, "Sample counts; default: 1,4,16,64")
       ->delimiter(',')
       ->check(CLI::Range(1u, 1u << 24));
   command
-      ->add_option("--steps", o->steps,
-                   "Steps of the methods that have one, in voxels; 4,2,1,0.5 without this")
+      ->add_option("--steps", o->steps, "Steps of the methods that have one, in voxels; default: 4,2,1,0.5")
       ->delimiter(',')
       ->check(CLI::Range(0.01, 100.0) & numberUpTo(100, false));
-  command->add_option("--macrocells", o->macrocells, "Macrocell edges, in voxels; the scene's without this")
+  command->add_option("--macrocells", o->macrocells, "Macrocell edges, in voxels; default: the scene's")
       ->delimiter(',')
       ->check(CLI::Range(1, 64));
-  command->add_option("--threads", o->threads, "Numbers of threads; 0 takes all")
+  command->add_option("--threads", o->threads, "Numbers of threads; 0: all")
       ->delimiter(',')
       ->check(CLI::Range(0, 1024));
-  command->add_option("--repetitions", o->repetitions, "Seeds and timings of every point; medians are told")
+  command
+      ->add_option("--repetitions", o->repetitions,
+                   "Repetitions of every point, each with its own seed; medians are reported")
       ->check(CLI::Range(2, 1000))
       ->capture_default_str();
   command
       ->add_option("--longest", o->longest,
-                   "Leave out sample counts that would take more seconds than this, all but the smallest")
+                   "Leave out sample counts that would take more seconds than this, except the smallest")
       ->check(numberUpTo(1e9, false))
       ->capture_default_str();
   auto* truth = command->add_option("--truth", o->truth,
-                                    "Picture that errors are counted from, made by scolopax reference with "
-                                    "image.filter=point; it may be an odd "
-                                    "number\nof times smaller: then only pixels at its pixels' centres "
-                                    "count. Without it the reference is rendered");
+                                    "Reference picture for the errors, made by scolopax reference with "
+                                    "image.filter=point; it may be smaller by an odd "
+                                    "factor:\nthen only the pixels at the centres of its pixels "
+                                    "count. By default the reference is rendered");
   command->add_flag("--times-only", o->timesOnly, "Times and counts only, no reference and no errors")
       ->excludes(truth);
-  command->add_option("--json", o->json, "Write the numbers here instead of printing a table");
+  command->add_option("--json", o->json, "Write the numbers to this file instead of printing a table");
   command->footer(
       "Samples go through the pixels' centres, where the reference has no noise. Methods without a step are "
       "unbiased and\n"
       "compared by 1 / (MSE x seconds) with sync-dda at the same number of samples (to sync). The bias is "
       "what "
-      "stays\n"
+      "remains\n"
       "when the pictures of all repetitions are averaged.");
   command->callback([o] { run(*o); });
   return command;

@@ -4,7 +4,7 @@
 
 namespace scolopax {
 
-/// Speed against error of the methods on one scene.
+/// Adds `bench`, which measures speed against error of the methods on one scene.
 CLI::App* addBenchCommand(CLI::App& root);
 
 }  // namespace scolopax

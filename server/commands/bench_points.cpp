@@ -17,14 +17,14 @@ using nlohmann::ordered_json;
 
 constexpr double kTargets[] = {1e-2, 1e-3};  // RMSE
 
-/// Whether more samples leave an error; `auto` may choose what has one.
+/// Whether an error remains however many samples are taken; `auto` may choose a method that has one.
 bool isBiased(Method method) { return hasStep(method) || method == Method::automatic; }
 
 struct Reached {
   double seconds, samples, step;
 };
 
-/// How this method's points reach the target best, if they do.
+/// The quickest way in which this method's points reach the target, if any does.
 std::optional<Reached> reach(double target, const std::vector<const Point*>& points,
                              const std::optional<Image>& truth) {
   std::optional<Reached> best;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What bench measures: settings, the points (time, error) that they become, and what follows from them.
+// The measurements of `bench`: settings, the points (time, error) measured for them, and the results.
 #pragma once
 #include <cstdint>
 #include <glm/vec4.hpp>
@@ -15,16 +15,16 @@ namespace scolopax::bench {
 struct Setting {
   Method method;
   std::uint32_t samples;
-  double step;  ///< of methods that have one, in smallest spacings; else 0
+  double step;  ///< in smallest voxel spacings; 0 for methods without one
   int macrocell, threads;
 };
 
 struct Point : Setting {
-  std::vector<double> seconds, squaredErrors;  ///< of every repetition; no errors without a truth
+  std::vector<double> seconds, squaredErrors;  ///< for every repetition; no errors without a reference
   std::vector<glm::dvec4> sum;                 ///< of the pictures of all repetitions
   double flip = 0;                             ///< of the first repetition
   RenderStats counts;                          ///< of one sample
-  double rebuildMs = 0;                        ///< of the first setScene, macrocells apart
+  double rebuildMs = 0;                        ///< of the first setScene, without building macrocells
   std::uint32_t samplesTimed = 0;
 
   double time() const;  ///< median, seconds
@@ -32,20 +32,22 @@ struct Point : Setting {
   double efficiency() const { return 1 / (mse() * time()); }
 };
 
-/// Squared error that stays when pictures of independent seeds are averaged: that of the mean of k pictures
-/// is bias^2 + noise / k, of one bias^2 + noise. 0 where the noise hides it.
+/// The squared error that remains when pictures of independent seeds are averaged. One picture's squared
+/// error is bias^2 + noise; that of the mean of k pictures is bias^2 + noise / k. 0 if the noise hides the
+/// bias.
 double squaredBias(const Point& point, const Image& truth);
 
-/// Rows "points", one per point, and "timeToError", one per method, macrocell size and number of threads:
-/// the time to an RMSE of 1e-2 and 1e-3, with the samples and the step that reach it, null where nothing
-/// measured says. Of methods without a step by the law of their noise, from the most samples measured; of
-/// the others at the best step, by that law above their bias and over at most kLongestReach times the
-/// samples measured, since a bias well below the noise cannot be told. Without `truth` times and counts only.
+/// Rows "points", one per point, and "timeToError", one per method, macrocell size and number of threads: the
+/// time to an RMSE of 1e-2 and of 1e-3, and the samples and step that reach it; null if the measurements do
+/// not tell. For methods without a step, this is extrapolated by the law of their noise from the most samples
+/// measured. For the others it is the best step's, extrapolated by that law above the bias and to at most
+/// kLongestReach times the samples measured, since a bias well below the noise cannot be seen. Without
+/// `truth`, times and counts only.
 nlohmann::ordered_json report(const std::vector<Point>& points, const std::optional<Image>& truth,
                               std::size_t pixels);
 inline constexpr double kLongestReach = 16;
 
-/// The table of what report() gave.
+/// Prints the result of report() as a table.
 void print(const nlohmann::ordered_json& result);
 
 }  // namespace scolopax::bench

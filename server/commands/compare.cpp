@@ -61,7 +61,7 @@ CLI::App* addCompareCommand(CLI::App& root) {
   command->add_flag("--json", options->json,
                     "Print one JSON object {rmse, psnr, max, relative, flip}; psnr is null if equal");
   command->add_option("--difference", options->difference,
-                      "Write FLIP of every pixel as a picture, from black (0) to light yellow (1)");
+                      "Write the FLIP of every pixel as a picture, from black (0) to light yellow (1)");
   command->callback([options] { compare(*options); });
   return command;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// scolopax compare: how far two pictures are apart.
+// scolopax compare: the difference between two pictures.
 #pragma once
 namespace CLI {
 class App;

@@ -33,7 +33,7 @@ void generateOrbitalFile(const OrbitalOptions& options) {
 }  // namespace
 
 CLI::App* addGenerateCommand(CLI::App& root) {
-  CLI::App* command = root.add_subcommand("generate", "Write a data set that is made from a formula");
+  CLI::App* command = root.add_subcommand("generate", "Write a data set computed from a formula");
   command->require_subcommand(1);
 
   CLI::App* orbitals = command->add_subcommand(

@@ -36,11 +36,13 @@ CLI::App* addInfoCommand(CLI::App& root) {
     bool json = false;
   };
   CLI::App* command = root.add_subcommand(
-      "info", "Say what files hold: dimensions, spacing, and each channel's name, type and range");
+      "info",
+      "Print what volume files contain: dimensions, spacing, and each channel's name, type and range");
   const auto options = std::make_shared<Options>();
-  command->add_option("PATH", options->paths, "Volume files; those of one grid are one data set")->required();
+  command->add_option("PATH", options->paths, "Volume files; files with the same grid form one data set")
+      ->required();
   command->add_flag("--json", options->json,
-                    "Print a list in JSON of what GET /api/v1/datasets/ID answers for each");
+                    "Print a JSON list of what GET /api/v1/datasets/ID returns for each");
   command->callback([options] {
     const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
     const auto datasets = io::loadDatasets(options->paths, io::defaultMemoryLimitBytes(), warn);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// scolopax info: what files hold.
+// scolopax info: what volume files contain.
 #pragma once
 namespace CLI {
 class App;

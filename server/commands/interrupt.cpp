@@ -9,12 +9,12 @@ namespace {
 
 std::atomic<bool> interrupted{false};
 volatile std::sig_atomic_t caught = 0;
-static_assert(std::atomic<bool>::is_always_lock_free);  // what a handler may write to
+static_assert(std::atomic<bool>::is_always_lock_free);  // required in a signal handler
 
 extern "C" void onInterrupt(int signal) {
   caught = signal;
   interrupted = true;
-  for (const int other : {SIGTERM, SIGINT}) std::signal(other, SIG_DFL);  // the second of either ends at once
+  for (const int other : {SIGTERM, SIGINT}) std::signal(other, SIG_DFL);  // a second one ends at once
 }
 
 }  // namespace

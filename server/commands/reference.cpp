@@ -42,8 +42,8 @@ void renderTruth(const Options& options) {
 }  // namespace
 
 CLI::App* addReferenceCommand(CLI::App& root) {
-  CLI::App* command = root.add_subcommand(
-      "reference", "Render a scene in double precision: slow, what errors are counted from");
+  CLI::App* command =
+      root.add_subcommand("reference", "Render a scene in double precision: slow, the reference for errors");
   const auto o = std::make_shared<Options>();
   addSceneArguments(*command, o->scene);
   command
@@ -51,14 +51,15 @@ CLI::App* addReferenceCommand(CLI::App& root) {
                    "Picture: .exr or .tif (float, linear premultiplied RGBA), .png or .jpg")
       ->required();
   command
-      ->add_option("--samples-per-axis", o->samplesPerAxis,
-                   "Strata of a pixel along x and y, two rays in each; with image.filter=point one ray goes "
-                   "through the\npixel's centre, and there is no noise")
+      ->add_option(
+          "--samples-per-axis", o->samplesPerAxis,
+          "Strata per pixel along x and along y, with two rays in each; with image.filter=point one ray goes "
+          "through the\npixel's centre, and there is no noise")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   command->footer(
-      "Prints the largest estimated error of a ray, and the noise that sampling the pixels' areas leaves.\n"
-      "integrator.method, .step and .macrocell of the scene are of no account.");
+      "Prints the largest estimated error of a ray, and the noise left by sampling the pixels' areas.\n"
+      "The scene's integrator.method, .step and .macrocell have no effect.");
   command->callback([o] { renderTruth(*o); });
   return command;
 }

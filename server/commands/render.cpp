@@ -37,7 +37,7 @@ struct Options {
   int threads = 0;
 };
 
-/// A picture beside the picture.
+/// An AOV to be written beside the picture.
 struct AovFile {
   Aov aov;
   std::filesystem::path path;
@@ -61,7 +61,7 @@ void writeAov(const AovFile& file, const Renderer& renderer) {
   io::writeImage(file.path, isFloat ? aovImage(values) : aovPicture(values), glm::vec3(0));
 }
 
-/// A line that is rewritten while one watches; nothing where nobody does.
+/// A progress bar that is redrawn on one line of a terminal; elsewhere it prints nothing.
 class ProgressBar {
  public:
   explicit ProgressBar(const server::StopRule& stop) : stop_(stop) {}
@@ -108,7 +108,7 @@ void writeStats(const std::filesystem::path& path, const Renderer& renderer, con
 }
 
 void render(const Options& options) {
-  // Before minutes are spent on a picture that cannot be written.
+  // Checked before minutes are spent on a picture that cannot be written.
   io::checkImageName(options.out);
   io::checkWritable(options.out);
   if (!options.stats.empty()) io::checkWritable(options.stats);
@@ -124,7 +124,7 @@ void render(const Options& options) {
   checkOutputs(outputs, options.scene);
   const auto resolved = resolveScene(options.scene);
   server::StopRule stop = resolved->stop;
-  // A rule on the command line replaces the scene's: what is asked for last is what is meant.
+  // A stop rule on the command line replaces the scene's as a whole.
   if (options.samples || options.seconds || options.error)
     stop = {options.samples.value_or(0), options.seconds.value_or(0), options.error.value_or(0)};
   Scene scene = resolved->render;
@@ -139,7 +139,7 @@ void render(const Options& options) {
   const auto start = Clock::now();
   double seconds = 0;
   while (true) {
-    // In slices, so that the bar moves and --seconds holds also where one sample takes long.
+    // In slices, so that the bar moves and --seconds holds even if one sample takes long.
     renderer->renderSample(cancel, std::chrono::milliseconds(100));
     seconds = std::chrono::duration<double>(Clock::now() - start).count();
     bar.show(renderer->samples(), seconds);
@@ -149,8 +149,9 @@ void render(const Options& options) {
   }
   bar.clear();
   if (cancel) {
-    fmt::print(stderr, "scolopax: interrupted after {} samples; {}\n", renderer->samples(),
-               renderer->samples() > 0 ? "the picture is written with these" : "no picture is written");
+    fmt::print(
+        stderr, "scolopax: interrupted after {} samples; {}\n", renderer->samples(),
+        renderer->samples() > 0 ? "the picture is written with these samples" : "no picture is written");
     if (renderer->samples() == 0) endByInterrupt();
   }
   io::writeImage(options.out, renderer->image(), resolved->render.background);
@@ -170,30 +171,31 @@ CLI::App* addRenderCommand(CLI::App& root) {
                    "Picture: .png or .jpg (sRGB, over the background), .exr or .tif (float, linear "
                    "premultiplied RGBA)")
       ->required();
-  command->add_option("--samples", o->samples, "Stop at so many samples a pixel")
+  command->add_option("--samples", o->samples, "Stop after this many samples per pixel")
       ->check(CLI::Range(1u, 1u << 24));
   command->add_option("--seconds", o->seconds, "Stop after this time")->check(numberUpTo(1e9, false));
   command->add_option("--error", o->error, "Stop at this estimated RMSE over linear premultiplied RGBA")
       ->check(numberUpTo(1e9, false));
-  command->add_option("--threads", o->threads, "Threads to use; 0 takes all")
+  command->add_option("--threads", o->threads, "Threads to use; 0: all")
       ->envname("SCOLOPAX_THREADS")
       ->check(CLI::Range(0, 1024));
   std::string names;
   for (const NamedValue& aov : kAovs) names += fmt::format("\n{}: {}", aov.name, aov.doc);
   command
       ->add_option("--aov", o->aovs,
-                   "NAME=FILE: also write what else is known of the pixels, as values to .exr or .tif, as a "
+                   "NAME=FILE: also write another quantity of the pixels, as values to .exr or .tif, as a "
                    "picture to .png or .jpg:" +
                        names)
       ->allow_extra_args(false);
   command->add_option("--stats", o->stats, "Write counts and times as JSON");
   command->footer(
-      "With several stop rules the first that is met ends the rendering; without any, the scene's (64 "
+      "Rendering stops when the first of several stop rules is met; without any, the scene's apply (64 "
       "samples).\n"
-      "Ctrl-C and SIGTERM end it as well: the picture is written as it stands, and the status is 130 or 143. "
+      "Ctrl-C and SIGTERM stop it as well: the picture is written as it is, and the status is 130 or 143. "
       "A "
-      "second one ends at once.");
-  // With one, CLI11 reads the environment when this command is parsed; without, whichever command runs.
+      "second one ends the program at once.");
+  // With a callback here, CLI11 reads the environment when this command is parsed; without one, whichever
+  // command runs.
   command->parse_complete_callback([] {});
   command->callback([o] { render(*o); });
   return command;

@@ -48,12 +48,13 @@ json patchOf(const std::string& assignment) {
 
 void addSceneArguments(CLI::App& command, SceneArguments& arguments) {
   command.add_option("SCENE", arguments.scene,
-                     "Scene file (JSON, see PROTOCOL.md); without one, a good first picture");
-  command.add_option("--data", arguments.data, "Volume files; those of one grid are one data set")
+                     "Scene file (JSON, see PROTOCOL.md); by default, a good first picture");
+  command.add_option("--data", arguments.data, "Volume files; files with the same grid form one data set")
       ->required();
   command
-      .add_option("--set", arguments.assignments,
-                  "Set a field of the scene, as channels.0.density=0.1; the value is JSON, else a string")
+      .add_option(
+          "--set", arguments.assignments,
+          "Set a field of the scene, e.g. channels.0.density=0.1; a value that is not JSON is a string")
       ->allow_extra_args(false);
 }
 
@@ -67,7 +68,7 @@ std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& 
   const server::SceneResolver resolver(store, {});
   auto resolved = resolver.replace(scene);
   for (const json& patch : patches) resolved = resolver.patch(*resolved, patch);
-  // As one scene: the automatic view is that of the final curves.
+  // Resolved again as one scene, so that the automatic view fits the final curves.
   return patches.empty() ? resolved : resolver.replace(resolved->sparse);
 }
 
@@ -81,7 +82,7 @@ void checkOutputs(const std::vector<std::filesystem::path>& outputs, const Scene
   if (!arguments.scene.empty()) taken.push_back(canonical(arguments.scene));
   for (const auto& path : outputs) {
     if (std::find(taken.begin(), taken.end(), canonical(path)) != taken.end())
-      throw CLI::ValidationError(path.string(), "expected a file that is not read or written otherwise");
+      throw CLI::ValidationError(path.string(), "expected a file that is not also read or written otherwise");
     taken.push_back(canonical(path));
   }
 }

@@ -17,14 +17,14 @@ struct SceneArguments {
   std::vector<std::string> assignments;  ///< "channels.0.density=0.1"
 };
 
-/// Adds SCENE, --data and --set, which fill `arguments`; it must live as long as the command.
+/// Adds SCENE, --data and --set, which fill `arguments`; these must live as long as the command.
 void addSceneArguments(CLI::App& command, SceneArguments& arguments);
 
-/// Loads the data, reads the scene and applies the assignments in their order. Throws Error or ProtocolError,
-/// and CLI::ValidationError for an assignment that is none, before anything is loaded.
+/// Loads the data, reads the scene and applies the assignments in order. Throws Error or ProtocolError, and,
+/// before anything is loaded, CLI::ValidationError for a malformed assignment.
 std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& arguments);
 
-/// Throws CLI::ValidationError when two of the files are one, or one is to be written over data that is read.
+/// Throws CLI::ValidationError if two outputs are the same file, or if one would overwrite an input.
 void checkOutputs(const std::vector<std::filesystem::path>& outputs, const SceneArguments& arguments);
 
 }  // namespace scolopax

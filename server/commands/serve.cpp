@@ -38,7 +38,7 @@ struct ServeOptions {
   std::uint64_t maxMemoryMebibytes = io::defaultMemoryLimitBytes() / 2 >> 20;
 };
 
-/// The built page: where the build left it, or beside the folder of the program; empty when there is none.
+/// The folder of the built page: where the build left it, or relative to the program; empty if there is none.
 std::string findWebRoot() {
   std::error_code error;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
@@ -48,7 +48,7 @@ std::string findWebRoot() {
   return "";
 }
 
-// A signal may come to any thread, so its handler only writes to a pipe that the main thread reads.
+// A signal may be delivered to any thread, so its handler only writes to a pipe that the main thread reads.
 int signalPipe[2] = {-1, -1};
 
 extern "C" void onSignal(int) {
@@ -62,7 +62,7 @@ void catchSignals() {
   if (pipe2(signalPipe, O_CLOEXEC) != 0) throw Error(ErrorCode::io, "cannot make a pipe for signals");
   struct sigaction action = {};
   action.sa_handler = onSignal;
-  action.sa_flags = int(SA_RESETHAND | SA_RESTART);  // a second one ends the program at once
+  action.sa_flags = int(SA_RESETHAND | SA_RESTART);  // a second one of its kind ends the program
   for (const int signal : {SIGTERM, SIGINT}) sigaction(signal, &action, nullptr);
 }
 
@@ -94,7 +94,7 @@ void serve(ServeOptions options) {
                                             std::string(config.keyFile.empty() ? "cert" : "key"));
   net::checkTlsFiles(config.certificateFile, config.keyFile);
   if (!isLoopback(config.host) && config.certificateFile.empty())
-    log->warn("{} can be reached from other machines, and what is sent is not encrypted", config.host);
+    log->warn("{} can be reached from other machines, and the traffic is not encrypted", config.host);
 
   auto datasets = io::loadDatasets(server::pathsBelowRoot(options.paths, options.dataRoot),
                                    io::defaultMemoryLimitBytes(), warn);
@@ -125,34 +125,34 @@ void serve(ServeOptions options) {
 CLI::App* addServeCommand(CLI::App& root) {
   auto options = std::make_shared<ServeOptions>();
   server::Config& config = options->config;
-  CLI::App* command =
-      root.add_subcommand("serve", "Serves volumes to browsers and scripts until it is told to stop");
+  CLI::App* command = root.add_subcommand("serve", "Serve volumes to browsers and scripts until stopped");
   const auto add = [command](const std::string& name, auto& value, const std::string& doc) {
     std::string variable = "SCOLOPAX_";
     for (const char c : name) variable += c == '-' ? '_' : char(std::toupper(static_cast<unsigned char>(c)));
     return command->add_option("--" + name, value, doc)->envname(variable)->capture_default_str();
   };
 
-  command->add_option("PATH", options->paths,
-                      "Volume files, at least one. Files of one grid become the channels of one data set");
-  add("host", config.host, "Address to listen on; 0.0.0.0 is every one of this machine")
+  command->add_option(
+      "PATH", options->paths,
+      "Volume files, at least one. Files with the same grid become the channels of one data set");
+  add("host", config.host, "Address to listen on; 0.0.0.0: all addresses of this machine")
       ->type_name("ADDRESS");
-  add("port", config.port, "Port to listen on; 0 takes any free one")->type_name("PORT");
+  add("port", config.port, "Port to listen on; 0: any free one")->type_name("PORT");
   add("token-file", options->tokenFile,
-      "File with the token that opens the server, one line of 16 to 512 letters, digits and -._~+/=; without "
+      "File with the token that opens the server, one line of 16 to 512 letters, digits and -._~+/=; by "
+      "default, "
       "it, a new one each start")
       ->type_name("FILE");
   add("tls-cert", config.certificateFile, "Certificate (PEM, with its chain): https instead of http")
       ->type_name("FILE");
   add("tls-key", config.keyFile, "Private key of that certificate (PEM, without a password)")
       ->type_name("FILE");
-  add("data-root", options->dataRoot, "Folder that every PATH is below and relative to")->type_name("FOLDER");
-  add("threads", config.threads, "Threads that render; 0 is all there are")
-      ->check(CLI::Range(0, 1024))
-      ->type_name("N");
-  add("log-level", options->logLevel, "What goes to standard error")
+  add("data-root", options->dataRoot, "Folder that contains every PATH and that they are relative to")
+      ->type_name("FOLDER");
+  add("threads", config.threads, "Threads for rendering; 0: all")->check(CLI::Range(0, 1024))->type_name("N");
+  add("log-level", options->logLevel, "Least severe messages to log on standard error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "critical", "off"}));
-  add("allow-origin", config.allowedOrigins, "Another site whose pages may use this server; may be repeated")
+  add("allow-origin", config.allowedOrigins, "Another site whose pages may use this server; can be repeated")
       ->type_name("https://HOST");
 
   const std::string limits = "Limits";
@@ -172,9 +172,9 @@ CLI::App* addServeCommand(CLI::App& root) {
   limit("max-renders", config.maxRenders, "POST /render at once")->check(CLI::PositiveNumber);
   limit("max-body", config.maxBodyBytes, "Bytes of one request's body")->check(CLI::PositiveNumber);
   limit("max-message", config.maxMessageBytes, "Bytes of one WebSocket message")->check(CLI::PositiveNumber);
-  limit("max-json-depth", config.maxJsonDepth, "Lists and objects within each other")
+  limit("max-json-depth", config.maxJsonDepth, "Nesting depth of lists and objects")
       ->check(CLI::PositiveNumber);
-  limit("keep-session", options->keepSeconds, "Seconds that a session outlives its last client")
+  limit("keep-session", options->keepSeconds, "Seconds for which a session outlives its last client")
       ->check(numberUpTo(1e9, true));
 
   command->add_option("--config", options->configFile, "File with lines such as: port = 8081")
@@ -184,10 +184,11 @@ CLI::App* addServeCommand(CLI::App& root) {
   command->footer(
       "Each option can also be set in the environment (--max-body as SCOLOPAX_MAX_BODY) or in the file of "
       "--config;\n"
-      "the command line wins over the environment, the environment over the file.\n"
-      "The ready line on standard output holds the address with the token that opens the page.\n"
-      "SIGTERM and Ctrl-C end the server in order.");
-  // With one, CLI11 reads the environment when this command is parsed; without, whichever command runs.
+      "the command line takes precedence over the environment, the environment over the file.\n"
+      "The ready line on standard output contains the address of the page, with its token.\n"
+      "SIGTERM and Ctrl-C shut the server down in order.");
+  // With a callback here, CLI11 reads the environment when this command is parsed; without one, whichever
+  // command runs.
   command->parse_complete_callback([] {});
   command->callback([options, command] {
     if (!options->configFile.empty()) applyConfigFile(*command, options->configFile);

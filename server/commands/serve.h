@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `scolopax serve`: the program's main business.
+// `scolopax serve`: the program's main command.
 #pragma once
 #include <CLI/App.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of options that CLI11's own leave open: its ranges let NaN pass.
+// Validators of options that CLI11 lacks: its own ranges accept NaN.
 #pragma once
 #include <fmt/core.h>
 
@@ -8,7 +8,7 @@
 
 namespace scolopax {
 
-/// A number up to `highest`, above zero or, with `zeroToo`, from it.
+/// Accepts a number up to `highest` and above 0 or, with `zeroToo`, at least 0.
 inline CLI::Validator numberUpTo(double highest, bool zeroToo) {
   return {[highest, zeroToo](std::string& text) {
             double value = 0;

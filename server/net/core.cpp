@@ -35,7 +35,7 @@ Response Core::guarded(const Handler& handler, const Request& request) const {
   } catch (...) {
   }
   log(request.method + " " + request.path + ": " + cause);
-  return problem(500, "The server failed; its log says why.");
+  return problem(500, "The server failed; see its log for the cause.");
 }
 
 void Core::enter(const std::shared_ptr<Connection>& connection) {
@@ -54,7 +54,7 @@ void Core::enter(const std::shared_ptr<Connection>& connection) {
 void Core::leave(Connection* connection) {
   const std::lock_guard lock(mutex_);
   connections_.erase(connection);
-  // Under the lock: once the waiter has it, nothing of this core may be touched.
+  // Notifies under the lock: as soon as the waiter holds it, this core may be destroyed.
   left_.notify_all();
 }
 

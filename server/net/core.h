@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all connections of one server share: options, routes, threads, and the list of who is connected.
+// What all connections of one server share: options, routes, threads, and the list of connections.
 #pragma once
 #include <utility>  // Asio 1.74 needs it first under C++20
 
@@ -24,11 +24,11 @@ namespace scolopax::net {
 
 namespace asio = boost::asio;
 
-/// Something with a socket that has to end before the server does. Both may be called from any thread.
+/// A connection, which must end before the server does. Both functions may be called from any thread.
 class Connection {
  public:
   virtual ~Connection() = default;
-  virtual void beginStop() = 0;  ///< finish politely and soon
+  virtual void beginStop() = 0;  ///< finish in order, but soon
   virtual void cut() = 0;        ///< close the socket now
 };
 
@@ -36,20 +36,20 @@ class Core {
  public:
   explicit Core(Options options);
 
-  /// Refusals of the server's own, in the format that the owner chose.
+  /// A refusal by the server itself, in the format of Options::problem.
   Response problem(int status, const std::string& detail) const;
   void log(const std::string& line) const;
-  /// Runs a handler and turns what it throws into a 500.
+  /// Runs a handler and turns an exception into a log line and a 500.
   Response guarded(const Handler& handler, const Request& request) const;
 
   /// From here until leave() the server waits for this connection when it stops.
   void enter(const std::shared_ptr<Connection>& connection);
-  /// The connection is no stranger's any more: it is never cut to make room.
+  /// The connection's client is known: the connection is no longer cut to make room.
   void trust(Connection* connection);
-  /// Whether there is a place for one more connection. Strangers have half of the places at most: when they
-  /// have them all, or all are taken, the one that came first is cut.
+  /// Whether there is room for one more connection. Strangers, whose client is not known yet, have at most
+  /// half of the places: when they fill that half, or all places are taken, the oldest stranger is cut.
   bool makeRoom();
-  /// The last thing that a connection does with its core.
+  /// Must be a connection's last call to its core.
   void leave(Connection* connection);
   std::size_t connectionCount() const;
 
@@ -66,11 +66,11 @@ class Core {
   UpgradeHandler upgradeHandler;
   /// Shared with WebSocket handles, which may outlive the server.
   std::shared_ptr<asio::io_context> io = std::make_shared<asio::io_context>();
-  /// Bytes; shared as well.
+  /// Bytes of texts that wait to be sent; shared as well.
   std::shared_ptr<std::atomic<std::size_t>> unsentTexts = std::make_shared<std::atomic<std::size_t>>(0);
   asio::thread_pool workers;
   asio::thread_pool bulkWorkers;
-  /// Pool for quick work of this size: large requests queue only behind each other.
+  /// The pool for quick work on so many bytes: large requests queue only behind each other.
   asio::thread_pool& workersFor(std::size_t bytes) { return bytes > kBulkBytes ? bulkWorkers : workers; }
   asio::thread_pool slowWorkers;
   std::atomic<int> slowRunning{0};
@@ -79,7 +79,7 @@ class Core {
  private:
   struct Entry {
     std::weak_ptr<Connection> connection;
-    std::uint64_t arrival;  ///< counts those who enter
+    std::uint64_t arrival;  ///< number of connections that entered before
     bool stranger = true;
     bool leaving = false;  ///< was cut to make room
   };

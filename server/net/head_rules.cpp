@@ -13,7 +13,7 @@ namespace {
 
 namespace http = boost::beast::http;
 
-/// Paths meet regular expressions, whose recursion grows with the text.
+/// Paths are matched by regular expressions, whose recursion grows with the length of the text.
 constexpr std::size_t kPathLimit = 2048;
 constexpr std::array<std::string_view, 7> kMethods{"GET",   "HEAD",   "POST",   "PUT",
                                                    "PATCH", "DELETE", "OPTIONS"};
@@ -32,13 +32,13 @@ std::optional<Refusal> readHead(const HeadFields& head, std::size_t bodyLimit, R
   const auto codings = request.headers.equal_range("Transfer-Encoding");
   if (codings.first != codings.second) {
     if (count("Content-Length") > 0)
-      return Refusal{400, "Transfer-Encoding and Content-Length exclude each other."};
+      return Refusal{400, "Transfer-Encoding and Content-Length may not both be given."};
     if (head.version() < 11) return Refusal{400, "Transfer-Encoding needs HTTP/1.1."};
     if (count("Transfer-Encoding") > 1 || !equalIgnoringCase(codings.first->second, "chunked")) {
-      return Refusal{501, "The only Transfer-Encoding here is chunked."};
+      return Refusal{501, "The only supported Transfer-Encoding is chunked."};
     }
   }
-  if (count("Content-Length") > 1) return Refusal{400, "Content-Length is given twice."};
+  if (count("Content-Length") > 1) return Refusal{400, "Content-Length is given more than once."};
   if (const std::string* length = request.header("Content-Length")) {
     std::uint64_t value = 0;
     const char* end = length->data() + length->size();
@@ -56,14 +56,14 @@ std::optional<Refusal> readHead(const HeadFields& head, std::size_t bodyLimit, R
     }
   }
   if (count("Host") > 1 || (count("Host") == 0 && head.version() >= 11)) {
-    return Refusal{400, "One Host header is needed."};
+    return Refusal{400, "Exactly one Host header is required."};
   }
   if (std::find(kMethods.begin(), kMethods.end(), request.method) == kMethods.end()) {
-    return Refusal{501, "There is no such method here."};
+    return Refusal{501, "This method is not supported."};
   }
   const std::string* expect = request.header("Expect");
   if (expect && !equalIgnoringCase(*expect, "100-continue")) {
-    return Refusal{417, "The only expectation here is 100-continue."};
+    return Refusal{417, "The only supported expectation is 100-continue."};
   }
   const std::string_view target = view(head.target());
   if (target.substr(0, target.find('?')).size() > kPathLimit) return Refusal{414, "The path is too long."};
@@ -79,7 +79,7 @@ std::optional<Refusal> refusalOf(const boost::system::error_code& error) {
     return Refusal{431, "The head of the request is too large."};
   }
   if (error == http::error::body_limit) return Refusal{413, "The body is too large."};
-  if (error == http::error::bad_version) return Refusal{505, "Only HTTP/1.0 and HTTP/1.1 are spoken here."};
+  if (error == http::error::bad_version) return Refusal{505, "Only HTTP/1.0 and HTTP/1.1 are supported."};
   if (error == http::error::end_of_stream || error == http::error::partial_message) return std::nullopt;
   if (error.category() == http::make_error_code(http::error::bad_method).category()) {
     return Refusal{400, "The request is malformed: " + error.message() + "."};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is checked on a request's head before anything else looks at it: framing that two parsers could read
-// differently, encodings that could expand, names and targets that cannot be decoded.
+// Checks of a request's head before anything else uses it: against framing that two parsers could read
+// differently, encodings that could expand, and names and targets that cannot be decoded.
 #pragma once
 #include <utility>  // Asio 1.74 needs it first under C++20
 
@@ -21,11 +21,11 @@ struct Refusal {
 
 using HeadFields = boost::beast::http::request_header<boost::beast::http::fields>;
 
-/// Fills `request` but for body, matches and address; or says why the head is refused. A refusal here closes
-/// the connection: where the next request begins is not known for sure.
+/// Fills in `request` except for body, matches and address, or returns why the head is refused. A refusal
+/// must close the connection, since it is not certain where the next request begins.
 std::optional<Refusal> readHead(const HeadFields& head, std::size_t bodyLimit, Request& request);
 
-/// What a failed read means to the client; nullopt when it is gone and nobody is left to be told.
+/// The refusal to send after a failed read; nullopt if the client has disconnected.
 std::optional<Refusal> refusalOf(const boost::system::error_code& error);
 
 }  // namespace scolopax::net

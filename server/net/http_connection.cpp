@@ -36,8 +36,8 @@ constexpr Milliseconds kWatchInterval{100};
 
 auto into(error_code& error) { return asio::redirect_error(asio::use_awaitable, error); }
 
-/// While it lives and its time is up, whatever the socket is waiting for fails. Repeatedly: a composed
-/// operation may just be between two steps when the time is up.
+/// While this object lives and its time is up, cancels whatever the socket waits for. It does so repeatedly:
+/// a composed operation may be just between two steps when the time is up.
 class Deadline {
  public:
   Deadline(tcp::socket& socket, Milliseconds time) : state_(std::make_shared<State>(socket)) {
@@ -72,8 +72,9 @@ class Deadline {
   std::shared_ptr<State> state_;
 };
 
-/// One of the slots for slow requests, if there is one. Those of quick routes may have a quarter of them:
-/// what such a request waits for is done once for all, and who asks for much of it must not keep others out.
+/// Takes one of the slots for slow requests, if one is free. Requests of quick routes get at most a quarter
+/// of them: what such a request waits for is computed once for all clients, and a client that sends many of
+/// them must not keep others out.
 class SlowSlot {
  public:
   SlowSlot(Core& core, RouteKind kind) : core_(core), quick_(kind == RouteKind::quick) {
@@ -94,8 +95,8 @@ class SlowSlot {
   bool quick_, taken_;
 };
 
-/// While it lives, notices within kWatchInterval that the client has closed its end. Asked of the system:
-/// reading would take bytes of the next request.
+/// While this object lives, notices within kWatchInterval that the client has closed its end. It polls the
+/// system, since reading would consume bytes of the next request.
 class ClientWatch {
  public:
   explicit ClientWatch(tcp::socket& socket) : state_(std::make_shared<State>(socket)) { State::wait(state_); }
@@ -169,7 +170,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
   }
 
  private:
-  /// The handshake of TLS, where it is spoken. False when there is none to be had.
+  /// The TLS handshake, if there is TLS. False if it fails.
   awaitable<bool> secure() {
     if (!transport_.tls()) co_return true;
     idle_ = true;
@@ -186,7 +187,8 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     if (!co_await waitForByte(patience)) co_return false;
     Parser parser;
     parser.header_limit(static_cast<std::uint32_t>(core_.options.headerLimit));
-    // The limit on bodies is ours to check: this one would refuse before anybody has been authorised.
+    // Disables the parser's limit on bodies, which would refuse before the request has been authorised.
+    // readHead() and readBody() check it.
     parser.body_limit(std::numeric_limits<std::uint64_t>::max());
     error_code error;
     {
@@ -209,10 +211,11 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     if (const auto refusal = readHead(parser.get(), core_.options.bodyLimit, request)) {
       co_return co_await refuse(refusal->status, refusal->detail);
     }
-    // From here on only an unread body stands between this request and the next.
+    // From here on, only an unread body can stand between this request and the next.
     const bool keepAlive = keepAlive_;
     keepAlive_ = keepAlive_ && !hasBody;
-    if (full_) co_return co_await write(withRetry(core_.problem(503, "Too many connections.")), false);
+    if (full_)
+      co_return co_await write(withRetry(core_.problem(503, "Too many connections; retry later.")), false);
     if (core_.options.authorize) {
       std::optional<Response> refused = authorize(request);
       if (refused) co_return co_await write(std::move(*refused), keepAlive_);
@@ -245,7 +248,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     co_return !error;
   }
 
-  /// False when a refusal was sent instead, or nobody is left.
+  /// False if a refusal was sent instead, or if the client has disconnected.
   awaitable<bool> readBody(Parser& parser, Request& request) {
     parser.body_limit(core_.options.bodyLimit);
     error_code error;
@@ -286,7 +289,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
   Response noRoute(const RouteMatch& match) const {
     if (match.allow.empty()) return core_.problem(404, "There is nothing at this path.");
-    Response response = core_.problem(405, "This path has other methods: " + match.allow + ".");
+    Response response = core_.problem(405, "This path supports other methods: " + match.allow + ".");
     response.headers.emplace_back("Allow", match.allow);
     return response;
   }
@@ -312,7 +315,8 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
       if (!takesLong) co_return response;
     }
     const SlowSlot slot(core_, route.kind);
-    if (!slot.taken()) co_return withRetry(core_.problem(503, "Too many long requests at once."));
+    if (!slot.taken())
+      co_return withRetry(core_.problem(503, "Too many long requests at once; retry later."));
     const ClientWatch watch(transport_.socket());
     request.mayWait = true;
     request.gone = watch.gone();
@@ -322,7 +326,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
   awaitable<bool> upgrade(Parser& parser, const Request& request) {
     if (buffer_.size() > 0 || !parser.is_done()) {
-      co_return co_await refuse(400, "Nothing may follow an upgrade before it is answered.");
+      co_return co_await refuse(400, "Nothing may follow an upgrade request before it is answered.");
     }
     if (!originAllowed(request, core_.options.allowedOrigins)) {
       co_return co_await write(core_.problem(403, "Pages of another origin may not connect."), keepAlive_);
@@ -349,7 +353,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     co_return false;
   }
 
-  /// For requests after which the stream cannot be trusted: always ends the connection.
+  /// For requests after which the byte stream cannot be trusted: always ends the connection.
   awaitable<bool> refuse(int status, std::string_view detail) {
     Response response = core_.problem(status, std::string(detail));
     co_return co_await write(std::move(response), false);
@@ -378,7 +382,8 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     serializer.split(head_);
     error_code error;
     while (!error && !(head_ ? serializer.is_header_done() : serializer.is_done())) {
-      // Per piece: a slow reader may take its time over a large answer, a stalled one may not.
+      // The deadline is for each piece: a slow reader may take long over a large answer, a stalled one may
+      // not.
       const Deadline deadline(transport_.socket(), core_.options.bodyTimeout);
       co_await http::async_write_some(transport_, serializer, into(error));
     }
@@ -386,7 +391,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     co_return !error && keepAlive;
   }
 
-  /// Reads on after the last answer, so that the client sees it.
+  /// Reads on after the last answer, so that the client receives it.
   awaitable<void> linger() {
     idle_ = true;
     if (core_.stopping()) co_return;
@@ -399,11 +404,11 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
   Core& core_;
   Transport transport_;
-  asio::any_io_executor executor_;  ///< kept apart: cut() may come when the socket has moved on
+  asio::any_io_executor executor_;  ///< a copy: cut() may come after the socket has been moved away
   boost::beast::flat_buffer buffer_;
   std::string remoteAddress_;
   bool full_;
-  bool idle_ = false;  ///< between requests: a stopping server need not wait for it
+  bool idle_ = false;  ///< between requests: a server that stops need not wait
   bool linger_ = false;
   bool head_ = false;
   bool keepAlive_ = false;

@@ -12,7 +12,7 @@
 
 namespace scolopax::net {
 
-/// Orders header names without regard to ASCII case.
+/// Orders header names, ignoring ASCII case.
 struct NameLess {
   using is_transparent = void;
   bool operator()(std::string_view a, std::string_view b) const;
@@ -28,9 +28,9 @@ struct Request {
   std::string body;                  ///< whole and within the limit; empty in authorize and upgrades
   std::vector<std::string> matches;  ///< regex groups of the route; [0] is the whole path
   std::string remoteAddress;         ///< numeric, without the port
-  /// Whether the handler runs where it may wait: RouteKind::slow, or after TakesLong.
+  /// Whether the handler may wait: in a RouteKind::slow route, or when called again after TakesLong.
   bool mayWait = false;
-  /// Where it may wait: requested when the client has closed without waiting for the answer.
+  /// If the handler may wait: requested when the client closes the connection before it has the answer.
   std::stop_token gone;
 
   /// First header (query value) of that name, or nullptr.
@@ -42,16 +42,15 @@ struct Response {
   int status = 200;
   std::string contentType;  ///< empty: no Content-Type
   std::string body;
-  std::vector<std::pair<std::string, std::string>>
-      headers;                            ///< further ones; lengths are the server's business
-  std::shared_ptr<const void> keep = {};  ///< what lives until the answer has been sent
+  std::vector<std::pair<std::string, std::string>> headers;  ///< further headers; the server sets the lengths
+  std::shared_ptr<const void> keep = {};                     ///< kept alive until the answer has been sent
 };
 
-/// What the handler of a quick route throws, before it has changed anything, for a request that takes long:
-/// it is called again where it may wait.
+/// Thrown by the handler of a quick route, before it has changed anything, for a request that takes long: the
+/// handler is called again where it may wait.
 struct TakesLong {};
 
-/// Runs on a worker thread. What it throws becomes a 500 that says nothing about the cause, and a log line.
+/// Runs on a worker thread. An exception becomes a log line and a 500 that does not tell the cause.
 using Handler = std::function<Response(const Request&)>;
 
 }  // namespace scolopax::net

@@ -17,7 +17,7 @@ bool Outbox::pushText(std::string text) {
 
 bool Outbox::hasRoomFor(std::size_t bytes) const {
   if (texts_.size() >= limits_.count) return false;
-  if (texts_.empty()) return true;  // a single one may be as large as it is
+  if (texts_.empty()) return true;  // a single text may have any size
   const std::size_t mine = unsent_ + bytes;
   return mine <= limits_.fairBytes || (mine <= limits_.bytes && *unsentByAll_ + bytes <= limits_.bytesOfAll);
 }
@@ -45,7 +45,7 @@ void Outbox::withdraw() {
 }
 
 void Outbox::acknowledge(std::uint32_t number) {
-  // Cumulative, so that one lost or omitted acknowledgement does not shrink the window for good.
+  // Cumulative, so that a missing acknowledgement does not shrink the window for good.
   const auto found = std::find(unacknowledged_.begin(), unacknowledged_.end(), number);
   if (found == unacknowledged_.end()) return;
   unacknowledged_.erase(unacknowledged_.begin(), found + 1);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What one WebSocket client is still to be sent. Latest frame wins is decided here, away from any socket.
+// What waits to be sent to one WebSocket client. The rule that the latest frame wins is implemented here,
+// apart from any socket.
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -21,7 +22,7 @@ struct CloseMessage {
 /// Not thread-safe. One consumer calls next() whenever the socket is free for another write.
 class Outbox {
  public:
-  /// Bytes of texts that all clients of a server have not been sent yet.
+  /// Bytes of texts not sent yet, over all clients of a server.
   using UnsentBytes = std::shared_ptr<std::atomic<std::size_t>>;
   explicit Outbox(const TextLimits& limits,
                   UnsentBytes unsentByAll = std::make_shared<std::atomic<std::size_t>>(0))
@@ -30,20 +31,20 @@ class Outbox {
   Outbox(const Outbox&) = delete;
   Outbox& operator=(const Outbox&) = delete;
 
-  /// False when it would go beyond a limit: the text is dropped, and the caller closes the connection.
+  /// False if the text would exceed a limit: it is dropped, and the caller closes the connection.
   bool pushText(std::string text);
   void offer(Frame frame);
   void withdraw();
   void acknowledge(std::uint32_t number);
-  /// The first one counts. Frames no longer go out, texts still do, unless it is `withoutTexts`.
+  /// Only the first message counts. Frames are no longer sent; queued texts still are, unless `withoutTexts`.
   void close(CloseMessage message, bool withoutTexts);
 
   using Item = std::variant<std::string, Frame, CloseMessage>;
-  /// What it gave before counts as sent. Texts first, then a frame if the window is open, the close message
-  /// last of all; nullopt: nothing now.
+  /// The next item to send; the one before it now counts as sent. Texts come first, then a frame if the
+  /// window is open, and the close message last of all; nullopt if there is nothing to send now.
   std::optional<Item> next();
 
-  /// The connection has ended: nothing is kept that could not be sent.
+  /// The connection has ended: drops everything that was not sent.
   void clear();
 
   bool closing() const { return close_.has_value() || closeSent_; }
@@ -58,8 +59,8 @@ class Outbox {
   const UnsentBytes unsentByAll_;
   std::deque<std::string> texts_;
   std::size_t unsent_ = 0;                    ///< bytes of texts_, and of the text that is being sent
-  std::size_t sending_ = 0;                   ///< of the latter
-  std::optional<Frame> pending_;              ///< the one waiting place
+  std::size_t sending_ = 0;                   ///< bytes of the text that is being sent
+  std::optional<Frame> pending_;              ///< the frame in the one waiting place
   std::deque<std::uint32_t> unacknowledged_;  ///< in the order sent, at most kFrameWindow
   std::optional<CloseMessage> close_;
   bool closeSent_ = false;

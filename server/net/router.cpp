@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that touches cpp-httplib. It never opens a socket there: a request line is fed from memory.
+// The only file that uses cpp-httplib. It opens no socket with it: the request line is read from memory.
 #include "server/net/router.h"
 
 #include <httplib.h>
@@ -16,12 +16,12 @@
 namespace scolopax::net {
 namespace {
 
-// process_request is protected API: its behaviour was checked for this version.
+// process_request is a protected function: its behaviour was checked for this version.
 static_assert(std::string_view(CPPHTTPLIB_VERSION) == "0.11.4");
 
 constexpr std::array<const char*, 6> kMethods{"GET", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"};
 
-/// Reads a request from memory and forgets the answer: what matters was noted by the matching route.
+/// Reads a request from memory and discards the answer: the matching route has already noted the result.
 class MemoryStream : public httplib::Stream {
  public:
   explicit MemoryStream(std::string_view input) : input_(input) {}
@@ -45,7 +45,7 @@ class MemoryStream : public httplib::Stream {
 class Matcher : public httplib::Server {
  public:
   Matcher() {
-    // process_request only runs a request while the server counts as started.
+    // process_request handles a request only while the server counts as started.
     svr_sock_ = 0;
     set_exception_handler([](const httplib::Request&, httplib::Response& response,
                              const std::exception_ptr&) { response.status = 500; });
@@ -59,7 +59,7 @@ class Matcher : public httplib::Server {
   }
 };
 
-// process_request runs on the calling thread: the route that matches leaves its finding here.
+// process_request runs on the calling thread: the matching route stores its result here.
 thread_local RouteMatch* currentMatch = nullptr;
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which handler a method and path belong to. cpp-httplib does the matching; bodies, queries and headers never
-// reach it, so that none of its limits and conversions apply to them.
+// Finds the handler for a method and path. cpp-httplib does the matching; bodies, queries and headers never
+// reach it, so none of its limits and conversions apply to them.
 #pragma once
 #include <memory>
 #include <string>
@@ -25,7 +25,7 @@ class Router {
  public:
   Router();
   ~Router();
-  /// Throws NetError for a method it does not know or a pattern that is no regex.
+  /// Throws NetError for an unknown method or an invalid regex.
   void add(const std::string& method, const std::string& pattern, Route route);
   /// `path` is decoded. Thread-safe once all routes are added.
   RouteMatch find(const std::string& method, const std::string& path) const;

@@ -20,7 +20,7 @@ using asio::ip::tcp;
 using boost::system::error_code;
 
 constexpr int kIoThreads = 2;
-/// Connections beyond the limit that are still told 503; further ones are closed without a word.
+/// Connections beyond the limit that still get a 503; further ones are closed without an answer.
 constexpr std::size_t kRefusedAtOnce = 32;
 constexpr std::chrono::milliseconds kAcceptPause{50};
 
@@ -43,13 +43,14 @@ struct Server::Impl {
     if (error || found.empty()) throw NetError("cannot listen on " + where + ": no such host");
     const tcp::endpoint endpoint = found.begin()->endpoint();
     acceptor.open(endpoint.protocol(), error);
-    // Lets a restart follow at once; unlike SO_REUSEPORT it never lets two servers share the port.
+    // Lets a restarted server bind the port at once. Unlike SO_REUSEPORT, it never lets two servers share the
+    // port.
     if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
     if (!error) acceptor.bind(endpoint, error);
     if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
     if (error == asio::error::address_in_use) {
       throw NetError("cannot listen on " + where +
-                     ": another program has this port; choose a different one, or 0 for any that is free");
+                     ": another program uses this port; choose a different one, or 0 for any free port");
     }
     if (error) throw NetError("cannot listen on " + where + ": " + error.message());
     boundPort = acceptor.local_endpoint().port();
@@ -62,7 +63,7 @@ struct Server::Impl {
                                                           asio::redirect_error(asio::use_awaitable, error));
       if (error == asio::error::operation_aborted || core.stopping()) break;
       if (error) {
-        // Most likely out of descriptors: those who are connected go on, and some will leave.
+        // Probably out of file descriptors: existing connections continue, and some of them will end.
         core.log("accept: " + error.message());
         asio::steady_timer pause(strand, kAcceptPause);
         co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, error));
@@ -117,7 +118,7 @@ void Server::stop(std::chrono::milliseconds grace) {
     impl_->core.waitUntilEmpty();
   }
   impl_->work.reset();
-  // Without io->stop(): what is left to run are cancelled timers, and running them is what frees them.
+  // Without io->stop(): only cancelled timers are left to run, and running them frees them.
   for (std::thread& thread : impl_->threads) thread.join();
   impl_->core.workers.join();
   impl_->core.bulkWorkers.join();

@@ -11,15 +11,15 @@ namespace scolopax::net {
 
 class StaticFiles {
  public:
-  /// `root` empty: there are none. Throws NetError when it is not a folder.
+  /// With an empty `root` there are no files. Throws NetError if it is not a folder.
   explicit StaticFiles(const std::string& root);
 
-  /// The existing regular file that a decoded request path names ("/" is index.html), or nullopt: also for
-  /// hidden names, "..", and links that lead out of the folder.
+  /// The existing regular file that a decoded request path names ("/" is index.html), or nullopt; nullopt
+  /// also for hidden names, "..", and links that lead out of the folder.
   std::optional<std::filesystem::path> find(const std::string& path) const;
 
-  /// The file with type, ETag and caching: names that carry a content hash (assets/) for good, others are
-  /// asked for again each time and then answered by 304 when unchanged.
+  /// The file with its type, ETag and caching rule: files in assets/, whose names contain a content hash, are
+  /// cached for good; all others are revalidated each time, and answered with 304 if unchanged.
   Response respond(const std::filesystem::path& file, const Request& request) const;
 
  private:

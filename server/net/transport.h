@@ -14,7 +14,7 @@ namespace scolopax::net {
 
 namespace asio = boost::asio;
 
-/// An AsyncStream of Beast's. Everything on the socket's strand; a moved-from one may only be closed.
+/// Models Beast's AsyncStream. To be used only on the socket's strand; a moved-from one may only be closed.
 class Transport {
  public:
   using executor_type = asio::ip::tcp::socket::executor_type;
@@ -28,7 +28,7 @@ class Transport {
 
   executor_type get_executor() { return socket_->get_executor(); }
   asio::ip::tcp::socket& socket() { return *socket_; }
-  /// Null when plain. For the handshake and its counterpart at the end.
+  /// Null if plain. For the TLS handshake and shutdown.
   asio::ssl::stream<asio::ip::tcp::socket&>* tls() { return tls_.get(); }
 
   void close() {
@@ -47,14 +47,15 @@ class Transport {
     return socket_->async_write_some(buffers, std::forward<Token>(token));
   }
 
-  /// After the last word: sends the end and reads on until the other's, kDiscardLimit bytes or a failure.
-  /// Closing with unread bytes would reset the connection, and the client might never get what was sent.
+  /// To be called after the last write: ends sending, and reads on until the peer ends, kDiscardLimit bytes
+  /// have come, or reading fails. Closing with unread bytes would reset the connection, and the client might
+  /// never get what was sent.
   template <class Token>
   auto async_discard(Token&& token) {
     return asio::async_compose<Token, void(ErrorCode)>(Discard(*this), token, *socket_);
   }
 
-  // What Beast's WebSocket calls to end and to cut a connection.
+  // Called by Beast's WebSocket to end and to cut a connection.
   template <class Handler>
   friend void async_teardown(boost::beast::role_type, Transport& transport, Handler&& handler) {
     transport.async_discard(std::forward<Handler>(handler));

@@ -11,7 +11,7 @@
 
 namespace scolopax::net {
 
-/// nullopt when a "%" is not followed by two hex digits, or when a NUL would come out.
+/// nullopt if a "%" is not followed by two hex digits, or if the result would contain a NUL.
 std::optional<std::string> percentDecode(std::string_view text, bool plusIsSpace);
 /// Everything but unreserved characters and "/" (RFC 3986) becomes %XX.
 std::string percentEncodePath(std::string_view path);
@@ -20,26 +20,26 @@ struct Target {
   std::string path;
   Query query;
 };
-/// Origin form alone ("/path?query"); nullopt for anything else or for bad encoding.
+/// Origin form only ("/path?query"); nullopt for anything else or for bad encoding.
 std::optional<Target> parseTarget(std::string_view target);
 
-/// What a Host header holds, and an origin after its scheme.
+/// The value of a Host header, or the part of an origin after its scheme.
 struct Authority {
   std::string_view host;  ///< a name or IPv4 address, or "[...]" with an IPv6 address
   std::optional<std::uint16_t> port;
 };
-/// nullopt for anything but a host and maybe a port (RFC 3986, 3.2.2): no user, no path, nothing behind "]".
+/// nullopt for anything but a host and an optional port (RFC 3986, 3.2.2): no user, no path.
 std::optional<Authority> parseAuthority(std::string_view text);
 
-/// Whether an Origin header names the host that the request was sent to, by http or by https, whichever: a
-/// proxy in front may speak TLS. False for "null" and other schemes.
+/// Whether an Origin header names the host that the request was sent to. http and https both match: a proxy
+/// in front may speak TLS. False for "null" and other schemes.
 bool sameOrigin(std::string_view origin, std::string_view host);
-/// The rule for upgrades: no Origin (not a browser), the own one, or one of `allowed`.
+/// The rule for upgrades: no Origin (not a browser), the server's own, or one of `allowed`.
 bool originAllowed(const Request& request, const std::vector<std::string>& allowed);
 
-/// Without the spaces and tabs around it.
+/// The text without spaces and tabs around it.
 std::string_view trimmed(std::string_view text);
-/// ASCII only.
+/// Ignores the case of ASCII letters only.
 bool equalIgnoringCase(std::string_view a, std::string_view b);
 
 }  // namespace scolopax::net

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One WebSocket client: control texts in order, and pictures of which only the latest matters.
-// The session offers frames as they are encoded; the connection sends what the client can take.
+// One WebSocket client: control texts in order, and pictures, of which only the latest matters. The session
+// offers frames as they are encoded; the connection sends what the client can take.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -22,12 +22,12 @@ struct Frame {
   std::shared_ptr<const std::vector<unsigned char>> payload;  ///< may be null
 };
 
-/// What may wait to be read by clients, as text. One that wants more is closed with 1008.
+/// Limits on the texts that wait to be sent. A connection that exceeds them is closed with 1008.
 struct TextLimits {
   std::size_t count = 256;            ///< texts for one client
-  std::size_t bytes = 4 << 20;        ///< of the texts for one client, unless there is but one
-  std::size_t bytesOfAll = 64 << 20;  ///< of those for all clients together
-  std::size_t fairBytes = 256 << 10;  ///< for one client, even when all together have more than they may
+  std::size_t bytes = 4 << 20;        ///< of the texts for one client; a single text may be longer
+  std::size_t bytesOfAll = 64 << 20;  ///< of the texts for all clients together
+  std::size_t fairBytes = 256 << 10;  ///< for one client, even when all together exceed bytesOfAll
 };
 
 struct WebSocketStats {
@@ -59,15 +59,15 @@ class WebSocket {
   virtual WebSocketStats stats() const = 0;
 };
 
-/// Called on a worker thread, one at a time per connection; the next message is read when onText returns.
-/// An exception from onText closes the connection with 1011. Keep a WebSocket only weakly in these.
+/// Called on a worker thread, one at a time per connection; the next message is read when onText returns. An
+/// exception from onText closes the connection with 1011. These functions must hold a WebSocket only weakly.
 struct WebSocketEvents {
   std::function<void(std::string)> onText;  ///< valid UTF-8; binary messages close with 1003
   std::function<void()> onClose;            ///< exactly once, last, whatever ended the connection
 };
 
-/// Runs on a worker thread before the handshake is answered; decides by path. A Response refuses.
-/// What is sent or offered to the socket here already goes out right after the handshake.
+/// Runs on a worker thread before the handshake is answered; decides by path. Returning a Response refuses
+/// the upgrade. What is sent or offered to the socket here goes out right after the handshake.
 using UpgradeHandler =
     std::function<std::variant<WebSocketEvents, Response>(const Request&, std::shared_ptr<WebSocket>)>;
 

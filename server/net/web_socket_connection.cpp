@@ -19,23 +19,24 @@ namespace websocket = boost::beast::websocket;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-/// Compression is compiled out: pictures are compressed already, and it would cost memory per client.
+/// Compression is left out at compile time: pictures are compressed already, and it would cost memory per
+/// client.
 using Stream = websocket::stream<Transport, false>;
 
 constexpr std::chrono::seconds kHandshakeTimeout{5};
 constexpr int kSendBufferBytes = 128 << 10;  ///< a large one hides stale frames in the kernel
 constexpr std::size_t kReasonLimit = 123;    ///< RFC 6455, 5.5
 
-/// At most kReasonLimit bytes, cut between two characters.
+/// The first kReasonLimit bytes at most, cut between two UTF-8 characters.
 websocket::reason_string reasonString(const std::string& text) {
   std::size_t size = std::min(text.size(), kReasonLimit);
   while (size < text.size() && size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0) == 0x80) --size;
   return {text.data(), size};
 }
 
-/// Of a stream and its neighbours everything is touched on the strand alone, the outbox under the mutex.
-/// There is always one read (the handshake counts) and at most one write under way; when both have ended the
-/// connection has.
+/// The stream and the members after it are used only on the strand, the outbox only under the mutex. There is
+/// always one read in progress (the handshake counts) and at most one write; when both have ended, so has the
+/// connection.
 class WebSocketConnection : public PreparedWebSocket,
                             public Connection,
                             public std::enable_shared_from_this<WebSocketConnection> {
@@ -48,7 +49,7 @@ class WebSocketConnection : public PreparedWebSocket,
   void sendText(std::string text) override {
     const std::lock_guard lock(mutex_);
     if (ended_) return;
-    if (!outbox_.pushText(std::move(text))) outbox_.close({1008, "too many messages wait for you"}, true);
+    if (!outbox_.pushText(std::move(text))) outbox_.close({1008, "too many messages wait to be read"}, true);
     wake();
   }
   void offerFrame(Frame frame) override {
@@ -119,7 +120,7 @@ class WebSocketConnection : public PreparedWebSocket,
   }
 
  private:
-  /// With the mutex held: sees to it that the strand looks at the outbox.
+  /// Requires the mutex. Makes the strand check the outbox.
   void wake() {
     if (!strand_ || ended_ || woken_) return;
     woken_ = true;
@@ -141,7 +142,7 @@ class WebSocketConnection : public PreparedWebSocket,
   void onRead(const error_code& error) {
     if (error) return finish();
     if (!stream_->got_text()) {
-      close(1003, "only text messages are read here");
+      close(1003, "only text messages are accepted");
       buffer_.consume(buffer_.size());
       return read();
     }
@@ -199,13 +200,13 @@ class WebSocketConnection : public PreparedWebSocket,
 
   void onWritten(const error_code& error) {
     writing_ = false;
-    current_ = std::string();  // lets go of the picture
+    current_ = std::string();  // releases the picture
     if (readEnded_) return end();
-    if (error) return closeSocket();  // the read fails in turn
+    if (error) return closeSocket();  // then the read fails as well
     pump();
   }
 
-  /// A client that does not read cannot be told: the close message would wait behind the write for ever.
+  /// The close message to a client that does not read would wait behind the current write for ever.
   void startCloseTimer() {
     if (closeTimerStarted_) return;
     closeTimerStarted_ = true;
@@ -219,7 +220,7 @@ class WebSocketConnection : public PreparedWebSocket,
     if (stream_) stream_->next_layer().close();
   }
 
-  /// The read has ended, and with it the connection, once the write has too.
+  /// The read has ended. The connection ends as soon as the write has, too.
   void finish() {
     readEnded_ = true;
     closeSocket();
@@ -246,12 +247,12 @@ class WebSocketConnection : public PreparedWebSocket,
   }
 
   std::shared_ptr<asio::io_context>
-      io_;      ///< first: handles outlive the server, and timers need it to be destroyed
+      io_;      ///< first: handles outlive the server, and timers need it for their destruction
   Core& core_;  ///< valid until leave()
 
   mutable std::mutex mutex_;
   Outbox outbox_;
-  std::optional<asio::any_io_executor> strand_;  ///< from start() on
+  std::optional<asio::any_io_executor> strand_;  ///< set by start()
   bool woken_ = false;
   bool cut_ = false;
   bool ended_ = false;

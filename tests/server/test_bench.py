@@ -61,7 +61,7 @@ class Bench(CommandTest):
         self.assertLess(told["smaller"]["rmse"], 3 * told["rendered"]["rmse"])
         done = self.bench("--truth", truth[2])
         self.assertEqual(done.returncode, 1)
-        self.assertIn("expected 24x20 pixels or an odd number of times less, found 12x10", done.stderr)
+        self.assertIn("expected 24x20 pixels, or fewer by an odd factor, found 12x10", done.stderr)
 
     def test_varies_macrocells_and_threads_and_tells_the_memory(self):
         done = self.bench("--methods", "sync-dda", "--samples", "4", "--macrocells", "8,2", "--threads", "1,2", "--json",
