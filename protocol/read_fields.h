@@ -45,7 +45,7 @@ constexpr std::string_view kPluralOf = "";
 template <>
 inline constexpr std::string_view kPluralOf<double> = "numbers";
 template <>
-inline constexpr std::string_view kPluralOf<bool> = "times true or false";
+inline constexpr std::string_view kPluralOf<bool> = "booleans";
 template <>
 inline constexpr std::string_view kPluralOf<std::uint32_t> = "integers";
 

@@ -17,20 +17,18 @@ namespace scolopax {
   X(mix, "mix",                                                                                            \
     "as dense as the densest channel; the colours of all are mixed, by their density and weight")          \
   X(composite, "composite",                                                                                \
-    "every channel is drawn by itself and the pictures are added: what is in front is lost")
+    "every channel is drawn by itself and the pictures are added: depth order between channels is lost")
 
-#define SCOLOPAX_METHODS(X) /* Listings 3 (n-dda, mended) and 4 (sync-dda); section 5.1 (cumulative) */     \
-  X(automatic, "auto",                                                                                      \
-    "raymarch (hybrid for shadows) with the largest step that the error asked for allows, else superposed") \
-  X(superposed, "superposed",                                                                               \
-    "follows all channels at once and looks up one of them a step; exact but for noise")                    \
-  X(cumulative, "cumulative",                                                                               \
-    "follows all channels at once and looks up all of them a step; exact but for noise")                    \
-  X(syncDda, "sync-dda", "follows one channel after the other inside each small cell; exact but for noise") \
-  X(nDda, "n-dda", "follows every channel by itself, the nearest hit wins; exact but for noise")            \
-  X(raymarch, "raymarch", "equal steps along the ray: little noise, and a bias that falls with the step")   \
-  X(hybrid, "hybrid",                                                                                       \
-    "as raymarch, with light worked out at eight places of a ray: faster and noisier where light is costly")
+#define SCOLOPAX_METHODS(X) /* Listings 3 (n-dda, mended) and 4 (sync-dda); section 5.1 (cumulative) */    \
+  X(automatic, "auto",                                                                                     \
+    "raymarch (hybrid for shadows) with the largest step that meets the requested error, else superposed") \
+  X(superposed, "superposed", "tracks all channels at once and samples one of them per step; unbiased")    \
+  X(cumulative, "cumulative", "tracks all channels at once and samples all of them per step; unbiased")    \
+  X(syncDda, "sync-dda", "tracks one channel after the other inside each macrocell; unbiased")             \
+  X(nDda, "n-dda", "tracks every channel separately, and the nearest hit wins; unbiased")                  \
+  X(raymarch, "raymarch", "equal steps along the ray: little noise, and a bias that falls with the step")  \
+  X(hybrid, "hybrid",                                                                                      \
+    "as raymarch, with light computed at eight points of a ray: faster and noisier where light is costly")
 
 #define SCOLOPAX_LIGHT_TYPES(X)                                                   \
   X(directional, "directional", "parallel rays that travel along `direction`")    \
@@ -50,7 +48,7 @@ namespace scolopax {
   X(depth, "depth", "mean distance of the first collision from the eye, along the view direction") \
   X(transmittance, "transmittance", "share of the light from behind that comes through")           \
   X(channel, "channel", "channel in which most rays end")                                          \
-  X(cost, "cost", "voxel lookups per sample: what a pixel costs")
+  X(cost, "cost", "voxel fetches per sample: what a pixel costs")
 
 struct NamedValue {
   std::string_view name;
