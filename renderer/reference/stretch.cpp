@@ -124,7 +124,7 @@ void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, const Clippi
         here.factor->appendCuts(knots);
       }
       for (const double value : channel.curves.breakpoints()) here.scalar.appendCrossings(value, knots);
-      stretch.channels.push_back(std::move(here));
+      stretch.channels.push_back(here);
     }
     std::sort(knots.begin(), knots.end());
     for (std::size_t j = 0; j + 1 < knots.size(); ++j) {
