@@ -40,7 +40,7 @@ test('a killed server is reported, and a restarted one is reconnected to', async
   const announced = page.getByRole('status');
   await first.end('SIGKILL');
   await eventually(async () => /reconnecting in \d+ s/.test(await state.textContent()), 'the loss is not shown', 10_000);
-  await eventually(async () => (await announced.textContent()) === 'Server gone', 'the server is not called gone', 10_000);
+  await eventually(async () => (await announced.textContent()) === 'Server unreachable', 'the server is not announced as unreachable', 10_000);
 
   // The edit made meanwhile must not be lost either.
   await page.locator('.channel header .switch').nth(1).uncheck();
