@@ -53,9 +53,8 @@ inline Image renderAnalog(const std::shared_ptr<const Volume>& volume, Scene sce
 ///  - The largest deviation, by Bernstein's inequality, which holds for any distribution on [0,1], over all
 ///    pixels and components together: false-alarm probability 1e-9.
 ///  - The mean deviation of each component, which reveals a small bias of the whole picture: 6 sigma, 1e-8.
-///  - The mean squared deviation, which reveals a bias whose sign changes over the picture: 6 sigma;
-///  components
-///    of a pixel may be the same numbers (alpha and the only colour).
+///  - The mean squared deviation, which reveals a bias whose sign changes over the picture: 6 sigma. The
+///    components of a pixel may be identical (alpha and the only colour).
 inline ::testing::AssertionResult isUnbiased(const Image& found, int samples,
                                              const reference::ReferenceImage& expected) {
   const double n = double(samples) * statisticsFactor();

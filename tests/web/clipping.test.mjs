@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clip planes and crop are edited in the page: what they cut away is gone, and comes back.
+// Clip planes and crop regions are edited in the page: the parts cut away disappear, and come back.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import {
