@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-# make run     build everything, make the demo data if DATA names none, serve it on loopback
-# make test    build and run the tests; make check adds sanitizers, clang-tidy, fuzzing, hostile clients with large
-#              volumes, four times the samples in the statistical tests and ten times the random scenes
-# make fuzz    FUZZ_SECONDS more of every fuzzer, on the corpus that earlier runs have found
-# make soak    SCENES more random scenes, from where the last run ended; those that fail are kept in build/soak
+# make run     builds the program and the page and serves DATA, or generated demo data, on loopback
+# make test    builds and runs the tests
+# make check   does more: sanitizers, clang-tidy, fuzzing, hostile clients with large volumes, four times the samples in
+#              the statistical tests and ten times the random scenes
+# make fuzz    runs every fuzzer for another FUZZ_SECONDS, on the corpus of earlier runs
+# make soak    tests SCENES more random scenes, starting where the last run ended; keeps failing ones in build/soak
 DATA ?=
 PORT ?= 8080
 JOBS ?= $(shell nproc)
 FUZZ_SECONDS ?= 600
 SCENES ?= 20000
-# run-tests,BUILD,OPTIONS: a label that no test has is a mistake in this file; tests that were skipped are listed.
+# run-tests,BUILD,OPTIONS: runs tests and lists those that were skipped. A label without tests is a mistake in this file:
+# fail.
 define run-tests
 ctest --no-tests=error --test-dir build/$(1) --output-on-failure $(2)
 @sed -n 's/ ([0-9]* ms)$$//; /^\[  SKIPPED \] .*\./p' build/$(1)/Testing/Temporary/LastTest.log | sort -u
@@ -17,7 +19,7 @@ endef
 DEMO := build/demo/orbitals.nrrd
 SCOLOPAX := build/release/scolopax
 
-# Two recipes would run .ci/install at once; the tools called use all processors on their own.
+# Parallel recipes would run .ci/install twice at once; the tools called use all processors by themselves.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 .PHONY: fuzzers run build web test check check-asan-ubsan check-tsan check-tidy check-fuzz check-format check-cuda fuzz soak deps test-deps format clean
@@ -29,7 +31,7 @@ $(DEMO): | build
 	mkdir -p $(dir $@)
 	$(SCOLOPAX) generate orbitals $@
 
-# Without the tests, whose libraries need not be here, until `make test` has configured them.
+# Configured without the tests, whose libraries may not be installed, until `make test` has configured with them.
 build: deps
 	cmake --preset release -DBUILD_TESTING=$(if $(wildcard build/release/tests),ON,OFF) > /dev/null
 	cmake --build --preset release --target scolopax -j $(JOBS)
@@ -53,7 +55,7 @@ check-asan-ubsan: test-deps
 	SCOLOPAX_RANDOM_SCENES=20 $(call run-tests,asan-ubsan,-j $(JOBS) -LE 'web|statistics|hostile')
 	$(call run-tests,asan-ubsan,-j $(JOBS) -L hard)
 
-# The server's threads, with renderers that tests make up: those of the true ones are TBB's, which is not instrumented.
+# Checks the server's threads, with fake renderers: the real ones use TBB, which is not instrumented.
 check-tsan: test-deps
 	cmake --preset tsan > /dev/null
 	cmake --build --preset tsan -j $(JOBS)
@@ -73,7 +75,7 @@ fuzz: fuzzers
 	    -artifact_prefix=build/fuzz/ $$corpus $$(ls -d tests/fuzz/seeds/$$(basename $$corpus _fuzz) 2> /dev/null) || exit 1; \
 	done
 
-# In batches, so that stopping loses little. The first 3000 are those of make check.
+# Runs in batches, so that stopping loses little. The first 3000 scenes are those of make check.
 soak: test-deps
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null
 	cmake --build --preset release --target tests_random_scenes -j $(JOBS)
@@ -85,13 +87,13 @@ soak: test-deps
 	  first=$$((first + 500)); echo $$first > build/soak/next; echo "scenes below $$first are done"; \
 	done; exit $$failed
 
-# With nvcc; without one, configuring says so and there is nothing to check.
+# Needs nvcc; without it, configuring prints a notice and nothing is checked.
 check-cuda: test-deps
 	cmake --preset cuda > /dev/null
 	cmake --build --preset cuda -j $(JOBS) --target cuda_checks
 	$(call run-tests,cuda,-L cuda)
 
-# clang 14 has coroutines but does not say so; Boost and libstdc++ ask.
+# clang 14 supports coroutines but does not define their feature macro, which Boost and libstdc++ test.
 TIDY := clang-tidy --quiet -p build/release --extra-arg=-D__cpp_impl_coroutine=201902L \
   --extra-arg=-DBOOST_ASIO_HAS_CO_AWAIT=1 --extra-arg=-DBOOST_ASIO_HAS_STD_COROUTINE=1
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The HTTP calls that the page makes, with the server's problem details as errors. All addresses are
-// relative to the page, so that a path prefix in front of the server needs no setting.
+// The HTTP calls that the page makes. A problem that the server reports is thrown as an ApiError. All addresses are
+// relative to the page, so a path prefix in front of the server needs no configuration.
 import type { Histogram } from './histogram';
 import type { JsonObject } from './merge-patch';
 
@@ -14,7 +14,7 @@ export interface Named {
 export interface Capabilities {
   colormaps?: Named[];
   limits?: Record<string, number>;
-  /** Among others the lists of what enumerated fields may be, each a Named[]. */
+  /** Among others, a Named[] of the allowed values for each enumerated field. */
   [member: string]: unknown;
 }
 
@@ -34,7 +34,7 @@ export interface DatasetInfo {
   dims: [number, number, number];
   /** World units between voxel centres. */
   spacing: [number, number, number];
-  /** Of the box, world units. */
+  /** Length of the box's diagonal, world units. */
   diagonal: number;
   channels: ChannelInfo[];
 }
@@ -49,7 +49,7 @@ export interface SceneAnswer {
   scene: JsonObject;
 }
 
-/** RFC 9457, with the pointer to the field that is at fault. */
+/** Problem details (RFC 9457); `pointer` leads to the invalid field. */
 export interface Problem {
   title?: string;
   detail?: string;
@@ -82,7 +82,7 @@ export const api = {
   datasets: async () => (await call<{ datasets: DatasetInfo[] }>('datasets')).datasets,
   histogram: (id: string, channel: number) =>
     call<Histogram>(`datasets/${seg(id)}/histogram?channel=${channel}`),
-  /** Of the gradient's magnitude. */
+  /** Histogram of the gradient's magnitude. */
   gradientHistogram: async (id: string, channel: number, signal: AbortSignal): Promise<Histogram> => {
     const path = `datasets/${seg(id)}/gradient-histogram?channel=${channel}`;
     return { minimum: 0, ...(await call<Omit<Histogram, 'minimum'>>(path, { signal })) };

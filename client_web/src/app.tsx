@@ -13,7 +13,7 @@ import { StatusBar } from './status-bar';
 import type { Store } from './store';
 import { Toasts } from './toasts';
 
-/** A few channels are shown opened; with more, the first one. */
+/** Up to this many channels are all shown opened; of more, only the first is. */
 const kOpenChannels = 2;
 
 export function App({ store, attach }: { store: Store; attach(view: FrameView): void }) {

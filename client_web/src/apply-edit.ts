@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an edit makes of the scene, before the server has answered it.
+// Applies an edit to the page's copy of the scene, before the server has answered.
 import { applyPatch, isObject, type Json, type JsonObject } from './merge-patch';
 import type { Scene } from './scene.generated';
 
-/** The scene as it will be: camera projections exclude each other, the last one set wins. */
+/** The scene after the patch. The two camera projections exclude each other: the one that the patch sets wins. */
 export function applyEdit(scene: Json | undefined, patch: JsonObject): Scene {
   const next = applyPatch(scene ?? {}, patch) as JsonObject;
   if (isObject(patch.camera) && isObject(next.camera)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Projection and view; the camera itself is moved in the picture.
+// Projection and camera parameters; dragging in the picture moves the camera.
 import { NumberControl } from './controls';
 import { FieldControls } from './fields';
 import { distanceOf, isOrthographic, toOrthographic, toPerspective, type Camera } from './orbit-camera';

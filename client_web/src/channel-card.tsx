@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One channel: a row with what is changed most, and below it, when opened, colour, range, opacity and every
-// further field that the schema gives a channel.
+// One channel: a row with the most used controls and, when opened, colour map, range, opacity and all other
+// fields of a channel in the schema below it.
 import { useState } from 'preact/hooks';
 import type { Named } from './api';
 import { CurveEditor } from './curve-editor';
@@ -13,7 +13,7 @@ import { RangeEditor } from './range-editor';
 import { fieldAt, leavesBelow, type Path } from './schema';
 import type { Store } from './store';
 
-/** Members that have an editor of their own here; all others get the schema's control. */
+/** Members with their own editor here; all others get the control that fits their schema. */
 const kSpecial = new Set(['name', 'visible', 'range', 'color', 'colormap', 'opacity', 'gradientOpacity']);
 const furtherFields = leavesBelow(['channels', 0])
   .map((path) => path.slice(2))
@@ -88,8 +88,8 @@ export function ChannelCard({ store, index, open: openAtFirst }: { store: Store;
               value={Array.isArray(channel.colormap) ? '?' : (channel.colormap ?? '')}
               onChange={(event) => setColormap(event.currentTarget.value)}
             >
-              <option value="">one colour</option>
-              {Array.isArray(channel.colormap) && <option value="?">own control points</option>}
+              <option value="">single colour</option>
+              {Array.isArray(channel.colormap) && <option value="?">custom control points</option>}
               {colormaps.map(({ name: map, doc }) => (
                 <option key={map} value={map} title={doc}>
                   {map}

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which channels a plane clips, and which regions of a volume are kept. fields.tsx picks them by the schema.
+// Controls for the channels that a plane clips, and for the regions of the volume that are kept. fields.tsx selects
+// them by the kind of field.
 import { useId } from 'preact/hooks';
 import { Row, type ControlProps } from './controls';
 import { kRegions } from './schema';
 
-/** A box for every channel; no value is all of them. */
+/** A check box for every channel. An undefined `value` means all channels; choosing all calls `onChange(null)`. */
 export function ChannelsControl({ field, value, names, onChange }: ControlProps<number[]> & { names: string[] }) {
   const all = names.map((_, i) => i);
   const chosen = value ?? all;
@@ -48,7 +49,7 @@ export function RegionsControl({ field, value, onChange }: ControlProps<boolean[
     <>
       <Row field={field} id={id}>
         <select id={id} value={String(bits)} onChange={(event) => onChange(regionsOf(Number(event.currentTarget.value)))}>
-          {!known && <option value={String(bits)}>Own choice</option>}
+          {!known && <option value={String(bits)}>Custom</option>}
           {kRegionSets.map((set) => (
             <option key={set.name} value={String(set.bits)}>
               {set.name}
@@ -57,7 +58,7 @@ export function RegionsControl({ field, value, onChange }: ControlProps<boolean[
         </select>
       </Row>
       <details class="regions">
-        <summary>One by one</summary>
+        <summary>Individual regions</summary>
         {kPlaces.map((place, z) => (
           <fieldset key={place}>
             <legend>z {place}</legend>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Keeps one session's stream open: opens it, resumes it after a loss, makes a new session when the old one
-// is gone. Knows nothing of scenes and pictures beyond handing them on.
+// Keeps one session's stream open: opens it, resumes it after a lost connection, and creates a new session when the
+// old one no longer exists. Passes scenes and pictures on without interpreting them.
 import { ApiError, api, streamUrl, type Capabilities, type Problem, type SessionInfo } from './api';
 import type { Json, JsonObject } from './merge-patch';
 import type { Picked } from './pointer-pick';
@@ -10,7 +10,7 @@ export type ConnectionState =
   | { kind: 'connected' }
   /** `gone`: the server did not answer at the last attempt. `retryAt` is in Date.now() milliseconds. */
   | { kind: 'waiting'; gone: boolean; retryAt: number }
-  /** The token is not, or no longer, valid: trying again cannot help. */
+  /** The token is not, or no longer, valid: retrying cannot help. */
   | { kind: 'refused' };
 
 export interface ConnectionEvents {
@@ -22,17 +22,17 @@ export interface ConnectionEvents {
   onScene(revision: number, patch: Json): void;
   onProblem(problem: Problem, patch?: number): void;
   onNotice(text: string): void;
-  /** The server has dealt with all that was sent before the ping of this id. */
+  /** The server has processed everything that was sent before the ping with this id. */
   onPong(id: number): void;
   onPicked(picked: Picked): void;
-  /** The scene that a new session shall begin with; undefined for the server's default. */
+  /** The scene for a new session; undefined for the server's default. */
   currentScene(): JsonObject | undefined;
 }
 
 const kFirstDelayMs = 250;
 const kLongestDelayMs = 8000;
 const kPingMs = 5000;
-const kSilenceMs = 15_000; // three pings unanswered: the network is gone without saying so
+const kSilenceMs = 15_000; // three unanswered pings: the connection is dead although it was never closed
 
 export const retryDelay = (attempt: number) => Math.min(kLongestDelayMs, kFirstDelayMs * 2 ** attempt);
 
@@ -49,7 +49,7 @@ export class Connection {
     private session?: SessionInfo,
   ) {}
 
-  /** Connects now, whatever was waited for. */
+  /** Connects now, without waiting for the next scheduled attempt. */
   async open(): Promise<void> {
     clearTimeout(this.timer);
     this.close();
@@ -75,7 +75,7 @@ export class Connection {
     this.close();
   }
 
-  /** False when the stream is not open; nothing is queued. */
+  /** Sends a message; false when the stream is not open. Nothing is queued. */
   send(message: JsonObject): boolean {
     if (this.socket?.readyState !== 1) return false;
     this.socket.send(JSON.stringify(message));
@@ -84,7 +84,7 @@ export class Connection {
 
   private close(): void {
     const socket = this.socket;
-    this.socket = undefined; // first, so that its close event finds that it is no longer ours
+    this.socket = undefined; // first, so that its close event is ignored
     clearInterval(this.pulse);
     socket?.close();
   }
@@ -103,7 +103,7 @@ export class Connection {
     return { session: this.session, fresh: true };
   }
 
-  /** With the scene on screen, or without it where it no longer fits what the server has. */
+  /** Creates a session with the scene on screen, or with the default if the server refuses that scene. */
   private async createSession(): Promise<SessionInfo> {
     const scene = this.events.currentScene();
     if (scene) {
@@ -111,7 +111,7 @@ export class Connection {
         return await api.createSession(scene);
       } catch (error) {
         if (!(error instanceof ApiError && [400, 404, 422].includes(error.status))) throw error;
-        this.events.onProblem({ ...error.problem, detail: `The scene was started anew: ${error.message}` });
+        this.events.onProblem({ ...error.problem, detail: `The scene was reset: ${error.message}` });
       }
     }
     return api.createSession();
@@ -169,7 +169,7 @@ export class Connection {
       case 'picked':
         this.events.onPicked(message as unknown as Picked);
         break;
-      default: // a later server may say more than this page understands
+      default: // a later server may send messages that this page does not know
     }
   }
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Controls built from the schema: one for each kind of field. fields.tsx picks among them.
+// Controls built from the schema, one for each kind of field. fields.tsx selects among them.
 import type { ComponentChildren, JSX } from 'preact';
 import { useId, useRef, useState } from 'preact/hooks';
 import type { Named } from './api';
 import type { Field } from './schema';
 
-const kLogDecades = 2; // a slider over a scale reaches this far to both sides of its first value
+const kLogDecades = 2; // a logarithmic slider extends this far to both sides of its first value
 const kSliderSteps = 400;
 const kNumberLength = 8;
 
-/** Five significant digits, or four where that needs an exponent: enough to recognise a value, and what fits an input. */
+/** Five significant digits, or four if an exponent is needed: enough to recognise a value, and short enough to fit. */
 export function shortNumber(value: number): string {
   const plain = String(Number(value.toPrecision(5)));
   return plain.length <= kNumberLength ? plain : Number(value.toPrecision(4)).toExponential();
@@ -19,7 +19,7 @@ interface RowProps {
   field: Field;
   children: ComponentChildren;
   id?: string;
-  /** Shown where the server can choose the value. */
+  /** If given, an "auto" button is shown, which lets the server choose the value. */
   onAutomatic?: () => void;
 }
 
@@ -41,7 +41,10 @@ export function Row({ field, children, id, onAutomatic }: RowProps) {
   );
 }
 
-/** Maps a slider's 0..1 to values: logarithmic for scales, linear within narrow bounds, none otherwise. */
+/**
+ * Maps a slider's 0..1 to values: logarithmic for numbers whose minimum is 0 and whose maximum is more than 20 times
+ * `reference`, linear within narrow bounds. Otherwise undefined: no slider.
+ */
 export function sliderScale(field: Field, reference: number | undefined) {
   const { minimum, maximum = Infinity } = field;
   if (minimum === undefined) return undefined;
@@ -63,7 +66,7 @@ export function sliderScale(field: Field, reference: number | undefined) {
     };
   }
   if (!(span <= 1000)) return undefined;
-  const inset = field.aboveMinimum ? span / kSliderSteps : 0; // the bound itself is not allowed
+  const inset = field.aboveMinimum ? span / kSliderSteps : 0; // the bounds themselves are not allowed
   return {
     toSlider: (value: number) => (value - minimum - inset) / (span - 2 * inset),
     toValue: (x: number) => Number((minimum + inset + x * (span - 2 * inset)).toPrecision(4)),
@@ -76,7 +79,7 @@ export interface ControlProps<T> {
   onChange(value: T | null): void;
 }
 
-/** Text that somebody types stays as it is until it is finished: meanwhile the scene may be drawn anew. */
+/** Keeps typed text unchanged until the input is finished, even if the scene changes in the meantime. */
 function useTyped(shown: string, onFinish: (text: string) => void) {
   const [typed, setTyped] = useState<string | undefined>(undefined);
   return {
@@ -149,7 +152,7 @@ export function ToggleControl({ field, value, onChange }: ControlProps<boolean>)
   );
 }
 
-/** `names` in the server's text as they are quoted in print. */
+/** The server's text with `names` in quotation marks instead of backquotes. */
 const inPrint = (doc: string | undefined) => doc?.replace(/`([^`]+)`/g, '“$1”');
 
 export function EnumControl({ field, value, onChange, choices }: ControlProps<string> & { choices: Named[] }) {

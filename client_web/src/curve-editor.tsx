@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A curve, such as the opacity's, over the part of the histogram within the range. Points are dragged, added by
-// a double click or Enter, removed by a double click or Delete, and moved by the arrow keys.
+// Editor of a curve, such as opacity, drawn over the histogram within the range. Points are moved by dragging or
+// the arrow keys, added by a double click, Enter or Insert, and removed by a double click, Delete or Backspace.
 import { useEffect, useRef } from 'preact/hooks';
 import { addPoint, evaluate, movePoint, pointAfter, removePoint, type Curve, type Point } from './curve';
 import { fractionIn, followPointer } from './drag';
@@ -8,7 +8,7 @@ import { histogramPath, type Histogram } from './histogram';
 import { shortNumber } from './controls';
 
 interface Props {
-  /** What the curve tells: "Opacity". */
+  /** What the curve's values are, such as "Opacity". */
   label: string;
   curve: Curve;
   range: readonly [number, number];
@@ -83,7 +83,7 @@ export function CurveEditor({ label, curve, range, histogram, paint, onChange }:
       class="plot curve"
       ref={plot}
       onDblClick={onDoubleClick}
-      title="Double-click adds a point or removes one; with a point chosen, arrows move it, Enter adds, Delete removes"
+      title="Double-click adds or removes a point. With a point focused: arrow keys move it, Enter adds, Delete removes"
     >
       <div class="plot-paint" style={{ background: paint, clipPath: area }} />
       <svg viewBox="0 0 100 100" preserveAspectRatio="none" aria-hidden="true">

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The opacity curve as a list of [position, value] points, both in [0, 1], positions never decreasing.
+// Curves as lists of [position, value] points, both in [0, 1]; positions never decrease.
 
 export type Point = readonly [number, number];
 export type Curve = readonly Point[];
@@ -8,7 +8,7 @@ const clamp = (x: number) => Math.max(0, Math.min(1, x));
 /** Four decimals: finer than a pixel of any editor, and short on the wire. */
 const round = (x: number) => Math.round(x * 1e4) / 1e4;
 
-/** The curve at a position: linear between points, constant outside; of two equal positions the later holds. */
+/** The value at a position: linear between points, constant outside; of two equal positions the later counts. */
 export function evaluate(curve: Curve, position: number): number {
   const after = curve.findIndex((point) => point[0] > position);
   const right = curve[after < 0 ? curve.length - 1 : after];
@@ -18,7 +18,7 @@ export function evaluate(curve: Curve, position: number): number {
   return width > 0 ? left[1] + ((right[1] - left[1]) * (position - left[0])) / width : left[1];
 }
 
-/** The point moved, held between its neighbours, so that the order never changes under the hand. */
+/** The curve with one point moved. The point stays between its neighbours, so that a drag never changes their order. */
 export function movePoint(curve: Curve, index: number, to: Point): Curve {
   const low = curve[index - 1]?.[0] ?? 0;
   const high = curve[index + 1]?.[0] ?? 1;
@@ -34,12 +34,12 @@ export function addPoint(curve: Curve, point: Point): { curve: Curve; index: num
   return { curve: [...curve.slice(0, index), added, ...curve.slice(index)], index };
 }
 
-/** The curve without a point; the last one stays, since an empty curve means nothing. */
+/** The curve without a point. The only point of a curve stays, because an empty curve is not valid. */
 export function removePoint(curve: Curve, index: number): Curve {
   return curve.length > 1 ? curve.filter((_, i) => i !== index) : curve;
 }
 
-/** The middle of the widest gap after `index` (or before the first): where a key press adds a point. */
+/** The point of the curve halfway from point `index` to the next (or to position 1): where a key press adds a point. */
 export function pointAfter(curve: Curve, index: number): Point {
   const left = curve[index]?.[0] ?? 0;
   const right = curve[index + 1]?.[0] ?? 1;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The server's data sets, and the histograms of the one that is shown.
+// The server's data sets, and the histograms of the data set that is shown.
 import { batch, signal } from '@preact/signals';
 import { api, type DatasetInfo } from './api';
 import type { Histogram } from './histogram';
@@ -7,17 +7,17 @@ import type { Histogram } from './histogram';
 export class DatasetList {
   readonly all = signal<DatasetInfo[]>([]);
   readonly shown = signal<DatasetInfo | undefined>(undefined);
-  /** One for each channel of the shown data set, as they come. */
+  /** One for each channel of the shown data set; undefined until it has been loaded. */
   readonly histograms = signal<(Histogram | undefined)[]>([]);
   private stale = true;
 
-  /** Asks what there is; the next show() fetches anew. */
+  /** Loads the list of data sets; the next show() loads histograms again. */
   async load(): Promise<void> {
     this.all.value = await api.datasets();
     this.stale = true;
   }
 
-  /** The data set of a scene; without an id, the first. */
+  /** Shows the data set of a scene by its id; the first one if the id is unknown. */
   show(id: unknown): void {
     const dataset = this.all.peek().find((one) => one.id === id) ?? this.all.peek()[0];
     if (!dataset || (!this.stale && this.shown.peek()?.id === dataset.id)) return;

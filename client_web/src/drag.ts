@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Follows one pointer from where it went down until it is released.
+// Follows one pointer from the press until the release.
 
-/** Where a pointer is in an element: fractions of its width and height, from the bottom left, in [0, 1]. */
+/** Position of a pointer in an element, as fractions of its width and height from the bottom left, in [0, 1]. */
 export function fractionIn(element: Element, event: PointerEvent | MouseEvent): { x: number; y: number } {
   const box = element.getBoundingClientRect();
   const clamp = (value: number) => Math.max(0, Math.min(1, value));
@@ -11,7 +11,7 @@ export function fractionIn(element: Element, event: PointerEvent | MouseEvent): 
   };
 }
 
-/** Calls `move` for each step of the pointer that went down in `event`. */
+/** Calls `move` for each movement of the pointer that was pressed in `event`, until it is released. */
 export function followPointer(event: PointerEvent, move: (event: PointerEvent) => void): void {
   const element = event.currentTarget as HTMLElement;
   element.setPointerCapture(event.pointerId);

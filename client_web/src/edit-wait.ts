@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether to say that the server is at work: when an edit has not shown in a picture for a while, and not before,
-// so that quick answers do not flicker.
+// Decides whether to show that the server is working: only after an edit has waited for a while without appearing in a
+// picture, so that the message does not flicker when the answer is quick.
 import { signal } from '@preact/signals';
 
 export const kPatienceMs = 250;
@@ -9,10 +9,10 @@ export class EditWait {
   readonly shown = signal(false);
   private timer: ReturnType<typeof setTimeout> | undefined;
 
-  /** `waitedMs`: how long the oldest edit that no picture shows has waited; undefined when there is none. */
+  /** `waitedMs`: how long the oldest edit that no picture shows yet has waited; undefined if there is none. */
   constructor(private readonly waitedMs: () => number | undefined) {}
 
-  /** To be called when an edit was made, shown or refused. */
+  /** Must be called whenever an edit has been made, shown or refused. */
   update(): void {
     clearTimeout(this.timer);
     const waited = this.waitedMs();

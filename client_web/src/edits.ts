@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Joins the edits made between two animation frames into one patch, numbers the patches, measures how long
-// each takes to come back in a picture, and keeps them until then, so that a lost stream loses no edit.
+// Joins the edits made between two animation frames into one patch, numbers the patches, and measures how long each
+// takes to appear in a picture. Patches are kept until the server has answered them, so a lost stream loses no edit.
 import { isObject, joinPatches, type Json, type JsonObject } from './merge-patch';
 
-/** The two projections exclude each other, so one patch cannot say first one and then the other. */
+/** The two projections exclude each other, so one patch cannot set first one and then the other. */
 function namesBothProjections(patch: Json): boolean {
   const camera = isObject(patch) ? patch.camera : undefined;
   return isObject(camera) && camera.fovY != null && camera.orthoHeight != null;
 }
 
-/** Adds a patch to a list, joined with the last one where that can be said in one. */
+/** Adds a patch to a list, joined with the last one where a single patch can express both. */
 function append(list: JsonObject[], patch: JsonObject): void {
   const last = list[list.length - 1];
   const joined = last && joinPatches(last, patch);
@@ -17,7 +17,7 @@ function append(list: JsonObject[], patch: JsonObject): void {
   else list[list.length - 1] = joined as JsonObject;
 }
 
-/** So many patches may be without an answer: later ones are joined. The server lets no more than 256 wait. */
+/** At most this many patches may be unanswered; later ones are joined. The server queues no more than 256. */
 const kMostInFlight = 64;
 
 export class Edits {
@@ -25,10 +25,10 @@ export class Edits {
   private scheduled = false;
   private lastId = 0;
   private readonly inFlight = new Map<number, JsonObject>();
-  /** When each patch was sent that no picture has shown yet. */
+  /** Time of sending of each patch that no picture has shown yet. */
   private readonly sentAt = new Map<number, number>();
 
-  /** `send` answers false while there is no stream. */
+  /** `send` returns false while there is no stream. */
   constructor(
     private readonly send: (id: number, patch: JsonObject) => boolean,
     private readonly nextFrame: (run: () => void) => void = (run) => void requestAnimationFrame(run),
@@ -54,13 +54,13 @@ export class Edits {
     }
   }
 
-  /** The server has taken, or refused, all patches up to `id`. */
+  /** The server has applied or refused all patches up to `id`. */
   answered(id: number): void {
     for (const known of this.inFlight.keys()) if (known <= id) this.inFlight.delete(known);
     if (!this.scheduled) this.flush();
   }
 
-  /** A picture that contains patches up to `id` has come; the age in milliseconds of that patch, if new. */
+  /** A picture that contains patches up to `id` has arrived. Returns the age of patch `id` in ms when first shown. */
   seen(id: number): number | undefined {
     this.answered(id);
     const sent = this.sentAt.get(id);
@@ -68,14 +68,14 @@ export class Edits {
     return sent === undefined ? undefined : this.now() - sent;
   }
 
-  /** The server has refused the patch of this id: no picture will show it. */
+  /** The server has refused the patch with this id: no picture will show it. */
   refused(id: number): void {
     this.inFlight.delete(id); // those before it may still wait
     this.sentAt.delete(id);
     if (!this.scheduled) this.flush();
   }
 
-  /** How long the oldest patch that no picture has shown has waited; undefined when there is none. */
+  /** How long the oldest patch that no picture has shown yet has waited; undefined if there is none. */
   get waitedMs(): number | undefined {
     const [oldest] = this.sentAt.values();
     return oldest === undefined ? undefined : this.now() - oldest;
@@ -91,12 +91,12 @@ export class Edits {
     return this.waiting.length === 0 && this.inFlight.size === 0;
   }
 
-  /** Edits that the server may not have yet, oldest first: they stay on top of another viewer's. */
+  /** Edits that the server may not have yet, oldest first; they are applied after another viewer's edits. */
   get unconfirmed(): JsonObject[] {
     return [...this.inFlight.values(), ...this.waiting];
   }
 
-  /** On a new stream to the same session: what may be lost is sent again, which does no harm if it was not. */
+  /** On a new stream to the same session: sends again what may be lost. Applying a patch twice does no harm. */
   resend(): void {
     this.waiting = this.unconfirmed;
     this.inFlight.clear();
@@ -104,7 +104,7 @@ export class Edits {
     this.flush();
   }
 
-  /** On a new session, which began with the scene that holds all edits. */
+  /** On a new session: drops all edits, because its initial scene contains them. */
   forget(): void {
     this.waiting = [];
     this.inFlight.clear();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The control for any field of the scene, by its path: kind, bounds and text come from the schema, the
-// choices from the running server.
+// The control for any field of the scene, given its path. Kind, bounds and text come from the schema, the choices
+// of an enumerated field from the running server.
 import { valueAt, type Json } from './merge-patch';
 import {
   ColorControl,
@@ -22,7 +22,7 @@ export function FieldControl({ store, path, label }: { store: Store; path: Path;
   const found = fieldAt(path);
   const field = label ? { ...found, label } : found;
   const scene = store.scene.value as Json | undefined;
-  const value = valueAt(scene, path) ?? (scene && field.default); // an item that was just added is still empty
+  const value = valueAt(scene, path) ?? (scene && field.default); // an item just added is still empty
   const props = { field, onChange: (next: Json) => store.set(path, next) };
   switch (field.kind) {
     case 'number':

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fixed header in front of every picture on the stream; layout in protocol/PROTOCOL.md.
+// The header before every picture on the stream; its layout is in protocol/PROTOCOL.md.
 
 export const headerMagic = 0x584c4353; // "SCLX", little-endian
 export const headerVersion = 1;
 const minimumBytes = 48;
 
 export interface FrameHeader {
-  /** Where the image bytes begin: later versions may lengthen the header. */
+  /** Offset of the image bytes: later versions may extend the header. */
   headerBytes: number;
   mime: 'image/jpeg' | 'image/png';
-  /** Drawn at reduced cost because edits are arriving. */
+  /** Rendered at reduced cost because edits are arriving. */
   interactive: boolean;
   /** The stop condition is reached; no more frames until something changes. */
   final: boolean;
   width: number;
   height: number;
-  /** What was used: 1 + its place in the capabilities' methods; 0 when it is not told. */
+  /** The method used: 1 + its index in the capabilities' methods; 0 if unknown. */
   method: number;
   frame: number;
   revision: number;
@@ -31,7 +31,7 @@ export interface FrameHeader {
 
 const mimeOf: Record<number, FrameHeader['mime']> = { 1: 'image/jpeg', 2: 'image/png' };
 
-/** Throws an Error that says what is wrong with a message that is no frame of ours. */
+/** Decodes the header of a binary message. Throws an Error that says what is wrong if it is not a valid frame. */
 export function decodeFrameHeader(message: ArrayBuffer): FrameHeader {
   if (message.byteLength < minimumBytes)
     throw new Error(`frame of ${message.byteLength} bytes is shorter than its ${minimumBytes}-byte header`);

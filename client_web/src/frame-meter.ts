@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How fast pictures come and how long an edit takes to show.
+// Measures the frame rate and how long an edit takes to appear.
 import { signal } from '@preact/signals';
 
 const kWindowMs = 2000;
@@ -18,7 +18,7 @@ export class FrameMeter {
     this.update();
   }
 
-  /** Lets the rate fall while no picture comes; called now and then. */
+  /** Must be called regularly, so that the rate falls while no picture arrives. */
   update(): void {
     const since = this.now() - kWindowMs;
     this.times = this.times.filter((time) => time > since);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Draws the stream's pictures on a canvas: decodes off the main thread, skips what a newer picture has
-// overtaken, and reports each as done, so that the server knows how far behind this viewer is.
+// Draws the stream's pictures on a canvas. Decodes off the main thread, skips a picture if a newer one is waiting,
+// and reports each as done, so that the server knows how far behind this viewer is.
 import { decodeFrameHeader, type FrameHeader } from './frame-header';
 import { enlarged, type Size } from './image-size';
 
@@ -11,15 +11,15 @@ export class FrameView {
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
-    /** Called once for each frame that came: after it is drawn, or when it is skipped (`drawn` false). */
+    /** Called once for each frame received: after it is drawn, or when it is skipped (`drawn` false). */
     private readonly onDone: (header: FrameHeader, drawn: boolean) => void,
-    /** Size of the scene's picture, to which the smaller ones that come while edits arrive are enlarged. */
+    /** Size of the scene's picture; the smaller pictures sent while edits arrive are enlarged to it. */
     private readonly fullSize: () => Size | undefined = () => undefined,
   ) {
     this.context = canvas.getContext('2d', { alpha: false })!;
   }
 
-  /** Takes one binary message. Throws for one that is no frame. */
+  /** Takes one binary message. Throws if it is not a frame. */
   show(message: ArrayBuffer): void {
     const header = decodeFrameHeader(message);
     if (this.next) this.onDone(this.next.header, false);
@@ -42,17 +42,17 @@ export class FrameView {
       const bytes = new Uint8Array(message, header.headerBytes);
       const picture = await createImageBitmap(new Blob([bytes], { type: header.mime }));
       const full = (header.interactive && this.fullSize()) || picture;
-      // Setting the size clears the canvas, so it happens only when the size changes and just before drawing.
+      // Setting the size clears the canvas: do it only when the size changes, just before drawing.
       if (this.canvas.width !== full.width || this.canvas.height !== full.height) {
         this.canvas.width = full.width;
         this.canvas.height = full.height;
       }
       const place = enlarged(picture, full);
-      this.context.imageSmoothingQuality = 'high'; // cubic, where the browser's own scaling is linear
+      this.context.imageSmoothingQuality = 'high'; // cubic; the browser's default is linear
       this.context.drawImage(picture, place.x, place.y, place.width, place.height);
       picture.close();
       this.canvas.dataset.pictureWidth = String(header.width);
-      this.canvas.dataset.revision = String(header.revision); // which scene is on screen, for whoever asks the page
+      this.canvas.dataset.revision = String(header.revision); // the scene on screen, for scripts and tests
       this.canvas.dataset.samples = String(header.samples);
       return true;
     } catch {

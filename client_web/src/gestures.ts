@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns pointers, wheel and keys over the picture into turns, shifts and zooms. Units: fractions of the
-// element's height for shifts, radians for turns, a factor for zooms.
+// Translates pointers, wheel and keys over the picture into rotating, panning and zooming. Units: radians for rotation,
+// fractions of the element's height for panning, a factor for zooming.
 import type { Spot } from './image-size';
 
 export interface GestureEvents {
@@ -10,12 +10,12 @@ export interface GestureEvents {
   reset(): void;
 }
 
-const kRadiansPerHeight = Math.PI; // a drag over the whole height turns the object half round
+const kRadiansPerHeight = Math.PI; // a drag over the whole height rotates the object by half a turn
 const kKeyTurn = Math.PI / 36;
 const kKeyShift = 0.04;
 const kKeyZoom = 1.12;
 
-/** The pointers' middle and spread. */
+/** Centre of the pointers and their mean distance from it. */
 function summary(pointers: Spot[]): Spot & { spread: number } {
   const x = pointers.reduce((sum, p) => sum + p.x, 0) / pointers.length;
   const y = pointers.reduce((sum, p) => sum + p.y, 0) / pointers.length;
@@ -23,7 +23,7 @@ function summary(pointers: Spot[]): Spot & { spread: number } {
   return { x, y, spread };
 }
 
-/** What a key does to the view; undefined for keys that are not ours. */
+/** What a key does to the view; undefined for keys without an effect. */
 export function keyAction(event: Pick<KeyboardEvent, 'key' | 'shiftKey' | 'ctrlKey' | 'metaKey' | 'altKey'>) {
   if (event.ctrlKey || event.metaKey || event.altKey) return undefined;
   const direction: Record<string, Spot> = {
@@ -41,7 +41,7 @@ export function keyAction(event: Pick<KeyboardEvent, 'key' | 'shiftKey' | 'ctrlK
   return undefined;
 }
 
-/** Listens on the element; the answer stops it. */
+/** Listens for gestures on the element; the returned function stops it. */
 export function attachGestures(element: HTMLElement, to: GestureEvents): () => void {
   const pointers = new Map<number, Spot>();
   const off = new AbortController();
@@ -86,7 +86,7 @@ export function attachGestures(element: HTMLElement, to: GestureEvents): () => v
     (event) => {
       event.preventDefault();
       const pixels = event.deltaY * (event.deltaMode === 1 ? 16 : event.deltaMode === 2 ? 400 : 1);
-      // A pinch on a touch pad arrives as a wheel with ctrl and small steps.
+      // A pinch on a touch pad arrives as wheel events with ctrlKey set and small steps.
       to.zoom(Math.exp(-Math.max(-200, Math.min(200, pixels)) * (event.ctrlKey ? 0.01 : 0.0015)));
     },
     { passive: false },

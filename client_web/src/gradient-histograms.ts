@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Histograms of the gradient's magnitude. Each costs the server a pass over the volume, so that it is fetched
-// when its plot is first shown, and once.
+// Histograms of the gradient's magnitude. Each costs the server a pass over the volume, so it is fetched only once,
+// when its plot is first shown.
 import { signal, type ReadonlySignal, type Signal } from '@preact/signals';
 import { ApiError, type DatasetInfo } from './api';
 import type { Histogram } from './histogram';
@@ -8,21 +8,21 @@ import type { Histogram } from './histogram';
 type Fetch = (id: string, channel: number, abort: AbortSignal) => Promise<Histogram>;
 
 export class GradientHistograms {
-  /** By data set as the server listed it: what a new list tells of may be another volume. */
+  /** Keyed by the list entry, not by its id: after reloading the list, the same id may be another volume. */
   private readonly known = new WeakMap<DatasetInfo, Signal<Histogram | undefined>[]>();
 
-  /** `say` is told why one did not come, unless the server is lost, which is the connection's to report. */
+  /** `say` receives the reason if fetching fails; a lost connection is reported by Connection instead. */
   constructor(
     private readonly fetchOne: Fetch,
     private readonly say: (problem: string) => void,
   ) {}
 
-  /** Over data units per world unit; undefined until it has come. */
+  /** The histogram over data units per world unit; undefined until it has been loaded. */
   of(dataset: DatasetInfo, channel: number): ReadonlySignal<Histogram | undefined> {
     return this.entry(dataset, channel);
   }
 
-  /** Fetches it if it is not there yet; what is returned gives that up. */
+  /** Fetches the histogram unless it has been loaded; the returned function cancels the request. */
   want(dataset: DatasetInfo, channel: number): () => void {
     const off = new AbortController();
     if (!this.entry(dataset, channel).peek()) void this.load(dataset, channel, off.signal);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A channel's opacity by the magnitude of the gradient: a switch, and below it, when on, the range of magnitudes
-// and the curve of the factor over that range.
+// A channel's opacity by the magnitude of the gradient: a switch and, when it is on, the range of magnitudes and the
+// curve of the factor over that range.
 import { useEffect, useState } from 'preact/hooks';
 import { ToggleControl } from './controls';
 import type { Curve } from './curve';
@@ -39,14 +39,14 @@ interface Props {
   settings: Settings;
 }
 
-/** Mounted while it is seen: its histogram is fetched for as long as that. */
+/** Mounted only while visible; unmounting cancels the request for its histogram. */
 function GradientEditors({ store, index, path, settings }: Props) {
   const dataset = store.datasets.shown.value;
   useEffect(() => dataset && store.gradientHistograms.want(dataset, index), [store, dataset, index]);
   const histogram = dataset && store.gradientHistograms.of(dataset, index).value;
   const rangeField = fieldAt([...path, 'range']);
   const pointsField = fieldAt([...path, 'points']);
-  // Until the server has resolved it, about where it will be.
+  // An approximation until the server has resolved the range.
   const range = settings.range ?? ([0, histogram?.maximum ?? 1] as const);
   return (
     <div role="group" aria-label={kLabel}>
@@ -71,7 +71,7 @@ function GradientEditors({ store, index, path, settings }: Props) {
       <button
         type="button"
         class="wide"
-        title="Range and factor as they are when this is switched on"
+        title="Restore the initial range and factor"
         onClick={() => store.set(path, { range: null, points: null })}
       >
         Reset

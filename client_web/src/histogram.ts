@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns a channel's histogram into the outline that the plots fill.
+// Converts a channel's histogram into the outline that the plots fill.
 
 export interface Histogram {
   minimum: number;
   maximum: number;
-  /** Voxel counts over equal widths from minimum to maximum. */
+  /** Voxel counts in bins of equal width from minimum to maximum. */
   bins: number[];
 }
 
-/** Bar heights in [0, 1] on a logarithmic scale: one voxel still shows beside a million. */
+/** Bar heights in [0, 1] on a logarithmic scale: one voxel is still visible next to a million. */
 export function logHeights(bins: readonly number[]): number[] {
   const most = Math.max(0, ...bins);
   const top = Math.log1p(most);
@@ -16,8 +16,8 @@ export function logHeights(bins: readonly number[]): number[] {
 }
 
 /**
- * An SVG path that fills the histogram within [lo, hi] of the data, in a box `width` by `height` whose y axis
- * points down. Empty when there is nothing to draw.
+ * An SVG path of the filled histogram. Data values lo and hi lie at the left and right edge of a box `width` by
+ * `height`, whose y axis points down. Empty when there is nothing to draw.
  */
 export function histogramPath(h: Histogram, lo: number, hi: number, width: number, height: number): string {
   const heights = logHeights(h.bins);

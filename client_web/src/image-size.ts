@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The size to ask pictures in: that of their place on the page, within the server's limits; and where a smaller one goes.
+// The size of the picture to request: that of its area on the page, within the server's limits. Also the mapping of
+// points on the page and of smaller pictures into it.
 
 export interface Size {
   width: number;
@@ -11,7 +12,7 @@ export interface Spot {
   y: number;
 }
 
-/** Whole pixels of the same shape, at least one; `limits` are those of the capabilities. */
+/** The size, shrunk in proportion to `limits` (of the capabilities) if needed; in whole pixels, at least 1 x 1. */
 export function fitSize({ width, height }: Size, limits: Readonly<Record<string, number>> = {}): Size {
   const { imageWidth = Infinity, imageHeight = Infinity, imagePixels = Infinity } = limits;
   const shrink = Math.min(1, imageWidth / width, imageHeight / height, Math.sqrt(imagePixels / (width * height)));
@@ -20,8 +21,8 @@ export function fitSize({ width, height }: Size, limits: Readonly<Record<string,
 }
 
 /**
- * Pixels from the picture's top left corner of a spot on the page, when the picture fills the box as far as its
- * shape allows, in the middle; undefined beside it.
+ * Converts a position on the page to pixels from the picture's top left corner; undefined outside the picture. The
+ * picture is centred in the box, as large as its aspect ratio allows.
  */
 export function pictureSpot(
   spot: Spot,
@@ -34,7 +35,7 @@ export function pictureSpot(
   return x >= 0 && x < picture.width && y >= 0 && y < picture.height ? { x, y } : undefined;
 }
 
-/** Where a smaller picture of the same view belongs in the full one: they share centre and vertical angle. */
+/** Where to draw a smaller picture of the same view in the full one: both have the same centre and vertical angle. */
 export function enlarged(picture: Size, full: Size): Size & { x: number; y: number } {
   const width = (picture.width * full.height) / picture.height;
   return { x: (full.width - width) / 2, y: 0, width, height: full.height };

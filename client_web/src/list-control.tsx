@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A list of objects, such as the lights: every item has the controls of its fields and can be removed, and more can
-// be added up to the schema's bound. Edits of an item are patches by its index, as everywhere.
+// A list of objects, such as the lights. Every item has controls for its fields and can be removed; items can be added
+// up to the schema's maximum. Edits of an item are patches by its index, as elsewhere.
 import { useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { FieldControls } from './fields';
 import { itemsAt, withAdded, withRemoved } from './list-items';
@@ -16,7 +16,7 @@ export function ListControl({ store, path }: { store: Store; path: Path }) {
   const adder = useRef<HTMLButtonElement>(null);
   const [said, say] = useState('');
 
-  // What was clicked may be gone after the edit: the focus goes on to what a user wants next.
+  // The clicked button may not exist after the edit: move the focus to the control that a user needs next.
   const moveFocus = useRef<(() => void) | undefined>(undefined);
   useLayoutEffect(() => {
     moveFocus.current?.();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Starts the page: the store opens the stream, the picture view draws what comes.
+// Starts the page: the store opens the stream; the picture view draws the frames it receives.
 import { render } from 'preact';
 import { App } from './app';
 import type { FrameView } from './frame-view';

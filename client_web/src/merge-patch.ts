@@ -11,7 +11,7 @@ export function isObject(value: Json | undefined): value is JsonObject {
 
 const isElementPatch = (patch: JsonObject) => Object.keys(patch).every((key) => /^\d+$/.test(key));
 
-/** A new value; `null` in the patch removes the member, which on the server means its default. */
+/** The patched value, as a copy. `null` in the patch removes a member, which on the server restores its default. */
 export function applyPatch(target: Json | undefined, patch: Json): Json {
   if (!isObject(patch)) return patch;
   if (Array.isArray(target) && isElementPatch(patch)) {
@@ -29,8 +29,8 @@ export function applyPatch(target: Json | undefined, patch: Json): Json {
 }
 
 /**
- * One patch that does what `first` and then `second` do. Undefined where no patch can say it: a value that
- * is first reset to its default and then changed in part.
+ * One patch with the effect of `first` followed by `second`. Undefined if no single patch can express it: when a value
+ * is first set as a whole, for instance reset to its default, and then patched in part.
  */
 export function joinPatches(first: Json, second: Json): Json | undefined {
   if (!isObject(second)) return second;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Moves of the scene's camera as pure functions: a turntable around the target, which keeps the horizon level.
+// Camera movements as pure functions: a turntable around the target, which keeps the horizon level.
 import type { JsonObject } from './merge-patch';
 
 export type Vector = readonly [number, number, number];
@@ -32,7 +32,10 @@ function rotate(v: Vector, axis: Vector, angle: number): Vector {
   return add(add(scale(v, c), scale(cross(axis, v), s)), scale(axis, dot(axis, v) * (1 - c)));
 }
 
-/** Unit vectors to the right of and upward in the picture; any right one when up is the line of sight. */
+/**
+ * Unit vectors to the right and upward in the picture, and the eye's offset from the target. If up is parallel to the
+ * line of sight, right is any vector perpendicular to it.
+ */
 function frame(camera: Camera): { right: Vector; upward: Vector; offset: Vector } {
   const offset = subtract(camera.eye, camera.target);
   let right = cross(camera.up, offset);
@@ -47,15 +50,15 @@ function frame(camera: Camera): { right: Vector; upward: Vector; offset: Vector 
 export const distanceOf = (camera: Camera) => Math.hypot(...subtract(camera.eye, camera.target));
 export const isOrthographic = (camera: Camera) => camera.orthoHeight !== undefined;
 
-/** World height of the picture at the target. */
+/** Height of the view at the target, world units. */
 export function viewHeight(camera: Camera): number {
   if (camera.orthoHeight !== undefined) return camera.orthoHeight;
   return 2 * distanceOf(camera) * Math.tan(((camera.fovY ?? 35) * Math.PI) / 360);
 }
 
-const kPole = 0.01; // radians kept between the line of sight and up
+const kPole = 0.01; // minimum angle between the line of sight and up, radians
 
-/** Turns about up by `yaw` and over by `pitch`, radians; positive values move the object right and down. */
+/** Rotates by `yaw` about up and by `pitch` about right, radians; positive values move the object right and down. */
 export function orbit(camera: Camera, yaw: number, pitch: number): Camera {
   const up = normalize(camera.up);
   const { right, offset } = frame(camera);
@@ -73,7 +76,10 @@ export function pan(camera: Camera, right: number, down: number): Camera {
   return { ...camera, eye: add(camera.eye, move), target: add(camera.target, move) };
 }
 
-/** Makes the object `factor` times as large; kept within 1e-3 .. 1e2 of `size`, the volume's diagonal. */
+/**
+ * Makes the object `factor` times as large. The eye's distance (orthographic: the view's height) stays within 1e-3 to
+ * 1e2 times `size`, the volume's diagonal.
+ */
 export function zoom(camera: Camera, factor: number, size: number): Camera {
   const bound = (length: number) => Math.max(1e-3 * size, Math.min(1e2 * size, length));
   if (camera.orthoHeight !== undefined) return { ...camera, orthoHeight: bound(camera.orthoHeight / factor) };
@@ -82,7 +88,7 @@ export function zoom(camera: Camera, factor: number, size: number): Camera {
   return { ...camera, eye: add(camera.target, scale(offset, bound(distance / factor) / distance)) };
 }
 
-/** Same view with parallel rays. The eye moves out to `size`, since orthographic rays begin in its plane. */
+/** The same view with parallel rays. The eye moves out to at least `size`, as orthographic rays start in its plane. */
 export function toOrthographic(camera: Camera, size: number): Camera {
   const offset = subtract(camera.eye, camera.target);
   const distance = Math.hypot(...offset);
@@ -90,7 +96,7 @@ export function toOrthographic(camera: Camera, size: number): Camera {
   return { eye, target: camera.target, up: camera.up, orthoHeight: viewHeight(camera) };
 }
 
-/** Same size at the target with converging rays. */
+/** The same view height at the target, in perspective. */
 export function toPerspective(camera: Camera, fovY: number): Camera {
   const distance = viewHeight(camera) / (2 * Math.tan((fovY * Math.PI) / 360));
   const offset = normalize(subtract(camera.eye, camera.target));
@@ -101,7 +107,7 @@ export function toPerspective(camera: Camera, fovY: number): Camera {
 export function cameraPatch(camera: Camera, before: Camera | undefined): JsonObject {
   const { eye, target, up, orthoHeight, fovY } = camera;
   const view: JsonObject = { eye: [...eye], target: [...target], up: [...up] };
-  // Either one removes the other, so the angle of view is said only when the projection changes.
+  // Setting either one removes the other, so fovY is sent only when the projection changes.
   if (orthoHeight !== undefined) view.orthoHeight = orthoHeight;
   else if (before?.orthoHeight !== undefined && fovY !== undefined) view.fovY = fovY;
   return view;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Joins gestures over the picture to the scene's camera.
+// Applies gestures over the picture to the scene's camera.
 import type { GestureEvents } from './gestures';
 import { isOrthographic, orbit, pan, toOrthographic, zoom, type Camera } from './orbit-camera';
 import type { Store } from './store';
@@ -17,7 +17,7 @@ export function orbitControls(store: Store): GestureEvents {
   };
 }
 
-/** The server's view of the whole volume, in the projection that is in use. */
+/** Resets the camera to the server's automatic view, in the current projection. */
 export function resetView(store: Store): void {
   const before = store.camera.peek();
   const parallel = before !== undefined && isOrthographic(before);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is visible under the resting pointer, in the corner of the picture.
+// The channel, value and voxel under the resting pointer, in a corner of the picture.
 import type { Store } from './store';
 
 const inFewDigits = (value: number) => String(Number(value.toPrecision(5)));

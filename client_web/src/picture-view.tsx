@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The live picture: a canvas that fills the window and takes the gestures that move the camera.
+// The live picture: a canvas whose gestures move the camera.
 import { useEffect, useRef } from 'preact/hooks';
 import { FrameView } from './frame-view';
 import { attachGestures } from './gestures';
@@ -7,7 +7,7 @@ import { orbitControls } from './orbit-controls';
 import { attachPointerPick } from './pointer-pick';
 import type { Store } from './store';
 
-/** More than two device pixels to a CSS pixel costs rays that nobody sees. */
+/** More than two device pixels per CSS pixel would cost rays without a visible benefit. */
 const kMostPixelRatio = 2;
 const kResizeRestMs = 120;
 
@@ -49,7 +49,7 @@ export function PictureView({ store, attach }: { store: Store; attach(view: Fram
       tabIndex={0}
       role="application"
       aria-roledescription="volume view"
-      aria-label="Volume. Arrow keys turn, shift and arrow keys shift, plus and minus zoom, R resets the view."
+      aria-label="Volume. Arrow keys rotate, Shift and arrow keys pan, plus and minus zoom, R resets the view."
       style={{ background: store.scene.value?.image?.background ?? '#000' }}
     >
       <canvas ref={canvas} width={1} height={1} />

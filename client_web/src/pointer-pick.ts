@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Asks what is visible under the pointer when it rests over the picture, and keeps the answer until the pointer
-// or the picture moves.
+// Requests what is visible under the pointer when it rests over the picture, and keeps the answer until the pointer
+// moves or the picture changes.
 import { signal } from '@preact/signals';
 import { pictureSpot, type Size, type Spot } from './image-size';
 
 export const kRestMs = 150;
 
-/** What the server says is visible at a pixel; without the members after `hit` where nothing is. */
+/** The server's answer on what is visible at a pixel; without the members after `hit` if nothing is. */
 export interface Picked {
   id: number;
   hit?: boolean;
@@ -14,21 +14,21 @@ export interface Picked {
   name?: string;
   /** Indices of the nearest voxel. */
   voxel?: [number, number, number];
-  /** Of all channels, data units. */
+  /** For each channel, in data units; null where not finite. */
   values?: (number | null)[];
 }
 
 export class PointerPick {
-  /** Undefined where nothing is hit, and while it is not known. */
+  /** Undefined where nothing is hit, and while no answer has arrived. */
   readonly shown = signal<Picked | undefined>(undefined);
   private spot: Spot | undefined;
   private id = 0;
   private timer: ReturnType<typeof setTimeout> | undefined;
 
-  /** `ask` sends a question that `answered` will be told the answer of. */
+  /** `ask` sends a request; its answer must be passed to `answered`. */
   constructor(private readonly ask: (id: number, spot: Spot) => void) {}
 
-  /** The pointer is there, in pixels of the picture; or away from it, or at work. */
+  /** The pointer is at `spot`, in pixels of the picture; undefined if it is outside or in use for a gesture. */
   moved(spot: Spot | undefined): void {
     this.spot = spot;
     this.pictureChanged();
@@ -37,7 +37,7 @@ export class PointerPick {
   pictureChanged(): void {
     clearTimeout(this.timer);
     this.shown.value = undefined;
-    this.id++; // an answer that is still to come is of another place or picture
+    this.id++; // an outstanding answer is for another place or picture
     const { spot } = this;
     if (spot) this.timer = setTimeout(() => this.ask(this.id, spot), kRestMs);
   }
@@ -47,7 +47,7 @@ export class PointerPick {
   }
 }
 
-/** Has it follow the mouse or pen over the element in which the picture is; the answer stops it. */
+/** Makes `pick` follow the mouse or pen over the element that shows the picture; the returned function stops it. */
 export function attachPointerPick(element: HTMLElement, pick: PointerPick, size: () => Size | undefined): () => void {
   const off = new AbortController();
   const follow = (event: PointerEvent) => {

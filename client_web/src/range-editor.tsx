@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The range of values that curves span: two handles over the whole histogram, and two numbers.
+// Editor of the range of values that a curve spans: two handles over the whole histogram, and two number fields.
 import { useRef } from 'preact/hooks';
 import { NumberInput } from './controls';
 import { fractionIn, followPointer } from './drag';
@@ -13,7 +13,7 @@ interface Props {
   onChange(range: [number, number] | null): void;
 }
 
-/** The data's extent, widened where the range lies outside; never empty. */
+/** The range of the data, extended to contain `range`; never empty. */
 export function plotDomain(range: readonly [number, number], histogram: Histogram | undefined): [number, number] {
   const low = Math.min(range[0], range[1], histogram?.minimum ?? Infinity);
   const high = Math.max(range[0], range[1], histogram?.maximum ?? -Infinity);

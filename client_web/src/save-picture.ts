@@ -9,13 +9,13 @@ export async function savePicture(store: Store): Promise<void> {
   try {
     const response = await fetch(pictureUrl(id), { cache: 'no-store' });
     if (!response.ok) throw await problemOf(response);
-    if (response.status === 204) throw new Error('the server had none in time');
+    if (response.status === 204) throw new Error('the server did not finish one in time');
     const link = document.createElement('a');
     link.href = URL.createObjectURL(await response.blob());
     link.download = `${store.datasets.shown.peek()?.id ?? 'scolopax'}.png`;
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
   } catch (error) {
-    store.toasts.say(`The picture was not saved: ${error instanceof Error ? error.message : String(error)}`);
+    store.toasts.say(`Could not save the picture: ${error instanceof Error ? error.message : String(error)}`);
   }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the scene's JSON Schema says of a field, in the form in which controls are built from it: a field
-// that is added to the schema gets its control without a change here.
+// Describes the fields of the scene's JSON Schema in the form from which controls are built: a field added to
+// the schema gets its control without a change here.
 import document from '../../protocol/schema.json';
 import { isNamedList, type Capabilities, type Named } from './api';
 
@@ -40,7 +40,7 @@ export type Kind =
   | 'object'
   | 'other';
 
-/** Of a volume that is cut twice along every axis. */
+/** Number of regions of a volume that two planes along every axis divide. */
 export const kRegions = 27;
 
 export interface Field {
@@ -49,7 +49,7 @@ export interface Field {
   /** The key in words: "orthoHeight" is "Ortho height". */
   label: string;
   kind: Kind;
-  /** What it is, with its unit. */
+  /** What the field means, with its unit. */
   doc: string;
   /** "degrees"; empty for plain numbers. */
   unit: string;
@@ -57,10 +57,10 @@ export interface Field {
   minimum?: number;
   maximum?: number;
   aboveMinimum: boolean;
-  /** null has the server choose. */
+  /** Whether null lets the server choose the value. */
   automatic: boolean;
   default?: unknown;
-  /** Of a vector. */
+  /** Number of components of a vector. */
   length: number;
   options: string[];
   /** Keys of an object. */
@@ -134,7 +134,7 @@ const itemLabelOf = (list: SchemaNode) => inWords((list.items && resolve(list.it
 
 function describeNode(key: string, outer: SchemaNode): Field {
   const { node, automatic } = withoutNull(outer);
-  const doc = (node.description ?? '').split('\n')[0]!; // the lines below it are the choices'
+  const doc = (node.description ?? '').split('\n')[0]!; // the lines below describe the choices
   return {
     key,
     label: inWords(key),
@@ -166,7 +166,7 @@ export function fieldAt(path: Path): Field {
   return describeNode(String(path[path.length - 1] ?? ''), node);
 }
 
-/** Paths of the single values below a path, objects opened; a list of objects counts as one. */
+/** Paths of the single values below a path. Objects are expanded; a list of objects counts as one value. */
 export function leavesBelow(path: Path): Path[] {
   const field = fieldAt(path);
   if (field.kind === 'object') return field.members.flatMap((member) => leavesBelow([...path, member]));
@@ -174,8 +174,8 @@ export function leavesBelow(path: Path): Path[] {
 }
 
 /**
- * The choices of an enumerated field, with a line on each: of the running server's lists the one that has most of
- * the schema's names, or, where none has half of them, those names alone.
+ * The choices of an enumerated field, each with a line of text if known: the list in the server's capabilities that
+ * shares most names with the schema or, if none has half of them, the schema's names alone.
  */
 export function choicesOf(path: Path, capabilities: Capabilities): Named[] {
   const { options } = fieldAt(path);
@@ -186,7 +186,7 @@ export function choicesOf(path: Path, capabilities: Capabilities): Named[] {
   return best && shared(best) >= options.length / 2 ? best : options.map((name) => ({ name }));
 }
 
-/** "/channels/0/gamma" as a person would say it: "Channel 1, gamma". */
+/** A JSON pointer in words: "/channels/0/gamma" is "Channel 1, gamma". */
 export function sayPointer(pointer: string): string {
   const words: string[] = [];
   let node: SchemaNode | undefined = root;

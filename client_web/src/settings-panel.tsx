@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the picture is made. The first settings are those most asked for; all others of the scene follow
-// under "More settings", so that a new one in the schema appears there by itself.
+// Render settings. The most used ones come first; all other fields of the scene follow under "More settings", where
+// a new field of the schema appears without a change here.
 import { FieldControl, FieldControls } from './fields';
 import { ListControl } from './list-control';
 import { fieldAt, leavesBelow, type Path } from './schema';
@@ -11,15 +11,15 @@ const kFirst = [
   { path: ['integrator', 'method'], label: 'Method' },
   { path: ['image', 'background'], label: 'Background' },
 ];
-/** Edited elsewhere, following the window, or above. */
+/** Fields not under "More settings": edited elsewhere, set from the window's size, or listed in kFirst. */
 const kElsewhere = new Set(['dataset', 'image.width', 'image.height', ...kFirst.map(({ path }) => path.join('.'))]);
 
 const isList = (path: Path) => fieldAt(path).kind === 'list';
 
-/** Every list of objects, such as the lights, has a section of its own; the channels have their cards. */
+/** Every list of objects, such as the lights, has its own section, except the channels, which have cards. */
 const lists = leavesBelow([]).filter((path) => isList(path) && path[0] !== 'channels');
 
-/** One group for each object of the scene that has something left. */
+/** One group for each object of the scene that has fields left. */
 const groups: { label: string; paths: Path[] }[] = fieldAt([])
   .members.filter((key) => key !== 'channels' && key !== 'camera')
   .map((key) => ({

@@ -5,7 +5,7 @@ import type { ConnectionState } from './connection';
 import { choicesOf } from './schema';
 import type { Store } from './store';
 
-/** What a screen reader is told when it changes: without the countdown. */
+/** The text that a screen reader announces when the state changes; it omits the countdown. */
 export function stateWords(state: ConnectionState): string {
   switch (state.kind) {
     case 'connecting':
@@ -13,7 +13,7 @@ export function stateWords(state: ConnectionState): string {
     case 'connected':
       return 'Connected';
     case 'waiting':
-      return state.gone ? 'Server gone' : 'Connection lost';
+      return state.gone ? 'Server unreachable' : 'Connection lost';
     case 'refused':
       return 'Not authorised: open the address that the server printed';
   }
@@ -91,7 +91,7 @@ export function StatusBar({ store }: { store: Store }) {
             hint="From sending an edit to the first picture that contains it"
           />
           <Figure name="frames/s" value={rate.toFixed(1)} hint="Pictures drawn per second" />
-          <Figure name="method" value={used ?? ''} hint="The method that this picture was made with" />
+          <Figure name="method" value={used ?? ''} hint="Method used for this picture" />
           <Figure name="pixels" value={`${frame.width} × ${frame.height}`} hint="Size of the picture received" />
         </>
       )}

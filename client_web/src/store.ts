@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page's state as signals, and the one way to change the scene. Between the stream (connection.ts) and
+// The page's state as signals, and the only way to change the scene. It lies between the stream (connection.ts) and
 // the components, which read signals and call edit().
 import { batch, computed, signal } from '@preact/signals';
 import { ApiError, api, type Capabilities, type Problem, type SessionInfo } from './api';
@@ -33,9 +33,9 @@ export class Store {
   readonly gradientHistograms = new GradientHistograms(api.gradientHistogram, (problem) => this.toasts.say(problem));
   readonly meter = new FrameMeter();
 
-  /** Length of the volume's diagonal in world units: the scale of what is looked at. */
+  /** Length of the volume's diagonal in world units: the scale for camera movements. */
   readonly worldSize = computed(() => this.datasets.shown.value?.diagonal || 1);
-  /** Undefined until the server has resolved it. */
+  /** Undefined until the server has resolved the scene. */
   readonly camera = computed<Camera | undefined>(() => {
     const { eye, target, up, fovY, orthoHeight } = this.scene.value?.camera ?? {};
     if (!eye || !target || !up) return undefined;
@@ -47,7 +47,7 @@ export class Store {
     if (sent) queueMicrotask(() => this.wait.update());
     return sent;
   });
-  /** The server is at work on an edit. */
+  /** Whether to show that the server is working on an edit. */
   readonly wait = new EditWait(() => this.edits.waitedMs);
   /** What is visible under the pointer. */
   readonly pick = new PointerPick((id, { x, y }) => void this.link.send({ type: 'pick', id, x, y }));
@@ -93,19 +93,19 @@ export class Store {
     this.edit({ camera: cameraPatch(camera, this.camera.peek()) });
   }
 
-  /** Has the server choose the view again; `then` runs when it is known. */
+  /** Lets the server choose the view again; `then` runs once the view is known. */
   resetCamera(then?: () => void): void {
     this.onRefreshed = then;
     this.edit({ camera: null });
   }
 
-  /** The size in device pixels that the picture should have. */
+  /** Sets the size in device pixels that the picture should have. */
   setImageSize(place: Size): void {
     this.place = place;
     this.applySize();
   }
 
-  /** Of the scene's picture; undefined until the server has told the scene. */
+  /** Size of the scene's picture; undefined until the scene has been loaded. */
   get imageSize(): Size | undefined {
     const { width, height } = this.scene.peek()?.image ?? {};
     return width && height ? { width, height } : undefined;
@@ -115,7 +115,7 @@ export class Store {
     this.link.send({ type: 'view', visible });
   }
 
-  /** Counts a picture that came, and tells the server that it did. */
+  /** Acknowledges a received frame; if it was drawn, updates the state that depends on it. */
   frameDone(header: FrameHeader, drawn: boolean): void {
     this.link.send({ type: 'ack', frame: header.frame });
     if (!drawn) return;
@@ -148,7 +148,7 @@ export class Store {
       await this.refresh();
       this.applySize();
     } catch {
-      // The stream has gone again: that is the connection's to report.
+      // The stream is lost again; Connection reports that.
     }
   }
 
@@ -167,17 +167,17 @@ export class Store {
     this.wait.update();
     const { detail, title, pointer = '' } = problem;
     const text = detail ?? title ?? 'The server reports an error.';
-    // The detail begins with the pointer, which is said in words instead.
+    // The detail begins with the pointer, which is shown in words instead.
     this.toasts.say(text.replace(pointer && `${pointer}: `, ''), sayPointer(pointer));
     if (patch) void this.refresh();
   }
 
-  /** The server's scene with the edits on top that it may not have yet. */
+  /** Shows the server's scene with the edits applied that the server may not have yet. */
   private showScene(scene: Scene): void {
     this.scene.value = this.edits.unconfirmed.reduce((at, patch) => applyEdit(at as Json, patch), scene);
   }
 
-  /** Fetches the scene with what the server chose for itself, such as a density. */
+  /** Fetches the scene with the values that the server chose, such as a density. */
   private async refresh(): Promise<void> {
     const id = this.sessionId.peek();
     if (!id) return;
@@ -190,19 +190,19 @@ export class Store {
       this.onRefreshed?.();
       this.onRefreshed = undefined;
     } catch (error) {
-      // A lost server is the connection's to report.
+      // Connection reports a lost server.
       if (error instanceof ApiError) this.toasts.say(error.message);
     }
   }
 
-  /** When edits rest, asks whether the server has dealt with them; the answer is receivePong(). */
+  /** After a pause in edits, pings the server; receivePong() then learns that it has processed them. */
   private refreshLater(): void {
     clearTimeout(this.settleTimer);
     this.settleTimer = setTimeout(() => this.link.send({ type: 'ping', id: this.edits.last }), kSettleMs);
   }
 
   private receivePong(id: number): void {
-    if (id === 0) return; // the connection's own, to see whether it lives
+    if (id === 0) return; // Connection's own ping, a heartbeat
     this.edits.answered(id);
     if (this.edits.settled) void this.refresh();
   }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the server had to say, until it is dismissed.
+// Messages for the user, kept until they are dismissed.
 import { signal } from '@preact/signals';
 
 export interface Toast {
   id: number;
-  /** The field at fault, in words; empty when it is none. */
+  /** The invalid field, in words; empty if no field is at fault. */
   field: string;
   text: string;
 }
@@ -15,7 +15,7 @@ export class ToastList {
   readonly all = signal<Toast[]>([]);
   private count = 0;
 
-  /** The same text is shown once. */
+  /** Shows a message; one with the same text is replaced. */
   say(text: string, field = ''): void {
     const others = this.all.peek().filter((toast) => toast.text !== text);
     this.all.value = [...others, { id: ++this.count, field, text }].slice(-kMost);

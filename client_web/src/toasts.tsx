@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Messages of the server that stay until they are dismissed.
+// Shows messages until they are dismissed.
 import type { Store } from './store';
 
 export function Toasts({ store }: { store: Store }) {

@@ -134,7 +134,7 @@ describe('the connection', () => {
     void connect().open();
     await settle();
     expect(server.created).toEqual([{}]);
-    expect(problems[0]).toMatch(/started anew: no such data set/);
+    expect(problems[0]).toMatch(/was reset: no such data set/);
   });
 
   it('says that the server is gone, waits twice as long each time up to 8 s, and comes back', async () => {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the experiments share: the program, the scenes and their data, truths, and calls of `scolopax bench`."""
+"""Shared by the experiments: program, scenes and their data, reference pictures, and calls of `scolopax bench`."""
 import hashlib
 import json
 import os
@@ -12,11 +12,11 @@ import time
 HERE = os.path.dirname(os.path.abspath(__file__))
 PROGRAM = os.environ.get("SCOLOPAX", os.path.join(HERE, "../../build/release/scolopax"))
 DATA = os.environ.get("SCOLOPAX_DATA_DIR", os.path.join(HERE, "../../../shared/data"))
-# The four of the paper's Figure 8: (shading, shadows).
+# The four light configurations of the paper's Figure 8: (shading, shadows).
 LIGHTS = {"emission-absorption": (False, False), "shading": (True, False), "shadows": (False, True), "both": (True, True)}
 
 TCGA = "multichannel/tcga_du_7294/TCGA-DU-7294_"
-# Files below the data folder; a number is that many generated orbitals.
+# Files relative to the data folder; a number means that many generated orbitals.
 SCENES = {
     "orbitals": 4,
     "tcga": [f"{TCGA}{name}_bet.nii.gz" for name in ("fla", "t1", "t1c", "t2")],
@@ -48,12 +48,12 @@ def light_settings(light):
 
 
 class Bench:
-    """Runs the program on scenes; everything it makes lies in `folder`, truths in `truths`."""
+    """Runs the program on scenes; its output goes to `folder`, reference pictures to `truths`."""
 
     def __init__(self, folder, truths, quick):
         self.folder, self.truths, self.quick = folder, truths or folder, quick
         os.makedirs(self.truths, exist_ok=True)
-        # A truth has every third pixel: the reference takes seconds a ray where shadows fall on many curves.
+        # A reference picture has only every third pixel: with shadows and many curves, a ray takes seconds.
         self.side, self.truth_side = (48, 16) if quick else (96, 32)
         self.repetitions = 2 if quick else 3
         self.scenes = [name for name in SCENES if not quick or name in ("orbitals", "cells", "bonsai")]
@@ -69,7 +69,7 @@ class Bench:
         return [out]
 
     def data(self, name):
-        """Files of a scene; None, with a message, when they are not there."""
+        """Files of a scene; None, with a message, if one is missing."""
         if isinstance(SCENES[name], int):
             return self.orbitals(SCENES[name])
         files = [os.path.join(DATA, file) for file in SCENES[name]]
@@ -96,8 +96,8 @@ class Bench:
         return out
 
     def bench(self, name, settings=None, data=None, truth=True, side=None, **options):
-        """The JSON of `scolopax bench` of a scene with `settings`; options as samples=[1, 4]. Without a truth it has no
-        errors."""
+        """The JSON that `scolopax bench` writes for a scene with `settings`; None if data is missing. Options, such as
+        samples=[1, 4], are passed on. With truth=False only times are measured, no errors."""
         data, settings = data or self.data(name), settings or {}
         if data is None:
             return None
@@ -117,7 +117,7 @@ class Bench:
 
 
 def resources(words):
-    """(seconds, peak bytes resident) of a command, output dropped."""
+    """(seconds, peak resident bytes) of a command; its output is discarded."""
     begin = time.monotonic()
     with open(os.devnull, "w", encoding="utf-8") as null:
         process = subprocess.Popen(words, stdout=null, stderr=null)

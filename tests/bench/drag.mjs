@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// How fluent a drag is in a browser without a GPU, on the processors that render: node drag.mjs [SECONDS]
+// Measures how smooth a drag is in a browser without a GPU, on the processors that also render: node drag.mjs [SECONDS]
 //
-// Turns the four-channel MRI in a picture of 944 x 770 by the mouse, 60 moves a second, and prints, as JSON, pictures a
-// second, their widths and the milliseconds from a patch being sent to the frame that contains it being received.
+// Rotates the four-channel MRI with the mouse in a picture of 944 x 770, with 60 moves a second. Prints, as JSON,
+// pictures per second, their widths, and the milliseconds from sending a patch to receiving a frame that contains it.
 // Reads SCOLOPAX, SCOLOPAX_DATA_DIR.
 import { readdirSync } from 'node:fs';
 import path from 'node:path';
@@ -16,7 +16,7 @@ const files = readdirSync(folder).filter((name) => name.endsWith('_bet.nii.gz'))
 const header = (message) => ({ width: message.readUInt16LE(10), patch: message.readUInt32LE(24) });
 const quantile = (values, q) => [...values].sort((a, b) => a - b)[Math.min(values.length - 1, Math.floor(q * values.length))];
 
-/** Makes the window so large that the picture is of that size. */
+/** Sizes the window so that the picture has the given size. */
 async function resize(page, width, height) {
   for (let i = 0; i < 3; ++i) {
     const box = await page.locator('.picture').boundingBox();
@@ -58,7 +58,7 @@ try {
   await page.mouse.down();
   const begin = performance.now();
   for (let step = 0; performance.now() < begin + 1000 * (seconds + 1); ++step) {
-    if (!measuring && performance.now() > begin + 1000) measuring = true; // the first second learns
+    if (!measuring && performance.now() > begin + 1000) measuring = true; // the first second warms up
     const angle = step / 20;
     await page.mouse.move(x + width / 2 + 200 * Math.sin(angle), y + height / 2 + 60 * Math.cos(angle));
     await new Promise((resolve) => setTimeout(resolve, Math.max(0, begin + (1000 * (step + 1)) / 60 - performance.now())));

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""How fluent a drag is: drag.py [PROGRAM...]
+"""Measures how smooth a drag is: drag.py [PROGRAM...]
 
-Turns the four-channel MRI (tcga) at 944x770 by 60 edits a second and prints, as JSON, pictures a second, their widths
-and the milliseconds from an edit to its picture. Several programs take turns, so that what else the machine does meets
-all alike; medians of the rounds, and their ratios to the first program's. Reads SCOLOPAX, SCOLOPAX_DATA_DIR,
+Rotates the four-channel MRI (tcga) at 944x770 with 60 edits a second. Prints, as JSON, pictures per second, their
+widths and the milliseconds from an edit to its picture: medians of the rounds, and their ratios to the first program's.
+Several programs take turns, so that other load on the machine affects all alike. Reads SCOLOPAX, SCOLOPAX_DATA_DIR,
 LATENCY_SECONDS, DRAG_ROUNDS."""
 import asyncio
 import json

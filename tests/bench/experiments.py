@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The experiments of the report: one function each, and one list of them. Each takes a common.Bench and returns what goes
-into the JSON file under its name."""
+"""The experiments of the report: one function each, and one list of them. Each takes a common.Bench and returns the
+entry of the JSON file under its name."""
 import json
 import os
 import time
@@ -27,7 +27,7 @@ def macrocells(bench):
     lit = () if bench.quick else ("orbitals", "tcga", "heptane")
     for name in bench.scenes:
         for light in ("emission-absorption", "both") if name in lit else ("emission-absorption",):
-            # The marcher with shadows is told by `speed`.
+            # `speed` measures the marcher with shadows.
             methods = ["superposed", "cumulative", "sync-dda", "n-dda", *(["raymarch"] if light != "both" else [])]
             result = bench.bench(name, light_settings(light), truth=False, macrocells=[1, 2, 4, 8, 16, 32], samples=[1, 4],
                                  methods=methods, steps=[1], longest=0.05 if bench.quick else 0.3)
@@ -43,7 +43,7 @@ def channels(bench):
     for light in bench.lights:
         for count in (1, 4, 12) if bench.quick else (1, 2, 3, 4, 6, 8, 10, 12):
             hidden = {f"channels.{i}.visible": False for i in range(count, 12)}
-            # The reference of twelve channels with shadows is slow and told by `speed`.
+            # The reference of twelve channels with shadows is slow; `speed` measures errors with it.
             found.setdefault(light, {})[count] = bench.bench(
                 "many", {**hidden, **light_settings(light)}, data, truth=light == "emission-absorption",
                 samples=[1, 4] if bench.quick else [1, 32], steps=[1], longest=0.05 if bench.quick else 0.5)
@@ -51,7 +51,7 @@ def channels(bench):
 
 
 def quality(bench):
-    """Section 5.3: growing samples of the trackers, shrinking steps of the marcher."""
+    """Section 5.3: trackers with an increasing number of samples, the marcher with decreasing steps."""
     found = {}
     for name in ("bonsai",) if bench.quick else ("orbitals", "tcga", "bonsai"):
         result = bench.bench(name, samples=[1, 4, 16, 64, 256], steps=[8, 4, 2, 1, 0.5, 0.25, 0.125],
@@ -62,8 +62,8 @@ def quality(bench):
 
 
 def blends(bench):
-    """Section 5.4: max, mix and composite against density, on finely marched pictures without noise to speak of, as they are
-    displayed: 8 bits, clipped."""
+    """Section 5.4: max, mix and composite against density, on finely marched pictures with negligible noise, as they
+    are displayed: 8 bits, clipped."""
     found = {}
     side, samples = (64, 2) if bench.quick else (192, 4)
     for name in MULTICHANNEL:
@@ -92,7 +92,7 @@ def memory(bench):
 
 
 def sizes(bench):
-    """Time per ray and peak memory as a volume of one content grows; rounds take turns, medians."""
+    """Time per ray and peak memory for the same content on finer grids: medians of rounds with the sizes in turn."""
     rows = {}
     edges = (32, 64) if bench.quick else (64, 128, 256, 512)
     for _ in range(2 if bench.quick else 3):
@@ -109,20 +109,20 @@ def sizes(bench):
                          for method, points in row["points"].items()}
         command = [PROGRAM, "render", bench.scene("orbitals"), "--data", *bench.orbitals(4, edge), "-o",
                    bench.path("sizes.exr"), "--samples", "1"]
-        # Above what the program and its libraries take before they do anything.
+        # Less what the program and its libraries need before they do anything.
         row["peakBytes"] = resources(command)[1] - resources([PROGRAM, "--version"])[1]
     return rows
 
 
 def threads(bench):
-    """Efficiency t1 / (n tn), numbers of threads taking turns in one process."""
+    """Efficiency t1 / (n tn); the numbers of threads take turns in one process."""
     counts, most = [1], os.cpu_count() or 1
     while 2 * counts[-1] <= most:
         counts.append(2 * counts[-1])
     found = {}
     for name in ("orbitals",) if bench.quick else ("orbitals", "tcga", "heptane"):
         for light in ("emission-absorption", "both"):
-            # The marcher with shadows is told by `speed`.
+            # `speed` measures the marcher with shadows.
             methods = ["superposed", "sync-dda", *(["raymarch"] if light != "both" else [])]
             result = bench.bench(name, light_settings(light), truth=False, threads=counts, samples=[4], steps=[1],
                                  methods=methods, side=64 if bench.quick else 256, repetitions=bench.repetitions + 2)
@@ -132,8 +132,8 @@ def threads(bench):
 
 
 def loading(bench):
-    """Loading (with its histograms, by `scolopax info`) against reading the file's bytes and against unpacking them
-    with gzip, all warm; medians."""
+    """Loading (with its histograms, by `scolopax info`) against reading the file's bytes and against decompressing them
+    with gzip, all from a warm cache; medians."""
     found = {}
     cases = {"orbitals 128^3, NRRD, not packed": bench.orbitals(4)}
     if not bench.quick:

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The gate of a change that must change no picture: gate.py record OUT.json, then gate.py compare OLD.json NEW.json
+"""Checks that a change affects no picture. Before and after it: gate.py record OUT.json; then:
+gate.py compare OLD.json NEW.json
 
 `record` hashes float pictures of every scene in every blend mode, light and method, on every instruction set that this
 processor has; `compare` lists the pictures that differ. Reads SCOLOPAX, SCOLOPAX_DATA_DIR."""
@@ -20,11 +21,11 @@ from common import LIGHTS, SCENES, Bench, scratch  # noqa: E402
 
 BLENDS = ("density", "max", "mix", "composite")
 INSTRUCTIONS = ("baseline", "avx2", "avx512")
-SIZE = {"width": 40, "height": 31}  # no multiple of tiles or packets
+SIZE = {"width": 40, "height": 31}  # not a multiple of tiles or packets
 
 
 def hashes(name, files, instructions, methods):
-    """{"blend light method": hash of its EXR} of one scene."""
+    """{"blend light method": hash of the EXR picture} for one scene."""
     with open(Bench.scene(name), encoding="utf-8") as file:
         scene = json.load(file)
     found = {}
@@ -70,7 +71,7 @@ def record(out, scenes):
 
 
 def compare(before, after):
-    """The number of pictures that differ or that only one has."""
+    """The number of pictures that differ or that only one file has."""
     with open(before, encoding="utf-8") as a, open(after, encoding="utf-8") as b:
         old, new = json.load(a), json.load(b)
     rows = [({f"{scene}: {picture}": bits for scene, found in side.items() for picture, bits in found.items()})

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""How long an edit takes to show: latency.py OUT.json [CLIENTS...], and latency.py --report IN.json > OUT.md
+"""Measures how long an edit takes to appear: latency.py OUT.json [CLIENTS...], and latency.py --report IN.json > OUT.md
 
-From a patch being sent to the first frame received whose header says that it contains it. The clients of all
-rows are one process on the same machine, whose own time counts too. Reads SCOLOPAX, SCOLOPAX_DATA_DIR."""
+Times are from sending a patch to receiving the first frame whose header says that it contains the patch. All clients
+are one process on the same machine; its own time is included. Reads SCOLOPAX, SCOLOPAX_DATA_DIR."""
 import asyncio
 import json
 import math
@@ -25,7 +25,7 @@ CLIENTS = (1, 4, 16)
 
 
 def camera(step, volume):
-    """An orbit of 2 degrees a step, as a drag makes it."""
+    """An orbit of 2 degrees a step, like a drag."""
     centre, distance = volume
     angle = math.radians(2 * step)
     eye = [centre[0] + distance * math.sin(angle), centre[1] - distance * math.cos(angle), centre[2]]
@@ -33,7 +33,7 @@ def camera(step, volume):
 
 
 def curve(step, _):
-    """A point of the first channel's opacity curve, moved to and fro."""
+    """Moves a point of the first channel's opacity curve back and forth."""
     return {"channels": {"0": {"opacity": [[0, 0], [0.3 + 0.2 * math.sin(0.2 * step), 0], [1, 1]]}}}
 
 
@@ -41,10 +41,10 @@ EDITS = {"camera": camera, "curve": curve}
 
 
 class Client:
-    """A viewer that notes when each patch was sent, and when the first frame came that contains it."""
+    """A viewer that records when each patch was sent, and when the first frame that contains it arrived."""
 
     def __init__(self, viewer, base=None):
-        self.viewer, self.base = viewer, base  # base: the revision before the first patch, to know others' patches by
+        self.viewer, self.base = viewer, base  # base: revision before the first patch, to count others' patches
         self.sent, self.rows, self.answered, self.wake = {}, [], 0, asyncio.Event()
 
     async def read(self):
@@ -83,7 +83,7 @@ class Client:
 
 
 async def measure(server, edit, rate, clients, shared, stalled, size=(SIZE, SIZE)):
-    """Rows of all clients. `shared`: all look at one session, which the first one edits."""
+    """Rows of all clients. `shared`: all view one session, which the first one edits."""
     width, height = size
     sessions, viewers = [], []
     for _ in range(1 if shared else clients):
@@ -96,7 +96,7 @@ async def measure(server, edit, rate, clients, shared, stalled, size=(SIZE, SIZE
     volume = cam["target"], math.dist(cam["eye"], cam["target"])
     for i in range(clients):
         viewers.append(await protocol_client.Viewer(server, sessions[i % len(sessions)]).__aenter__())
-    if stalled:  # never read from, never acknowledged
+    if stalled:  # a viewer that never reads and never acknowledges
         viewers.append(await protocol_client.Viewer(server, sessions[0]).__aenter__())
     everyone = [Client(viewer, sessions[0]["revision"] if shared else None) for viewer in viewers[:clients]]
     for one in everyone[1:] if shared else []:
@@ -146,7 +146,7 @@ def cases(counts):
 
 def main(out, counts):
     paths = [os.path.join(DATA, file) for file in SCENES["tcga"]]
-    results, load = [], os.getloadavg()[1]  # what else the machine has to do
+    results, load = [], os.getloadavg()[1]  # other load on the machine
     with serving.Server(paths=paths) as server:
         for case, rate in cases(counts):
             rows = asyncio.run(measure(server, case["edit"], rate, case["clients"], case["shared"], case["stalled"]))
@@ -157,7 +157,7 @@ def main(out, counts):
 
 
 def report(path):
-    from sections import table  # which wants matplotlib, and measuring does not
+    from sections import table  # needs matplotlib, which measuring does not
 
     with open(path, encoding="utf-8") as file:
         measured = json.load(file)

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which layout of the voxels is the fastest to sample? Prints ns per point, all channels, along rays: planar
-// one point at a time, planar eight points at once, channels interleaved with one vector over channels,
-// planar in bricks of 8^3; and of one channel out of many, as a tracker that draws a channel fetches.
-// bench_layout [--json]
+// Measures which layout of the voxels is fastest to sample. Prints ns per point for all channels along rays:
+// planar one point at a time, planar eight points at once, channels interleaved with one vector over
+// channels, planar in bricks of 8^3; and for one channel out of many, which is how a tracker that draws a
+// channel fetches. bench_layout [--json]
 #include <immintrin.h>
 
 #include <algorithm>
@@ -78,7 +78,7 @@ struct Line {
   glm::vec3 origin, step;
 };
 
-/// Points half a voxel apart; neighbouring lines, as of a picture's rows.
+/// Lines of points half a voxel apart; neighbouring lines are like the rays of a picture's rows.
 std::vector<Line> linesAlong(glm::vec3 direction) {
   std::vector<Line> lines;
   std::mt19937 random(3);
@@ -111,7 +111,7 @@ double nsPerPoint(const std::vector<Line>& lines, const std::function<float(cons
   return times[times.size() / 2] / (double(lines.size()) * kSteps);
 }
 
-bool furtherRow = false;  // of the JSON
+bool furtherRow = false;  // whether a row of the JSON has been printed
 
 template <class T>
 void measure(const char* type, ScalarType scalar, int channels, bool json) {

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""How much faster or slower one build is than another: paired.py OLD NEW [--scenes a,b] [--lights emission-absorption,both]
+"""Compares the speed of two builds: paired.py OLD NEW [--scenes a,b] [--lights emission-absorption,both]
 
-The two programs take turns at `scolopax bench --times-only`. Of every scene, light and method it prints the median of
-the ratios new / old of neighbouring runs, and their smallest and largest. Reads SCOLOPAX_DATA_DIR."""
+The two programs take turns at `scolopax bench --times-only`. For every scene, light and method it prints the median,
+smallest and largest of the ratios new / old of paired runs. Reads SCOLOPAX_DATA_DIR."""
 import argparse
 import json
 import os
@@ -16,7 +16,7 @@ from common import LIGHTS, SCENES, Bench, assignments, light_settings, scratch  
 
 
 def seconds(program, scene, files, out, settings, options):
-    """{(method, step): median seconds of a sample}."""
+    """{(method, step): median seconds per sample}."""
     words = [program, "bench", scene, "--data", *files, "--json", out, "--times-only", "--samples", str(options.samples),
              "--steps", options.steps, "--repetitions", "3", "--threads", "1"]
     if options.methods:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What macrocells and majorants cost, in one run: memory beside the paper's Table 1, and the time of an edit
-// beside the paper's scan. bench_rebuild [--json] [EDGE, 256 voxels without it]
+// Measures the cost of macrocells and majorants: memory compared with the paper's Table 1, and the time of an
+// edit compared with the paper's scan. bench_rebuild [--json] [EDGE, 256 voxels by default]
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -19,7 +19,7 @@
 namespace scolopax {
 namespace {
 
-/// Median of some runs, ms.
+/// Median of several runs, ms.
 template <class F>
 double milliseconds(F&& run) {
   std::vector<double> times;
@@ -33,7 +33,7 @@ double milliseconds(F&& run) {
   return times[4];
 }
 
-/// One hydrogen state as voxels of type T, the largest 1 (float) or the largest T.
+/// One hydrogen state as voxels of type T; the largest value is 1 (float) or the largest T.
 template <class T>
 std::shared_ptr<const Volume> orbital(int edge) {
   GeneratedVolume made = generateOrbitals(edge, 1);
@@ -48,8 +48,9 @@ std::shared_ptr<const Volume> orbital(int edge) {
   return std::make_shared<const Volume>(made.grid, std::move(sources));
 }
 
-/// The paper's macrocells and majorants (section 4.3): two floats and one a cell; for each cell the largest
-/// entry of the transfer function, a table of 256, between those of its least and largest value.
+/// The paper's macrocells and majorants (section 4.3): two floats and one float per cell. The majorant of a
+/// cell is the largest entry of the transfer function, a table of 256, from the entry of the cell's least
+/// value to that of its largest.
 struct Paper {
   static constexpr int kEntries = 256;
   std::vector<ValueInterval> intervals;
@@ -100,7 +101,7 @@ void measure(const char* type, int edge, bool json, bool* first) {
     for (std::size_t i = 0; i < table.size(); ++i) table[i] = float(i) / 255;
     const double scanMs = milliseconds([&] { paper.scan(table); });
 
-    // Both with the transfer function made anew, as an edit does.
+    // Each edit also rebuilds the transfer function, as in the program.
     const auto boundsOf = [&](const ChannelAppearance& a) {
       return std::vector<kernel::BoundTable>{buildBounds(cells->levels[0], TransferFunction(channel, a), 0)};
     };
@@ -110,17 +111,17 @@ void measure(const char* type, int edge, bool json, bool* first) {
       majorants = MajorantGrid(cells, boundsOf(a), sums, false, &majorants);
       return majorants.cellsRebuilt();
     };
-    const double fullMs = milliseconds([&] {  // every cell: sums and maxima in turn
+    const double fullMs = milliseconds([&] {  // every cell: alternates between sums and maxima
       edit(ramp(largest, 0.32), flip);
       flip = !flip;
     });
     edit(ramp(largest, 0.32), true);
     std::size_t narrowCells = 0, wideCells = 0;
-    const double narrowMs = milliseconds([&] {  // a knot in the middle moves: values from 30 % to 34 % change
+    const double narrowMs = milliseconds([&] {  // moves a knot in the middle: values from 30 % to 34 % change
       narrowCells = edit(ramp(largest, flip ? 0.9 : 0.5), true);
       flip = !flip;
     });
-    const double wideMs = milliseconds([&] {  // the whole ramp moves
+    const double wideMs = milliseconds([&] {  // changes the whole ramp
       ChannelAppearance a = ramp(largest, 0.32);
       a.density = flip ? 1 : 2;
       wideCells = edit(a, true);

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the report's tables and plots of what run.py has measured, with the sentences of remarks.md. Needs Debian's
+"""Makes the report's tables and plots from run.py's measurements, with the remarks of remarks.md. Needs Debian's
 python3-matplotlib."""
 import argparse
 import json
@@ -13,7 +13,7 @@ from sections import REPORT
 
 
 def remarks():
-    """What a person wrote about each experiment."""
+    """The hand-written remarks on each experiment, by its name."""
     with open(os.path.join(HERE, "remarks.md"), encoding="utf-8") as file:
         parts = re.split(r"^## (\w+)\n", file.read(), flags=re.MULTILINE)
     return {name: text.strip() for name, text in zip(parts[1::2], parts[2::2])}

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Measures everything that the report tells, into one JSON file that report.py reads; the list is in experiments.py."""
+"""Measures everything in the report, into one JSON file for report.py; experiments.py lists the experiments."""
 import argparse
 import json
 import os

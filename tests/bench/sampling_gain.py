@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""By how much low-discrepancy sampling lowers the squared error: sampling_gain.py DATA... prints a table.
+"""Measures how much low-discrepancy sampling reduces the squared error: sampling_gain.py DATA... prints a table.
 
-The error of N samples is that against 8192 low-discrepancy samples of another seed, mean over several seeds. The
-truth's own error adds at most 256 / 8192 of what is measured, the same to both columns."""
+The error of N samples is that against 8192 low-discrepancy samples with another seed, mean over several seeds. The
+error of those 8192 adds at most 256 / 8192 of the measured error, the same to both columns."""
 import json
 import os
 import subprocess

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report's sections: from what an experiment found to Markdown tables and plots. One function each, and one list of
-them; every function gets the experiment's entry of run.py's file and a function that keeps a plot and gives its link."""
+"""The report's sections: Markdown tables and plots of an experiment's results. One function each, and one list of them.
+Every function gets the experiment's entry of run.py's file, and a function that saves a plot and returns its link."""
 from plots import lines
 
 TARGETS = ("0.01", "0.001")

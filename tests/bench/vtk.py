@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Scolopax beside VTK's CPU ray caster, taking turns: vtk.py OUT.json [--only NAME,...] [--size PIXELS,...]
+"""Compares Scolopax with VTK's CPU ray caster, in turns: vtk.py OUT.json [--only NAME,...] [--size PIXELS,...]
 
 One channel: speed against error, both against the double-precision reference. Four channels: time per frame at
-equal step. Volumes that are not there are left out with a message. Reads SCOLOPAX (the program), SCOLOPAX_DATA_DIR."""
+equal step. Missing volumes are skipped with a message. Reads SCOLOPAX (the program), SCOLOPAX_DATA_DIR."""
 import argparse
 import json
 import os
@@ -20,26 +20,26 @@ from vtk_mapper import VERSION, VtkMapper, read_nifti
 SINGLE = {name: [f"scalar/{name}.nii.gz"] for name in ("heptane", "bonsai", "engine")}
 MULTIPLE = {"tcga": SCENES["tcga"]}
 STEPS = [8, 4, 2, 1, 0.5]  # in voxels
-FRAME_STEPS = STEPS[1:]  # of four channels
-BETWEEN = [6, 3, 1.5, 0.75, 0.25, 0.125]  # of Scolopax alone, to see the fastest that is good enough and how it goes on
-ROUNDS = 5  # of VTK before Scolopax's, and as many after
+FRAME_STEPS = STEPS[1:]  # with four channels
+BETWEEN = [6, 3, 1.5, 0.75, 0.25, 0.125]  # Scolopax's further steps: the fastest sufficient one, convergence
+ROUNDS = 5  # VTK's rounds before Scolopax's, and as many after
 COLORS = ["#ff4030", "#40c060", "#4080ff", "#ffd040"]
 
 
 def padded(voxels):
-    """A layer of nothing around: VTK's box ends at the outer voxels' centres, Scolopax's half a voxel beyond, and so
-    there is the same in both."""
+    """Adds an empty layer: VTK's box ends at the outer voxels' centres, Scolopax's half a voxel beyond; with an empty
+    border both show the same."""
     return numpy.pad(voxels, 1, constant_values=0)
 
 
 def wider(voxels):
-    """8 bits as 16: the mapper interpolates in the type of the voxels."""
+    """8-bit voxels as 16 bits: the mapper interpolates in the type of the voxels."""
     return voxels.astype(numpy.uint16) * 257
 
 
 def scene_of(channels, size):
-    """Curves from 15 % of the range up to an extinction of 0.05 per voxel, colours that change with the value; what is
-    not empty fills the picture."""
+    """A scene: opacity ramps from 15 % of the range up to an extinction of 0.05 per voxel, colours that change with the
+    value, and a camera such that everything visible fills the picture."""
     seen = numpy.argwhere(numpy.any([channel > 0.15 * channel.max() for channel in channels], axis=0))[:, ::-1]
     low, high = seen.min(axis=0), seen.max(axis=0)
     middle = (low + high) / 2
@@ -64,8 +64,8 @@ def write_nrrd(path, voxels):
 
 
 def write_tiff(path, picture):
-    """Premultiplied RGBA as 32-bit floats: a header, the pixels in one strip, four times the words 32 and 3 (bits; floats),
-    and the directory."""
+    """Writes premultiplied RGBA as 32-bit floats: a header, the pixels in one strip, four words 32 (bits per sample),
+    four words 3 (float samples), and the directory."""
     pixels = numpy.ascontiguousarray(picture).astype("<f4").tobytes()
     words = 8 + len(pixels)
     entries = [(256, 4, 1, picture.shape[1]), (257, 4, 1, picture.shape[0]), (258, 3, 4, words), (259, 3, 1, 1),
@@ -78,7 +78,7 @@ def write_tiff(path, picture):
 
 
 class Workplace:
-    """A volume and its scene as files for the program."""
+    """A folder with a volume and its scene as files for the program."""
 
     def __init__(self, folder, channels):
         self.folder = folder
@@ -105,7 +105,7 @@ class Workplace:
         return {name: json.loads(out)[name] for name in ("rmse", "psnr")}
 
     def bench(self, scene, steps, *options):
-        """Of the marcher: no tracker comes near the errors of VTK in its time."""
+        """Points of the marcher: no tracker comes near VTK's errors in VTK's time."""
         self.run("bench", scene, "--methods", "raymarch", "--steps", ",".join(map(str, steps)), "--samples", "1",
                  "--repetitions", str(2 * ROUNDS), "--json", self.path("bench.json"), *options)
         with open(self.path("bench.json"), encoding="utf-8") as file:
@@ -113,14 +113,15 @@ class Workplace:
 
 
 def take_turns(mappers, steps, bench):
-    """Seconds of every VTK mapper and step, by half: as many rounds before Scolopax's as after; and Scolopax's."""
+    """Seconds of every VTK mapper and step, in two halves (rounds before and after Scolopax's turn), and Scolopax's
+    points."""
     seconds = {(name, step): ([], []) for name in mappers for step in steps}
 
     def rounds(half):
         for count in range(ROUNDS + 1):
             for (name, step), halves in seconds.items():
                 time = mappers[name].draw(step)
-                if count > 0:  # the first warms up
+                if count > 0:  # the first round warms up
                     halves[half].append(time)
 
     rounds(0)
@@ -130,14 +131,14 @@ def take_turns(mappers, steps, bench):
 
 
 def row(voxels, step, halves, error):
-    """`drift` is how far apart the medians before and after Scolopax's turn are, as a ratio."""
+    """A row of VTK's results. `drift` is the ratio of the medians after and before Scolopax's turn."""
     before, after = map(statistics.median, halves)
     return {"voxels": voxels, "step": step, "seconds": statistics.median(halves[0] + halves[1]),
             "drift": after / before, **error}
 
 
 def single(channels, scene, folder):
-    """VTK also gets the volume as 16 bits: its interpolation rounds to the voxels' type."""
+    """Results for one channel. VTK also gets the volume as 16 bits: its interpolation rounds to the voxels' type."""
     place = Workplace(folder, channels)
     mappers = {"u8": VtkMapper(channels, scene)}
     wide = json.loads(json.dumps(scene))

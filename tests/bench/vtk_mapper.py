@@ -4,7 +4,7 @@ import ctypes
 import time
 
 import numpy
-import vtkmodules.vtkRenderingVolumeOpenGL2  # the mapper's constructor ends the process without it
+import vtkmodules.vtkRenderingVolumeOpenGL2  # without it, the mapper's constructor ends the process
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkVersion
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
@@ -33,8 +33,8 @@ def linear(color):
 
 
 def opacity_of(channel):
-    """Opacity of a unit length. The mapper looks opacity up, linear between entries, which 1 - exp(-extinction) is
-    not: an entry for every value that it tells apart (at most 2^15)."""
+    """Opacity per unit length. The mapper interpolates linearly in a table, but 1 - exp(-extinction) is not linear, so
+    the table has an entry for every value that the mapper distinguishes (at most 2^15)."""
     lo, hi = channel["range"]
     positions = numpy.linspace(0, 1, min(int(hi - lo), 32768) + 1)
     extinctions = channel["density"] * numpy.interp(positions, *zip(*channel["opacity"]))
@@ -69,7 +69,7 @@ def property_of(scene):
 
 
 def image_of(channels):
-    """Voxel (0, 0, 0) at the origin, spacing 1; the channels of a voxel side by side."""
+    """A VTK image with voxel (0, 0, 0) at the origin, spacing 1, and interleaved channels."""
     image = vtkImageData()
     image.SetDimensions(*channels[0].shape[::-1])
     voxels = numpy.stack([channel.ravel() for channel in channels], axis=-1)
@@ -78,7 +78,7 @@ def image_of(channels):
 
 
 class VtkMapper:
-    """Draws `channels` (arrays [z, y, x] of one type) as `scene` says."""
+    """Renders `channels` (arrays [z, y, x] of one type) according to `scene`."""
 
     def __init__(self, channels, scene):
         camera = vtkCamera()
@@ -96,7 +96,7 @@ class VtkMapper:
         self.renderer.SetActiveCamera(camera)
         self.renderer.AddLight(light)
         self.window.AddRenderer(self.renderer)
-        self.mapper = vtkFixedPointVolumeRayCastMapper()  # takes all cores
+        self.mapper = vtkFixedPointVolumeRayCastMapper()  # uses all cores
         self.mapper.SetInputData(image_of(channels))
         self.mapper.SetImageSampleDistance(1)
         self.mapper.AutoAdjustSampleDistancesOff()
@@ -105,8 +105,8 @@ class VtkMapper:
         self.volume.SetProperty(property_of(scene))
 
     def draw(self, step):
-        """Seconds of the ray casting: what the mapper's Render() does before it gives the picture to OpenGL, which
-        would need a display. The first call also prepares the data: gradients, and blocks to skip."""
+        """Seconds of the ray casting: the part of the mapper's Render() before the picture goes to OpenGL, which would
+        need a display. The first call also prepares the data: gradients, and blocks to skip."""
         self.mapper.SetSampleDistance(step)
         begin = time.perf_counter()
         self.mapper.PerImageInitialization(self.renderer, self.volume, 0, [0] * 3, [0] * 3, [0] * 6)
@@ -121,7 +121,7 @@ class VtkMapper:
         width, height = drawn.GetImageViewportSize()
         (stored_width, stored_height), (used_width, used_height) = drawn.GetImageMemorySize(), drawn.GetImageInUseSize()
         x, y = drawn.GetImageOrigin()
-        # Python gets a C pointer as "_<16 hex digits>_p_void".
+        # VTK passes a C pointer to Python as the string "_<16 hex digits>_p_void".
         address = int(drawn.GetImage()[1:17], 16)
         words = numpy.ctypeslib.as_array((ctypes.c_uint16 * (stored_width * stored_height * 4)).from_address(address))
         used = words.reshape(stored_height, stored_width, 4)[:used_height, :used_width]

@@ -1,21 +1,21 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of what vtk.py has measured, as Markdown: vtk_report.py IN.json > OUT.md"""
+"""Tables of vtk.py's measurements, as Markdown: vtk_report.py IN.json > OUT.md"""
 import json
 import sys
 
 from sections import table
 
-BAR = 5  # times less than VTK's: what is aimed at
+BAR = 5  # the goal: this many times faster than VTK
 
 
 def reaching(points, rmse):
-    """Scolopax's fastest point with no more error."""
+    """Scolopax's fastest point with at most this error."""
     return min((p for p in points if p["rmse"] <= rmse), key=lambda p: p["seconds"], default=None)
 
 
 def within(points, seconds):
-    """Scolopax's best point that takes no longer."""
+    """Scolopax's most accurate point that takes no longer than this."""
     return min((p for p in points if p["seconds"] <= seconds), key=lambda p: p["rmse"], default=None)
 
 
@@ -28,7 +28,7 @@ def milliseconds(seconds):
 
 
 def times_less(ratio):
-    """With a mark where it is below the bar."""
+    """The ratio, in bold if it is below BAR."""
     return f"{ratio:.3g}" if ratio >= BAR else f"**{ratio:.3g}**"
 
 
@@ -52,7 +52,7 @@ def frame_rows(light):
 
 
 def summary(rows, ratio, what):
-    """One sentence of numbers; what they mean is for people to say."""
+    """One sentence with the numbers; their interpretation is written by hand."""
     ratios = [float(row[ratio].strip("*")) for row in rows if row[ratio] != "-"]
     missed = len(rows) - sum(value >= BAR for value in ratios)
     return (f"Of {len(rows)} {what}, {len(rows) - missed} are at least {BAR} times faster here; "
@@ -60,7 +60,7 @@ def summary(rows, ratio, what):
 
 
 def floor(measured):
-    """Least errors of both."""
+    """A sentence with the least errors of both."""
     singles = [found for found in measured if "lights" not in found]
     vtk = [min(point["rmse"] for point in found["vtk"]) for found in singles]
     ours = [min(point["rmse"] for point in found["scolopax"]) for found in singles]

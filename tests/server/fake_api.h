@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The handlers of the HTTP interface without a network: what a server would call.
+// The handlers of the HTTP interface without a network, called as a server would.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ struct Api {
   StreamHub streams{workshop.store, workshop.background, metrics, {}};
   std::atomic<bool> stopping{false};
   std::stop_source gone, cutting;
-  int tookLong = 0;  ///< calls of quick routes that had to be made where they may wait
+  int tookLong = 0;  ///< calls of quick routes that had to be repeated where they may wait
   ApiContext context{config,
                      *datasets,
                      resolver,
@@ -46,7 +46,7 @@ struct Api {
       for (Route& route : family(context)) routes.push_back(std::move(route));
   }
 
-  /// Throws what the handler throws. `target` may have a query.
+  /// Calls the route's handler, and throws what it throws. `target` may have a query.
   net::Response call(const std::string& method, const std::string& target, const std::string& body = "",
                      net::Headers headers = {{"Content-Type", "application/json"}}) {
     net::Request request;

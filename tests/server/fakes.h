@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A clock, a renderer and a viewer that tests hold in their hands: nothing here waits or measures time.
+// A clock, a renderer and a viewer that tests control: nothing here waits or measures time.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -16,7 +16,7 @@
 
 namespace scolopax::server::testing {
 
-/// Stands still until it is moved.
+/// A clock that stands still until it is advanced.
 class FakeClock {
  public:
   void advance(std::chrono::microseconds by) { microseconds_ += by.count(); }
@@ -29,28 +29,29 @@ class FakeClock {
   std::atomic<long long> microseconds_{0};
 };
 
-/// What a test does to, and learns from, every fake renderer it hands out.
+/// Controls and records all fake renderers of a test.
 struct FakeControl {
   FakeClock* clock = nullptr;
-  double secondsPerPixel = 0;        ///< the clock moves so far in a pass
+  double secondsPerPixel = 0;        ///< how far a pass advances the clock
   std::function<void()> duringPass;  ///< called in the middle of each pass
   std::function<double(std::uint32_t samples)> error = [](std::uint32_t) { return 1.0; };
-  std::string failure;                     ///< setScene throws it
+  std::string failure;                     ///< if set, setScene throws an Error with this message
   int incompletePasses = 0;                ///< calls that use up their budget before the pass is complete
-  std::vector<std::uint32_t> passes;       ///< the seed of the scene of each pass that was not cancelled
-  std::vector<std::pair<int, int>> sizes;  ///< of each such pass
+  std::vector<std::uint32_t> passes;       ///< the scene's seed in each pass that was not cancelled
+  std::vector<std::pair<int, int>> sizes;  ///< width and height in each such pass
   int renderersMade = 0;
-  bool takesLong = false;                         ///< of every scene, not only of a renderer's first
+  bool takesLong = false;                         ///< what takesLong() returns, for every scene
   std::function<void(std::stop_token)> building;  ///< called in setScene
-  std::shared_ptr<MemoryBudget> memory;           ///< of which films take a byte a pixel
-  std::uint32_t longErrorFrom = ~0u;  ///< samples from which the error takes long, until it is measured
-  std::function<void(std::stop_token)> measuring;  ///< called while it is
+  std::shared_ptr<MemoryBudget> memory;           ///< from which films take a byte per pixel
+  std::uint32_t longErrorFrom =
+      ~0u;  ///< from this many samples on the error takes long, until it is measured
+  std::function<void(std::stop_token)> measuring;  ///< called during that measurement
   int incompletePicks = 0;           ///< calls that use up their budget before a pick is complete
-  std::vector<std::uint32_t> picks;  ///< the seed of the scene of each that was begun
-  std::vector<Picked> found;         ///< what each finds
+  std::vector<std::uint32_t> picks;  ///< the scene's seed in each pick that was begun
+  std::vector<Picked> found;         ///< the result of each pick
 };
 
-/// Begins no job before it is told to, or each at once.
+/// Runs each job at once or, with atOnce false, only when finish() is called.
 class FakeBackground : public Background {
  public:
   bool atOnce = true;
@@ -68,7 +69,7 @@ class FakeBackground : public Background {
       waiting.push_back(run);
     return job;
   }
-  /// Ends those that wait.
+  /// Runs the waiting jobs to their end.
   void finish() {
     for (const auto& run : std::exchange(waiting, {})) run();
   }
@@ -89,7 +90,8 @@ class FakePicking : public Picking {
   const std::shared_ptr<FakeControl> control_;
 };
 
-/// Its picture tells which scenes its samples were of: red is the seed when it was one scene, else -1.
+/// A renderer whose picture shows which scenes its samples belong to: red is the seed if they all belong to
+/// one scene, otherwise -1; green is the number of samples.
 class FakeRenderer : public Renderer {
  public:
   explicit FakeRenderer(std::shared_ptr<FakeControl> control) : control_(std::move(control)) {}
@@ -117,7 +119,7 @@ class FakeRenderer : public Renderer {
     if (control_->clock)
       control_->clock->advance(
           std::chrono::microseconds((long long)(pixels * control_->secondsPerPixel * 1e6)));
-    // A copy: it may replace itself.
+    // A copy, because the function may replace itself.
     if (const auto during = control_->duringPass) during();
     if (cancel) return false;
     seen_ = samples_ == 0 || seen_ == double(scene_.seed) ? double(scene_.seed) : -1;
@@ -161,7 +163,7 @@ class FakeRenderer : public Renderer {
   double seen_ = 0;
 };
 
-/// Two channels of 4 x 3 x 2 voxels: 0..23 and the same times ten.
+/// Two channels of 4 x 3 x 2 voxels: 0..23, and ten times these values.
 inline std::shared_ptr<const Volume> smallVolume() {
   Grid grid;
   grid.dims = {4, 3, 2};
@@ -186,7 +188,7 @@ struct FakeViewer : ViewerSink {
   struct Offer {
     FrameInfo info;
     int width = 0, height = 0;
-    float red = 0;  ///< the seed of the scene of all samples, -1 when they are mixed
+    float red = 0;  ///< the scene's seed; -1 if samples of several scenes are mixed
     std::uint32_t patch = 0;
   };
   std::vector<Offer> frames;
@@ -204,7 +206,7 @@ struct FakeViewer : ViewerSink {
   void sessionClosed(const std::string& reason) override { closed = reason; }
 };
 
-/// Both loops and a store, driven step by step by the test.
+/// Both loops and a store, which the test drives step by step.
 struct Workshop {
   FakeClock clock;
   std::shared_ptr<FakeControl> control = std::make_shared<FakeControl>();
@@ -215,7 +217,7 @@ struct Workshop {
       std::make_shared<const SceneResolver>(smallStore(), SceneResolver::Options{4096, 16'777'216});
   SessionStore store;
   FakeBackground background;
-  PassResult last;  ///< of the render loop's last turn
+  PassResult last;  ///< the result of the render loop's last turn
   RenderLoop render;
   EncodeLoop encode;
 
@@ -248,7 +250,7 @@ struct Workshop {
 };
 
 inline nlohmann::json seedPatch(std::uint32_t seed) { return {{"integrator", {{"seed", seed}}}}; }
-/// Of the first channel; its range is to be measured.
+/// Switches on gradient opacity in the first channel, with a range that must be measured.
 inline nlohmann::json gradientPatch() {
   return {{"channels", {{"0", {{"gradientOpacity", nlohmann::json::object()}}}}}};
 }

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A client written from protocol/PROTOCOL.md alone, and a TCP proxy that makes its line slow. It checks of every frame
-what the document promises of all of them."""
+"""A client written from protocol/PROTOCOL.md alone, and a TCP proxy that makes its connection slow. The client checks
+every frame for what the document promises of all frames."""
 import asyncio
 import http.client
 import json
@@ -11,7 +11,7 @@ import zlib
 
 import websockets
 
-PATIENCE = 30  # seconds for one answer; only a server that hangs takes as long
+PATIENCE = 30  # seconds for one answer; only a server that hangs takes that long
 INTERACTIVE, FINAL = 1, 2
 
 # "Frame header": offset, type.
@@ -31,7 +31,7 @@ class Frame:
         self.image = message[self.headerBytes:]
 
     def problems(self, before):
-        """What is not as promised, given the stream's frame before (or None)."""
+        """Names of the promises that are broken, given the stream's previous frame (or None)."""
         size = jpeg_size(self.image) if self.codec == 1 else png_size(self.image)
         found = {
             "magic": self.magic == b"SCLX", "version": self.version == 1, "headerBytes": self.headerBytes >= 48,
@@ -48,7 +48,7 @@ class Frame:
 
 
 def jpeg_size(image):
-    """(width, height) from the frame segment (SOF0 to SOF2) of a whole JPEG."""
+    """(width, height) from the frame segment (SOF0 to SOF2) of a complete JPEG."""
     if image[:2] != b"\xff\xd8" or image[-2:] != b"\xff\xd9":
         return None
     at = 2
@@ -86,7 +86,7 @@ def png_colors(image):
 
 
 def apply_patch(scene, patch):
-    """"Patches" for a resolved scene, whose lists are complete; null leaves a member out."""
+    """Section "Patches", for a resolved scene, whose lists are complete; null removes a member."""
     if isinstance(scene, list) and isinstance(patch, dict):
         result = list(scene)
         for index, value in patch.items():
@@ -107,7 +107,7 @@ def apply_patch(scene, patch):
 
 
 def call(server, method, path, body=None, **headers):
-    """(status, headers, body) of a fresh connection; a header `content_type=None` leaves that one out."""
+    """(status, headers, body) of a call on a new connection; a header of None, as `content_type=None`, is omitted."""
     send = {"Authorization": f"Bearer {server.token}", "Content-Type": "application/json"}
     send.update((name.replace("_", "-").title(), value) for name, value in headers.items())
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=PATIENCE)
@@ -126,14 +126,14 @@ def call_json(server, method, path, body=None, **headers):
 
 
 def connect(server, stream, port=None, query="", **options):
-    """The WebSocket at the address `stream` that a session told, by default with the token in the head."""
+    """The WebSocket at a session's address `stream`, by default with the token in the head."""
     options.setdefault("extra_headers", {"Authorization": f"Bearer {server.token}"})
     return websockets.connect(f"ws://127.0.0.1:{port or server.port}/{stream}{query}", max_size=None,
                               ping_interval=None, open_timeout=PATIENCE, **options)
 
 
 class Viewer:
-    """`async with Viewer(server, session) as viewer:` has read `hello`."""
+    """A viewer of a session; `async with Viewer(server, session) as viewer:` has read `hello`."""
 
     def __init__(self, server, session, port=None):
         self.opening = connect(server, session["stream"], port)
@@ -156,7 +156,7 @@ class Viewer:
         return self.patches
 
     async def receive(self, ack=True):
-        """The next message; a frame is checked, and acknowledged."""
+        """The next message; a frame is checked and, with `ack`, acknowledged."""
         message = await self.socket.recv()
         if isinstance(message, str):
             return json.loads(message)
@@ -170,7 +170,7 @@ class Viewer:
         return frame
 
     async def until(self, wanted, ack=True):
-        """All messages up to the first that is wanted: a type, or a function of the message."""
+        """All messages up to the first one that is `wanted`, which is a type or a predicate."""
         messages = []
         async with asyncio.timeout(PATIENCE):
             while True:
@@ -189,7 +189,7 @@ class Viewer:
         return (await self.until(lambda m: isinstance(m, Frame) and wanted(m)))[-1]
 
     async def sent_before_pong(self, ack=False):
-        """The messages that come before the answer to a ping: all that was on its way when the server read it."""
+        """The messages before the answer to a ping: all that were on their way when the server read the ping."""
         self.pings += 1
         await self.send("ping", id=self.pings)
         *before, pong = await self.until("pong", ack)
@@ -199,9 +199,9 @@ class Viewer:
 
 
 class Proxy:
-    """`async with Proxy(port) as proxy:` is a line to the server of which the way back passes only as many bytes as
-    were allowed (`allow`, `rate` in bytes a second; None for all). What cannot pass is either left where it is,
-    in small buffers, or, if `deep`, taken in without bound, as some proxies and tunnels do."""
+    """`async with Proxy(port) as proxy:` is a connection to the server. Only as many bytes as are allowed pass back:
+    by `allow`, and by `rate` (bytes a second) if that is given. What cannot pass stays in small buffers or, if `deep`,
+    is buffered without bound, as some proxies and tunnels do."""
 
     def __init__(self, target, rate=None, deep=False):
         self.target, self.rate, self.deep = target, rate, deep
@@ -231,7 +231,7 @@ class Proxy:
     async def feed(self):
         while True:
             await asyncio.sleep(0.01)
-            if self.budget < self.rate / 10:  # what was not used is not saved up
+            if self.budget < self.rate / 10:  # an unused allowance does not accumulate
                 await self.allow(self.rate // 100)
 
     async def serve(self, reader, writer):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts the program for the tests beside this file and speaks HTTP with it."""
+"""Starts the program for the tests in this folder, and speaks HTTP with it."""
 import json
 import os
 import re
@@ -15,7 +15,7 @@ PROGRAM = os.environ["SCOLOPAX"]
 
 
 def write_volume(folder, name="blob", size=16, channels=("a", "b")):
-    """One u8 raw file per channel: a ball, and a box of half its density."""
+    """Writes one u8 raw file per channel: a ball, and a box of half its value."""
     paths = []
     for c, channel in enumerate(channels):
         voxels = bytearray(size**3)
@@ -49,8 +49,8 @@ class CommandTest(unittest.TestCase):
 
 
 class Server:
-    """`with Server("--max-sessions", "2") as server:` on a free loopback port, ended by SIGTERM. `tls`: the context for
-    a server that is given a certificate."""
+    """`with Server("--max-sessions", "2") as server:` runs on a free loopback port and is ended by SIGTERM. `tls`: the
+    client's context for a server with a certificate."""
 
     def __init__(self, *options, environment=None, paths=None, port=True, tls=None):
         self.tls = tls
@@ -86,7 +86,7 @@ class Server:
         return status
 
     def call(self, method, path, body=None, headers=None, token=True):
-        """(status, headers, body); a dict or list as body is sent as JSON."""
+        """(status, headers, body) of a call; a dict or list as body is sent as JSON."""
         headers = dict(headers or {})
         if token:
             headers.setdefault("Authorization", f"Bearer {self.token}")

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Is the expected value of replicates the reference's, and is that of two methods the same? Per pixel and
-// component, per component over the picture, and over the picture's structure.
+// Tests whether the expected value of replicates is the reference's, and whether two methods have the same
+// expected value: per pixel and component, per component over the picture, and over the picture's structure.
 //
-// Chances of a wrong alarm, each for one comparison (one method in one scene, or one pair of methods):
-//  - pixels: 1e-8 over all pixels and components together, by Bernstein's inequality. It bounds the variance
-//    of a sample by m (M - m), which holds for anything with mean m in [0, M], and takes points of low
-//    discrepancy to spread no wider than independent ones;
-//  - components: Student's t of 31 degrees of freedom beyond 8: 5e-9 each, 2e-8. Pixels of a replicate may
-//    depend on each other in any way;
-//  - structure: mean inner product of the deviations of two different replicates, which is the squared length
-//    of the bias and not of the noise. In units of its estimated spread it is at worst a sum of squares of as
-//    many normal numbers as the picture has independent components, k: beyond 8 with k = 144, 1e-10, with 12,
-//    1e-6.
-// Together below 2e-6, and over all 960 comparisons of `make check` below 0.2 %. Seeds are fixed: what passes
-// once passes always.
+// False-alarm probabilities, each for one comparison (one method in one scene, or one pair of methods):
+//  - pixels: 1e-8 over all pixels and components together, by Bernstein's inequality. The variance of a
+//    sample is bounded by m (M - m), which holds for any distribution on [0, M] with mean m.
+//    Low-discrepancy points are assumed to have no larger variance than independent ones;
+//  - components: Student's t with 31 degrees of freedom beyond 8: 5e-9 each, 2e-8 together. Pixels of a
+//    replicate may depend on each other in any way;
+//  - structure: the mean inner product of the deviations of two different replicates; its expected value is
+//    the squared length of the bias, without the noise. In units of its estimated standard deviation it is at
+//    worst a sum of squares of k normal numbers, where k is the number of independent components of the
+//    picture: beyond 8, 1e-10 for k = 144 and 1e-6 for k = 12.
+// Together below 2e-6, and over all 960 comparisons of `make check` below 0.2 %. Seeds are fixed: a test that
+// passes once passes always.
 #pragma once
 #include <array>
 #include <string>
@@ -22,8 +22,8 @@
 
 namespace scolopax::test {
 
-/// The largest value that a sample can have, per component: of one channel's radiance, or the sum of all
-/// channels' where a sample can show several.
+/// The largest value that a sample can have, per component: the largest radiance of one channel or, where a
+/// sample can show several channels, the sum over all.
 inline glm::dvec4 largestSample(const Scene& scene) {
   glm::dvec3 light(0), largest(0), sum(0);
   for (const Light& l : scene.lights) light += l.color * l.intensity;
@@ -45,14 +45,14 @@ inline glm::dvec4 largestSample(const Scene& scene) {
 
 namespace detail {
 
-/// Deviations of replicates from what is expected of them: their expected value is 0 if nothing is wrong.
+/// Deviations of replicates from what they are compared with; their expected value is 0 if both agree.
 struct Deviations {
   std::vector<std::vector<glm::dvec4>> ofReplicate;
   std::vector<glm::dvec4> mean;
-  std::vector<glm::dvec4> spread;  // standard deviation of one sample, at most
+  std::vector<glm::dvec4> spread;  // upper bound of the standard deviation of one sample
 };
 
-/// `slack`: what the expected value itself may be off by.
+/// Tests the components and the structure. `slack`: possible error of the expected value itself.
 inline ::testing::AssertionResult areNoise(const Deviations& d, double slack) {
   const std::size_t pixels = d.mean.size();
   const double n = double(d.ofReplicate.size());
@@ -70,12 +70,12 @@ inline ::testing::AssertionResult areNoise(const Deviations& d, double slack) {
       return ::testing::AssertionFailure() << "component " << c << ": the picture's mean is off by " << mean
                                            << ", " << mean / sigma << " standard errors";
   }
-  // Inner products in units of what a component's noise may be; where there is none, nothing may differ.
+  // Inner products in units of each component's noise bound. Components almost without noise are skipped.
   std::vector<glm::dvec4> weight(pixels, glm::dvec4(0));
   double slackSquared = 0;
   for (std::size_t i = 0; i < pixels; ++i)
     for (int c = 0; c < 4; ++c) {
-      if (!(d.spread[i][c] > 1e-3)) continue;  // left to the other two
+      if (!(d.spread[i][c] > 1e-3)) continue;  // the other two tests cover these
       weight[i][c] = 1 / (d.spread[i][c] * d.spread[i][c]);
       slackSquared += slack * slack * weight[i][c];
     }
@@ -99,8 +99,8 @@ inline ::testing::AssertionResult areNoise(const Deviations& d, double slack) {
   return ::testing::AssertionSuccess();
 }
 
-/// By how much the mean of n samples in [0, M] of expected value m may be off, at a chance of 2
-/// exp(-logTerm).
+/// Bernstein's bound on the error of the mean of n samples in [0, `largest`] with expected value m. It is
+/// exceeded with a probability of at most 2 exp(-logTerm).
 inline double bernstein(double m, double largest, double n, double logTerm) {
   const double variance = std::max(0.0, m * (largest - m));
   const double a = logTerm * largest / 3;
@@ -116,7 +116,7 @@ inline ::testing::AssertionResult haveMean(const Replicates& found, const Scene&
   const double replicates = double(found.pictures.size()), n = replicates * found.samples;
   const double logTerm = std::log(2.0 * 4.0 * double(pixels) / 1e-8);
   const glm::dvec4 largest = largestSample(scene);
-  // The reference's bound of its own error; that of pixels and weights in float.
+  // The reference's bound on its own error, and the rounding of pixels and weights in float.
   const double slack = expected.maximumRayError + 2e-6;
   detail::Deviations d;
   d.mean.assign(pixels, glm::dvec4(0));
@@ -142,8 +142,8 @@ inline ::testing::AssertionResult haveMean(const Replicates& found, const Scene&
 }
 
 /// Whether two methods have the same expected value. Replicates of one seed share random numbers, so
-/// differences are taken per seed; however the two depend on each other, a difference spreads at most twice
-/// as wide as one of them.
+/// differences are taken per seed. However the two depend on each other, the standard deviation of a
+/// difference is at most twice that of one of them.
 inline ::testing::AssertionResult haveSameMean(const Replicates& a, const Replicates& b, const Scene& scene) {
   const std::size_t pixels = a.pictures[0].pixels.size(), replicates = a.pictures.size();
   const double n = double(replicates) * a.samples;

@@ -1,19 +1,19 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Fails when a folder includes one it may not depend on, or a library that only one file may touch."""
+"""Fails if a folder includes a folder on which it must not depend, or a library reserved for other files."""
 import pathlib
 import re
 import sys
 
 ROOT = pathlib.Path(sys.argv[1])
-# Our own top-level folders that each folder may include.
+# The top-level folders that each folder may include.
 MAY_INCLUDE = {
     "renderer": {"renderer"},
     "protocol": {"protocol"},
     "cuda": {"cuda", "renderer"},
     "server": {"server", "renderer", "protocol", "cuda"},
 }
-# Within renderer: the reference shares no code with the kernels; a kernel sees nothing that allocates.
+# Within renderer: the reference shares no code with the kernels; kernels include nothing that allocates.
 FORBIDDEN = [
     ("renderer/reference/", r"renderer/(kernel|cpu)/"),
     ("renderer/kernel/", r"renderer/(?!kernel/|core/)"),

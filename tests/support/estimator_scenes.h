@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scenes on which every method is held against the reference, in any blend mode and light; and which of
-// these combinations `make test` takes.
+// The scenes on which every method is compared with the reference, in any blend mode and light, and the
+// combinations of these that `make test` uses.
 #pragma once
 #include <array>
 #include <filesystem>
@@ -31,7 +31,7 @@ inline constexpr const char* kTestSceneNames[] = {"Figure3", "Orbitals", "Noise"
 struct Setting {
   int scene, blend, light;  ///< indices into the three lists
 };
-/// Covers every pair of scene, blend mode and light with as few settings as can be: a Latin square.
+/// The smallest set of settings that covers every pair of scene, blend mode and light: a Latin square.
 inline std::vector<Setting> pairwiseSettings() {
   std::vector<Setting> settings;
   for (int scene = 0; scene < int(std::size(kTestScenes)); ++scene)
@@ -50,10 +50,10 @@ inline std::vector<Setting> allSettings() {
 
 struct VolumeAndScene {
   std::shared_ptr<const Volume> volume;
-  Scene scene;  ///< unlit, density; with lights and materials for when light is switched on
+  Scene scene;  ///< unlit, density; has lights and materials, which take effect once light is switched on
 };
 
-/// Materials and weights that differ, a sun and a lamp of different colours.
+/// Gives the scene different materials and weights, and a directional and a point light of different colours.
 inline void furnish(const Grid& grid, Scene& scene) {
   for (std::size_t i = 0; i < scene.channels.size(); ++i) {
     ChannelAppearance& a = scene.channels[i];
@@ -67,7 +67,7 @@ inline void furnish(const Grid& grid, Scene& scene) {
       {LightType::point, centre + grid.diagonal() * glm::dvec3(0.5, 0.6, -0.5), {0.3, 0.5, 1}, 0.5}};
 }
 
-/// Framed, red, green, blue and white.
+/// A scene with channels in red, green, blue and white, framed by the camera.
 inline Scene framed(const Volume& volume, int side) {
   Scene scene;
   scene.width = scene.height = side;
@@ -79,7 +79,7 @@ inline Scene framed(const Volume& volume, int side) {
   return scene;
 }
 
-/// `dims` voxels from `lo` on, of the same types, ranges and spacing.
+/// The part of `dims` voxels that starts at voxel `lo`, with the same types, ranges and spacing.
 inline std::shared_ptr<const Volume> cropped(const Volume& volume, glm::ivec3 lo, glm::ivec3 dims) {
   const glm::ivec3 whole = volume.grid().dims;
   Grid grid = volume.grid();
@@ -105,7 +105,8 @@ inline std::shared_ptr<const Volume> cropped(const Volume& volume, glm::ivec3 lo
   return std::make_shared<const Volume>(grid, std::move(sources));
 }
 
-/// A piece of a data set that is not in this tree; none when it is absent.
+/// A piece of a data set outside the repository; none if the data set is absent. `centre`: where the piece
+/// lies, from 0 (at the first voxel) to 1 (at the last) per axis.
 inline std::optional<VolumeAndScene> cutFrom(const std::vector<std::string>& files, glm::dvec3 centre) {
   std::vector<std::filesystem::path> paths;
   for (const std::string& file : files)
@@ -128,13 +129,13 @@ inline std::optional<VolumeAndScene> cutFrom(const std::vector<std::string>& fil
   return VolumeAndScene{volume, scene};
 }
 
-/// None when the scene's data are absent.
+/// A volume and its scene; none if the data set is absent.
 inline std::optional<VolumeAndScene> testScene(TestScene which) {
   std::optional<VolumeAndScene> made;
   if (which == TestScene::figure3) {
     made = {Figure3::volume(), Figure3::scene()};
     made->scene.width = made->scene.height = 12;
-    made->scene.macrocell = 1;  // tight bounds: one that is too low shows
+    made->scene.macrocell = 1;  // tight bounds: a bound that is too low has an effect
     const std::vector<double> weights{1, 1, Figure3::blueWeight};
     furnish(made->volume->grid(), made->scene);
     for (std::size_t i = 0; i < 3; ++i) made->scene.channels[i].weight = weights[i];
@@ -147,7 +148,7 @@ inline std::optional<VolumeAndScene> testScene(TestScene which) {
     made->scene = framed(*made->volume, 12);
     for (std::size_t i = 0; i < 4; ++i) {
       made->scene.channels[i].rangeHi = made->volume->channels()[i].histogram.maximum * 0.3;
-      made->scene.channels[i].density = 0.12 + 0.02 * double(i);  // no two are equal but for rounding
+      made->scene.channels[i].density = 0.12 + 0.02 * double(i);  // no two differ by rounding only
     }
   } else if (which == TestScene::noise) {
     const glm::ivec3 dims(8, 7, 6);
@@ -167,7 +168,7 @@ inline std::optional<VolumeAndScene> testScene(TestScene which) {
     made->scene.channels[1].rangeHi = -100;
     made->scene.channels[2].gamma = 2.2;
   } else if (which == TestScene::lumps) {
-    // Different types on a grid of unequal spacing.
+    // Different types on an anisotropic grid.
     const glm::ivec3 dims(12, 14, 9);
     const auto field = [](double phase) {
       return [phase](int x, int y, int z) {

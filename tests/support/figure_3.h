@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Figure 3 of the paper: three cubes with linear densities, red falling along x, green along -x, blue along
-// -y, and what rays through them see, unlit, in closed form.
+// Figure 3 of the paper: three cubes with linear densities (red decreases along x, green along -x, blue along
+// -y), and the unlit radiance of rays through them in closed form.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -16,7 +16,7 @@ struct Figure3 {
   static constexpr double density = 0.15;  ///< at the dense end
   static constexpr double blueWeight = 0.5;
 
-  /// Colour and alpha of a ray of length-1 `direction`, none of whose components is 0.
+  /// Colour and alpha of a ray. `direction` has length 1 and no component that is 0.
   static glm::dvec4 seen(BlendMode mode, const glm::dvec3& origin, const glm::dvec3& direction) {
     if (mode == BlendMode::composite) {
       glm::dvec4 sum(0, 0, 0, 1);
@@ -69,7 +69,7 @@ struct Figure3 {
     scene.filter = PixelFilter::point;
     return scene;
   }
-  /// Of the parallel rays of scene(): from below, so that blue grows denser.
+  /// Direction of the parallel rays of scene(): from below, so that blue becomes denser along them.
   static glm::dvec3 direction() { return glm::dvec3(-2, 1, 1.5) / std::sqrt(7.25); }
   /// Origin of the ray through the centre of pixel (x, y).
   static glm::dvec3 origin(const Scene& scene, int x, int y) {
@@ -83,7 +83,8 @@ struct Figure3 {
   }
 
  private:
-  /// Extinctions of the channels at both ends; linear between, and one channel the largest.
+  /// Part of a ray. Extinctions of the channels at both ends, linear in between; the order of the channels by
+  /// extinction does not change within it.
   struct Piece {
     double length;
     glm::dvec3 begin, end;
@@ -92,7 +93,8 @@ struct Figure3 {
     const double x = std::clamp(p.x / (n - 1), 0.0, 1.0), y = std::clamp(p.y / (n - 1), 0.0, 1.0);
     return density * glm::dvec3(1 - x, x, y);
   }
-  /// Of equal ones the first: in the outer half voxels blue is as dense as red or green.
+  /// Index of the largest extinction, of equal ones the first: in the outer half voxels blue can be as dense
+  /// as red or green.
   static int largestOf(const glm::dvec3& s) {
     constexpr double kRounding = 1e-12;
     return s.x >= s.y - kRounding && s.x >= s.z - kRounding ? 0 : (s.y >= s.z - kRounding ? 1 : 2);
@@ -130,11 +132,11 @@ struct Figure3 {
         visit(Piece{cuts[i + 1] - cuts[i], at(cuts[i]), at(cuts[i + 1])});
   }
 
-  /// Integral over [0, h] of (p + q t) exp(-(s0 t + s1 t^2 / 2)): the first part of p + q t is a multiple of
-  /// the exponent's derivative, what is left is an error function.
+  /// Integral over [0, h] of (p + q t) exp(-(s0 t + s1 t^2 / 2)). One part of p + q t is a multiple of the
+  /// exponent's derivative; the rest gives an error function.
   static double absorbed(double p, double q, double s0, double s1, double h) {
     const double lost = -std::expm1(-(s0 + 0.5 * s1 * h) * h);
-    if (std::abs(s1) < 1e-12)  // parallel to where the extinction is the same
+    if (std::abs(s1) < 1e-12)  // constant extinction along the ray
       return s0 > 0 ? p * lost / s0 + q * (lost / s0 - h * std::exp(-s0 * h)) / s0 : p * h + 0.5 * q * h * h;
     const double r = std::sqrt(0.5 * std::abs(s1)), from = s0 / (2 * r);
     const double rest =
@@ -143,7 +145,7 @@ struct Figure3 {
     return q / s1 * lost + (p - q * s0 / s1) * rest;
   }
   static constexpr double kHalfRootPi = 0.88622692545275801;
-  /// erfi by its series, which converges everywhere; arguments here are below 5.
+  /// erfi by its series, which converges for every argument; arguments here are below 5.
   static double imaginaryErf(double x) {
     double power = x, sum = 0;
     for (int k = 0; k < 200; ++k) {

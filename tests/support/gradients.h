@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How steep a channel is, so that tests can choose ranges of opacity by the gradient that its voxels have.
+// Gradient magnitudes of a channel, from which tests choose ranges for opacity by the gradient.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,8 @@
 namespace scolopax::test {
 
 /// |gradient| at all voxels, ascending, in data units per world unit: central differences, one-sided at the
-/// border. Voxels where one is not finite are left out. `channel` is a Channel or a ChannelSource.
+/// border. Voxels with a difference that is not finite are left out. `channel` is a Channel or a
+/// ChannelSource.
 template <class ChannelLike>
 std::vector<double> gradientMagnitudes(const Grid& grid, const ChannelLike& channel) {
   const glm::ivec3 dims = grid.dims;
@@ -48,14 +49,14 @@ std::vector<double> gradientMagnitudes(const Grid& grid, const ChannelLike& chan
   return magnitudes;
 }
 
-/// What that share of the voxels whose gradient is not 0 do not exceed; 1 where there are none.
+/// Quantile `share` of |gradient| over the voxels whose gradient is not 0; 1 if there are none.
 inline double gradientQuantile(const Volume& volume, std::size_t channel, double share) {
   std::vector<double> found = gradientMagnitudes(volume.grid(), volume.channels()[channel]);
   found.erase(found.begin(), std::upper_bound(found.begin(), found.end(), 0.0));
   return found.empty() ? 1 : found[std::size_t(share * double(found.size() - 1))];
 }
 
-/// Factor by a curve over a part of the gradients that the channel has.
+/// Opacity by the gradient, with a curve over a part of the range of the channel's gradients.
 inline GradientOpacity factorBetween(const Volume& volume, std::size_t channel, double lowShare,
                                      double highShare, std::vector<OpacityKnot> factor = {{0, 0}, {1, 1}}) {
   return {gradientQuantile(volume, channel, lowShare), gradientQuantile(volume, channel, highShare),

@@ -13,7 +13,7 @@ inline std::shared_ptr<const Volume> orbitals() {
 
 inline Scene orbitalScene(const Volume& volume) {
   Scene scene;
-  scene.width = 50;  // neither a multiple of the tile
+  scene.width = 50;  // neither side is a multiple of the tile
   scene.height = 37;
   scene.camera = framingCamera(volume.grid(), 35, 50.0 / 37.0);
   scene.channels.resize(volume.channels().size());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The defect that the paper's Listing 3 has, for tests that must notice it.
+// The defect in the paper's Listing 3, for tests that must detect it.
 #pragma once
 #include "renderer/kernel/trackers/process_per_channel.h"
 
@@ -31,7 +31,7 @@ struct PrintedNDda {
       while (true) {
         const kernel::RandomBlock random = sampler.next();
         t += kernel::opticalDepth(kernel::uniformOf(random.x)) / bound;
-        if (*nearest && t > (*nearest)->place.t()) return;  // the order that is printed
+        if (*nearest && t > (*nearest)->place.t()) return;  // in the printed order
         if (!(t < walk.exit())) break;
         const kernel::Place place{t, 0};
         if (const auto hit = kernel::testChannel<Blend>(scene, kernel::AllChannels{}, n, bound, place,

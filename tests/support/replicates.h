@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of one scene that are independent of each other: one seed each, so that low-discrepancy points are
-// scrambled anew. Their spread says what noise explains; agreement.h decides.
+// Independent pictures of one scene: each has its own seed, which scrambles the low-discrepancy points
+// differently. Their spread shows how large the noise is; agreement.h compares them.
 #pragma once
 #include <utility>
 #include <vector>
@@ -14,16 +14,16 @@
 namespace scolopax::test {
 
 inline constexpr int kReplicates = 32;
-/// Of a replicate, times statisticsFactor(): all points of one scrambling.
+/// Samples of a replicate, times statisticsFactor(): all points of one scrambling.
 inline constexpr int kSamplesPerReplicate = int(kernel::kReplicateSamples);
 inline int samplesPerReplicate() { return kSamplesPerReplicate * statisticsFactor(); }
 
 struct Replicates {
-  std::vector<Image> pictures;  ///< each the mean of `samples` samples of every pixel
+  std::vector<Image> pictures;  ///< each is the mean of `samples` samples per pixel
   int samples = 0;
 };
 
-/// What the CPU backend draws.
+/// Replicates rendered by the CPU backend.
 inline Replicates replicate(const std::shared_ptr<const Volume>& volume, Scene scene, Method method) {
   scene.method = method;
   Replicates result{{}, samplesPerReplicate()};
@@ -38,8 +38,8 @@ inline Replicates replicate(const std::shared_ptr<const Volume>& volume, Scene s
   return result;
 }
 
-/// The same pictures from one kernel of the test's choice, on a view that `change` may have spoilt: for
-/// seeded defects. `change(view)` is called for every replicate; what it makes the view point at must live
+/// The same pictures from one kernel of the test's choice, on a view to which `change` may have added a
+/// defect. `change(view)` is called for every replicate; objects that it makes the view point to must live
 /// until the next call.
 template <class Integrator, class Blend, class Features, class Change>
 Replicates replicateKernel(const std::shared_ptr<const Volume>& volume, Scene scene, Change&& change) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sampling of many points at once (renderer/cpu/sample_lanes.h), for tests and benchmarks that are compiled
-// for no instruction set of their own.
+// Sampling of many points at once (renderer/cpu/sample_lanes.h), for tests and benchmarks, which are not
+// compiled for these instruction sets themselves.
 #pragma once
 #include <glm/vec3.hpp>
 
@@ -10,7 +10,8 @@ namespace scolopax::test {
 
 inline constexpr int kMostLanes = 16;
 
-/// Values of channels (bit n: channel n) at as many points as the set has lanes come into values[n].
+/// Writes the values of `channels` (bit n: channel n), at as many points as the instruction set has lanes, to
+/// values[n].
 using SampleLanes = void (*)(const kernel::SceneView& scene, std::uint32_t channels, const glm::vec3* points,
                              float (*values)[kMostLanes]);
 struct LaneSampler {

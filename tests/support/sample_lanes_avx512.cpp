@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #if defined(__x86_64__)
 #include "renderer/cpu/lanes_avx512.h"
-// The lane type comes first.
+// Must follow the lane type.
 #include "tests/support/sample_lanes_of_set.h"
 
 namespace scolopax::test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Included after a lane type, by a file for each.
+// Included after a lane type; there is one including file for each lane type.
 #pragma once
 #include "renderer/cpu/sample_lanes.h"
 #include "tests/support/sample_lanes.h"

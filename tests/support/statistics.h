@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Is an analog picture's expected value the reference's? Three questions, each with a stated chance of a
-// wrong alarm; seeds are fixed, so a test that passes once passes always.
+// Tests whether the expected value of an analog picture is the reference's: three tests, each with a stated
+// false-alarm probability. Seeds are fixed, so a test that passes once passes always.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -16,7 +16,8 @@
 
 namespace scolopax::test {
 
-/// SCOLOPAX_STATISTICS of the environment, 1 to 1000: by how much every number of samples here is multiplied.
+/// Factor for every number of samples here: the environment variable SCOLOPAX_STATISTICS, 1 to 1000; 1 if
+/// unset.
 inline int statisticsFactor() {
   static const int factor = [] {
     const char* text = std::getenv("SCOLOPAX_STATISTICS");
@@ -24,11 +25,11 @@ inline int statisticsFactor() {
   }();
   return factor;
 }
-/// Whether tests go through all combinations of what they vary, as `make check` has them do; else they cover
-/// pairs.
+/// Whether tests use all combinations of the settings that they vary, as in `make check`; otherwise they
+/// cover all pairs.
 inline bool allCombinations() { return statisticsFactor() > 1; }
 
-/// `samples`, times the factor, of the scene.
+/// A picture of the scene with `samples` times the factor samples per pixel.
 inline Image renderSamples(const std::shared_ptr<const Volume>& volume, const Scene& scene, int samples,
                            int threads = 0) {
   const auto renderer = makeCpuRenderer(volume, threads);
@@ -46,15 +47,14 @@ inline Image renderAnalog(const std::shared_ptr<const Volume>& volume, Scene sce
   return renderSamples(volume, scene, samples, threads);
 }
 
-/// Compares a picture of `samples`, times the factor, per pixel and component. Every sample must be 0 or 1 in
-/// every component (colours of the scene's channels have only zeros and ones): the mean is then binomial and
-/// its variance known from the reference.
-///  - the largest deviation against Bernstein's inequality, valid for any distribution on [0,1], split over
-///  all
-///    pixels and components: chance of a wrong alarm 1e-9;
-///  - the mean deviation of each component, which shows a small bias of the whole picture: 6 sigma, 1e-8;
-///  - the mean squared deviation, which shows a bias whose sign changes over the picture: 6 sigma,
-///    where components of a pixel may be the same numbers (alpha and the only colour).
+/// Compares a picture of `samples` times the factor samples with the reference. Every sample must be 0 or 1
+/// in every component (the colours of the scene's channels have only zeros and ones): the mean is then
+/// binomial, and the reference gives its variance.
+///  - The largest deviation, by Bernstein's inequality, which holds for any distribution on [0,1], over all
+///    pixels and components together: false-alarm probability 1e-9.
+///  - The mean deviation of each component, which reveals a small bias of the whole picture: 6 sigma, 1e-8.
+///  - The mean squared deviation, which reveals a bias whose sign changes over the picture: 6 sigma. The
+///    components of a pixel may be identical (alpha and the only colour).
 inline ::testing::AssertionResult isUnbiased(const Image& found, int samples,
                                              const reference::ReferenceImage& expected) {
   const double n = double(samples) * statisticsFactor();
@@ -62,7 +62,8 @@ inline ::testing::AssertionResult isUnbiased(const Image& found, int samples,
   const double logTerm = std::log(2.0 * 4.0 * double(pixels) / 1e-9);
   const double tolerance = expected.maximumRayError + 1e-6;
   double squares = 0, variance = 0;
-  std::vector<double> spread(pixels);  // of a pixel's squared deviations, summed as if fully correlated
+  std::vector<double> spread(
+      pixels);  // standard deviation of a pixel's squared deviations, as if fully correlated
   for (int c = 0; c < 4; ++c) {
     double sum = 0, sumVariance = 0;
     for (std::size_t i = 0; i < pixels; ++i) {

@@ -12,7 +12,7 @@
 
 namespace scolopax::test {
 
-/// The methods whose expected value is the picture.
+/// The unbiased methods.
 inline constexpr Method kTrackers[] = {Method::superposed, Method::cumulative, Method::syncDda, Method::nDda};
 
 /// Voxel (i,j,k) = value(i,j,k), rounded for integer types.
@@ -51,7 +51,7 @@ std::shared_ptr<const Volume> volumeOf(const Grid& grid, Sources... sources) {
   return std::make_shared<const Volume>(grid, std::move(list));
 }
 
-/// Extinction `density` everywhere a channel's value is not below the range: opacity 1 over the whole range.
+/// A channel of opacity 1 at every value: its extinction is `density` wherever its samples are finite.
 inline ChannelAppearance solid(double density, glm::dvec3 color = glm::dvec3(1)) {
   ChannelAppearance a;
   a.density = density;
@@ -60,7 +60,8 @@ inline ChannelAppearance solid(double density, glm::dvec3 color = glm::dvec3(1))
   return a;
 }
 
-/// Orthographic view along +z (towards rising k) that sees the box's cross-section exactly, for gridOf grids.
+/// Orthographic view along +z (towards increasing k) whose picture is exactly the box's cross-section, for
+/// grids made by gridOf.
 inline Scene frontScene(const Volume& volume, int width, int height) {
   Scene scene;
   const Grid& grid = volume.grid();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clip planes and crop are edited in the page: what they cut away is gone, and comes back.
+// Clip planes and crop regions are edited in the page: the parts cut away disappear, and come back.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import {
@@ -73,10 +73,10 @@ test('crop keeps the regions that are chosen', async () => {
   await eventually(async () => (await onServer()).crop.regions[13] === false, 'regions did not arrive');
   const outside = await steadyPicture(page, 4);
   assert.ok(difference(inside, outside) > 4, 'inside and outside look the same');
-  await crop.getByText('One by one').click();
+  await crop.getByText('Individual regions').click();
   await crop.getByRole('checkbox', { name: 'x low, y low, z low' }).uncheck();
   await eventually(async () => (await onServer()).crop.regions[0] === false, 'one region did not arrive');
-  assert.equal(await crop.getByLabel('Regions', { exact: true }).locator('option:checked').textContent(), 'Own choice');
+  assert.equal(await crop.getByLabel('Regions', { exact: true }).locator('option:checked').textContent(), 'Custom');
   const { violations } = await new AxeBuilder({ page }).analyze();
   assert.deepEqual(violations.map(({ id, nodes }) => [id, nodes[0]?.html]), []);
 });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// With several data sets the page offers a choice, and shows the one chosen with channels and view of its own.
+// With several data sets the page offers a choice, and shows the chosen one with its own channels and view.
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { difference, eventually, generateOrbitals, launchBrowser, openPage, scratchFolder, startServer, steadyPicture } from './support.mjs';

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opacity by the gradient is switched on and edited in a channel's card: the scene and the picture follow.
+// Opacity by the gradient is switched on and edited in a channel's card; the scene and the picture change with it.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import {
@@ -26,9 +26,9 @@ const editorsOf = (from) => cardOf(from).getByRole('group', { name: 'Opacity by 
 const barsOf = (from) => editorsOf(from).locator('.plot-bars');
 const point = (number) => editorsOf(page).getByRole('slider', { name: `Factor point ${number} of 2` });
 const upperEnd = () => editorsOf(page).getByLabel('Gradient range to');
-/** As the server has it; undefined while it is off. */
+/** The server's gradientOpacity; undefined while it is off. */
 const settings = async () => (await sceneOnServer(page)).scene.channels[0].gradientOpacity ?? undefined;
-/** Waits until the server has it with this end (0 or 1) of the range. */
+/** Waits until this end (0 or 1) of the range has this value on the server. */
 const rangeEnd = (end, value, message) => eventually(async () => (await settings())?.range?.[end] === value, message);
 
 before(async () => {
@@ -38,7 +38,7 @@ before(async () => {
   page.on('console', (message) => message.type() === 'error' && faults.push(message.text()));
   page.on('request', (request) => request.url().includes('gradient-histogram') && asked.push(request.url()));
   await steadyPicture(page, 1);
-  // The first channel alone, so that no other one hides what becomes of it.
+  // Only the first channel is visible, so that no other one hides changes to it.
   const { channels } = (await sceneOnServer(page)).scene;
   await patchFromOutside(page, { channels: Object.fromEntries(channels.map((_, i) => [i, { visible: i === 0 }])) });
   whole = await steadyPicture(page, 4);
@@ -65,7 +65,7 @@ test('switched on, it begins with a ramp over a range that the server has chosen
   assert.equal(range[0], 0);
   assert.ok(range[1] > 0, `the range ends at ${range[1]}`);
   assert.deepEqual(points, [[0, 0], [1, 1]]);
-  // Inputs show four digits or more.
+  // Inputs show at least four digits.
   const shown = async () => Math.abs(Number(await upperEnd().inputValue()) - range[1]) <= 1e-3 * range[1];
   await eventually(shown, 'the page does not show the chosen range');
   await eventually(async () => (await barsOf(page).count()) === 2, 'the histogram is not drawn');

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lights are edited in the page by the list control that is made from the schema: added, changed and removed.
+// Lights are added, changed and removed in the page, with the list control that is built from the schema.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import {
@@ -38,7 +38,7 @@ const focused = () =>
 
 test('shading is switched on in the page', async () => {
   await steadyPicture(page, 1);
-  // A steep surface that nothing but the lights makes bright: where the field is flat, light does little.
+  // A steep surface whose brightness comes only from the lights; where the field is flat, light has little effect.
   const { channels } = (await sceneOnServer(page)).scene;
   const surface = ({ range }) => ({
     color: '#ffffff',

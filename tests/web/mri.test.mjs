@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page on a real four-channel volume, with a script that edits beside it. README's picture is made here.
+// The page with a real four-channel volume, while a script also edits the scene. Makes the README's picture.
 import assert from 'node:assert/strict';
 import { existsSync, readdirSync } from 'node:fs';
 import path from 'node:path';
@@ -20,7 +20,7 @@ const files = existsSync(folder) ? readdirSync(folder).filter((name) => name.end
 const missing = files.length === 4 ? false : `the four files *_bet.nii.gz are not in ${folder}`;
 const picturePath = process.env.SCOLOPAX_SCREENSHOT;
 
-/** Files in the order of their names. Bright FLAIR is the tumour, bright T2 the fluid around it. */
+/** Channels in the order of the files' names. The tumour is bright in FLAIR, the fluid around it in T2. */
 const look = {
   channels: [
     { name: 'FLAIR', color: '#ff8a3d', range: [300, 800], opacity: [[0, 0], [0.4, 0], [0.65, 0.6], [1, 1]], density: 0.25 },

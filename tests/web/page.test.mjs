@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page as a user sees it, in a real browser on a real server.
+// The page as a user sees it, in a real browser with a real server.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
@@ -71,7 +71,7 @@ test('an edit that is not answered for a while is said to be rendering, until it
 
 test('samples rise and the estimated error falls', async () => {
   const error = async () => Number((await page.locator('.status').textContent()).match(/([\d.e-]+) error/)?.[1]);
-  // A tracker's: of quadrature most is bias, which samples do not lower.
+  // With a tracker: the error of quadrature is mostly bias, which samples do not reduce.
   await patchFromOutside(page, { integrator: { method: 'superposed' } });
   await steadyPicture(page, 4);
   const before = { samples: await samplesShown(page), error: await error() };
@@ -113,7 +113,7 @@ test('dragging turns the volume, and a double click brings the first view back',
   const first = await steadyPicture(page);
   await page.mouse.move(x + width / 2, y + height / 2);
   await page.mouse.down();
-  // Mostly over rather than round: the orbitals look the same from all sides.
+  // Mostly pitch rather than yaw: the orbitals look the same from all sides.
   await page.mouse.move(x + width / 2 + 40, y + height / 2 + 150, { steps: 8 });
   await page.mouse.up();
   const turned = await steadyPicture(page);
@@ -156,7 +156,7 @@ test('the keyboard turns, zooms and resets, also with parallel rays', async () =
     await page.getByRole('button', { name: projection }).click();
     const first = await steadyPicture(page);
     await page.locator('.picture').focus();
-    // Over rather than round: the orbitals look the same from all sides.
+    // Pitch rather than yaw: the orbitals look the same from all sides.
     for (let i = 0; i < 8; ++i) await page.keyboard.press('ArrowDown');
     const turned = await steadyPicture(page);
     assert.ok(difference(first, turned) > 8, `${projection}: arrow keys hardly change the picture`);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is visible under the pointer that rests over the picture is told in its corner, as the server tells a script.
+// When the pointer rests over the picture, a corner shows what is visible there: the same as a script gets from the
+// server.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import {
@@ -29,7 +30,7 @@ after(async () => {
   await server?.end();
 });
 
-/** What a script is told of a place, in pixels of the page from the picture's corner. */
+/** The server's answer to a script for a point in page pixels from the picture's top left corner. */
 const pickOnServer = (x, y) =>
   page.evaluate(async ([column, row]) => {
     const { id } = JSON.parse(sessionStorage.getItem('scolopax.session'));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A server that dies is reported, and one that comes back is found again with the scene on screen.
+// The page reports a server that dies, and reconnects to a restarted one with the scene on screen.
 import assert from 'node:assert/strict';
 import { randomBytes } from 'node:crypto';
 import { writeFileSync } from 'node:fs';
@@ -40,9 +40,9 @@ test('a killed server is reported, and a restarted one is reconnected to', async
   const announced = page.getByRole('status');
   await first.end('SIGKILL');
   await eventually(async () => /reconnecting in \d+ s/.test(await state.textContent()), 'the loss is not shown', 10_000);
-  await eventually(async () => (await announced.textContent()) === 'Server gone', 'the server is not called gone', 10_000);
+  await eventually(async () => (await announced.textContent()) === 'Server unreachable', 'the server is not announced as unreachable', 10_000);
 
-  // The edit made meanwhile must not be lost either.
+  // The edit made while the server was down must not be lost either.
   await page.locator('.channel header .switch').nth(1).uncheck();
 
   const second = await startServer([file], ['--token-file', tokenFile], first.port);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the browser tests share: a server on a free port, a browser, and ways to look at the picture.
+// Shared by the browser tests: a server on a free port, a browser, and functions that analyse the picture.
 import { spawn, spawnSync } from 'node:child_process';
 import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -15,7 +15,7 @@ export const { AxeBuilder } = require('@axe-core/playwright');
 const program = process.env.SCOLOPAX ?? path.join(root, 'build/release/scolopax');
 export const dataDir = process.env.SCOLOPAX_DATA_DIR ?? path.resolve(root, '../shared/data');
 
-/** A folder of the test's own, removed when the test process ends. */
+/** A temporary folder, removed when the test process ends. */
 export function scratchFolder() {
   const folder = mkdtempSync(path.join(tmpdir(), 'scolopax-web-'));
   process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
@@ -29,7 +29,7 @@ export function generateOrbitals(folder, name = 'orbitals.nrrd', options = ['--s
   return file;
 }
 
-/** Starts the server and waits for its ready line. `end(signal)` ends it and waits until it has; `signal` only sends. */
+/** Starts the server and waits for its ready line. `end(signal)` also waits until it has ended; `signal` does not. */
 export async function startServer(files, options = [], port = '0') {
   if (!existsSync(path.join(root, 'client_web/dist/index.html')))
     throw new Error('client_web/dist is missing: run `npm ci && npm run build` in client_web first');
@@ -71,7 +71,7 @@ export const launchBrowser = () =>
     ],
   });
 
-/** Opens the page; `faults` collects what goes wrong in it. */
+/** Opens the page; `faults` collects uncaught errors in it. */
 export async function openPage(browser, url, options = { viewport: { width: 900, height: 560 } }) {
   const context = await browser.newContext(options);
   const page = await context.newPage();
@@ -81,7 +81,7 @@ export async function openPage(browser, url, options = { viewport: { width: 900,
   return { page, faults };
 }
 
-/** Asks again until the answer is truthy, and returns it; fails with the message after the time. */
+/** Calls `ask` until its answer is truthy, and returns that; throws an Error with the message after the timeout. */
 export async function eventually(ask, message, timeoutMs = 30_000) {
   const end = Date.now() + timeoutMs;
   for (;;) {
@@ -93,8 +93,8 @@ export async function eventually(ask, message, timeoutMs = 30_000) {
 }
 
 /**
- * What is on the canvas: mean red, green and blue, the share of pixels that are lit, and the mean brightness of
- * 12 x 12 blocks, which noise hardly changes. Levels are 0..255.
+ * Statistics of the canvas: mean red, green and blue, the share of lit pixels, and the mean brightness of each of
+ * 12 x 12 blocks, which noise hardly affects. Levels are 0..255.
  */
 export function lookAt(page) {
   return page.locator('canvas').evaluate((canvas) => {
@@ -120,20 +120,20 @@ export function lookAt(page) {
 /** Largest difference between two pictures' blocks, in levels. */
 export const difference = (a, b) => Math.max(...a.blocks.map((block, i) => Math.abs(block - b.blocks[i])));
 
-/** Samples per pixel, as the status bar says. */
+/** Samples per pixel that the status bar shows. */
 export async function samplesShown(page) {
   const text = (await page.locator('.status').textContent()) ?? '';
   return Number(text.match(/(\d+)(?: \/ \d+)? samples?/)?.[1] ?? 0);
 }
 
-/** The session as the server has it. */
+/** The session's scene and revision on the server. */
 export const sceneOnServer = (page) =>
   page.evaluate(async () => {
     const { id } = JSON.parse(sessionStorage.getItem('scolopax.session'));
     return (await fetch(`api/v1/sessions/${id}/scene`)).json();
   });
 
-/** Edits the scene as another client would: a script with the same access. */
+/** Edits the scene as another client: over HTTP, with the page's access. */
 export const patchFromOutside = (page, patch) =>
   page.evaluate(async (body) => {
     const { id } = JSON.parse(sessionStorage.getItem('scolopax.session'));
@@ -142,11 +142,11 @@ export const patchFromOutside = (page, patch) =>
     if (!answer.ok) throw new Error(await answer.text());
   }, patch);
 
-/** Waits until a full-size picture of the newest scene has so many samples, and looks at it. */
+/** Waits until a full-size picture of the newest scene has `samples` samples; returns lookAt() of it. */
 export async function steadyPicture(page, samples = 16, timeoutMs = 90_000) {
   await page.locator('canvas[data-revision]').waitFor();
   let revision;
-  // The page sends its edits with the next animation frame, and some follow from an answer of the server.
+  // The page sends its edits with the next animation frame, and an answer of the server may cause further edits.
   await eventually(async () => {
     const before = revision;
     revision = (await sceneOnServer(page)).revision;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the hard cases share: colours of zeros and ones, fields with some structure, and views of them.
+// Shared by the hard cases: colours of zeros and ones, fields with some structure, views, and comparisons.
 #pragma once
 #include "tests/support/statistics.h"
 #include "tests/support/volumes.h"
@@ -25,13 +25,13 @@ inline auto lumps(int kind = 0) {
   };
 }
 
-/// A picture with one value everywhere: the closed form of a scene that looks the same in every pixel.
+/// A picture with one value everywhere: the closed form of a scene whose pixels are all the same.
 inline reference::ReferenceImage flat(const Scene& scene, glm::dvec4 value) {
   const std::size_t pixels = std::size_t(scene.width) * std::size_t(scene.height);
   return {{scene.width, scene.height, std::vector<glm::vec4>(pixels, glm::vec4(value))}, {}, 0};
 }
 
-/// Every tracker, and the reference, against optical thickness `depth` of one colour in every pixel.
+/// Compares every tracker, and the reference, with optical thickness `depth` of one colour in every pixel.
 inline void expectThickness(const std::shared_ptr<const Volume>& volume, Scene scene, double depth,
                             glm::dvec3 color, int samples) {
   const double alpha = -std::expm1(-depth);
@@ -43,13 +43,13 @@ inline void expectThickness(const std::shared_ptr<const Volume>& volume, Scene s
     ASSERT_NEAR(pixel.a / alpha, 1, 1e-5 + reference.maximumRayError / alpha);
 }
 
-/// Every tracker against the reference, through pixel centres.
+/// Compares every tracker with the reference, with rays through pixel centres.
 inline void expectReference(const std::shared_ptr<const Volume>& volume, Scene scene, int samples) {
   scene.filter = PixelFilter::point;
   expectTrackersMatchReference(volume, scene, samples, 1);
 }
 
-/// Perspective view of a scene whose channels are still to be set.
+/// A perspective view; the caller still has to set the channels.
 inline Scene viewFrom(const Volume& volume, glm::dvec3 eye, glm::dvec3 target, double fovY, int side) {
   Scene scene;
   scene.camera.eye = eye;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tests of the loaders share: a folder that goes away, files made byte by byte, errors as text.
+// Shared by the tests of the loaders: a temporary folder, files made byte by byte, errors as text.
 #pragma once
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -65,7 +65,7 @@ inline std::string gzipped(std::string_view bytes) {
   return packed;
 }
 
-/// The bytes of values, in memory order or reversed each.
+/// The bytes of the values, each in memory order or reversed.
 template <class T>
 std::string bytesOf(const std::vector<T>& values, bool reversed = false) {
   std::string bytes(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
@@ -75,7 +75,7 @@ std::string bytesOf(const std::vector<T>& values, bool reversed = false) {
   return bytes;
 }
 
-/// Every voxel of a channel as data value.
+/// Every voxel of a channel as a data value.
 inline std::vector<double> valuesOf(const ChannelSource& channel) {
   return visitScalarType(channel.voxels.type(), [&](auto zero) {
     std::vector<double> values;
@@ -92,7 +92,8 @@ inline std::pair<double, double> rangeOf(const ChannelSource& channel) {
   return {*low, *high};
 }
 
-/// The one line of the Error that `call` throws; "" when it throws none, and a failure for anything else.
+/// The message, of one line, of the Error that `call` throws; "" if it throws nothing. Any other exception
+/// fails the test.
 template <class F>
 std::string errorOf(F&& call) {
   try {

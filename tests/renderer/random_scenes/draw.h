@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random numbers of the scene tester: every purpose of every scene has a sequence of its own, so that a field
+// Random numbers of the scene tester: every purpose of every scene has its own sequence, so that a field
 // added later changes no number of another field.
 #pragma once
 #include <cmath>
@@ -14,7 +14,7 @@ namespace scolopax::random_scenes {
 
 class Draw {
  public:
-  /// `scene` counts scenes; `purpose` is the name of what is drawn.
+  /// `scene` is the scene's number; `purpose` names what is drawn.
   Draw(std::uint64_t scene, std::string_view purpose) : state_(mixed(scene + 1)) {
     for (const char c : purpose) state_ = mixed(state_ ^ std::uint64_t(static_cast<unsigned char>(c)));
   }
@@ -33,7 +33,7 @@ class Draw {
     return list[std::size_t(bits() % list.size())];
   }
   glm::dvec3 vector(double lo, double hi) { return {between(lo, hi), between(lo, hi), between(lo, hi)}; }
-  /// Of length 1; now and then along an axis.
+  /// Of length 1; sometimes along an axis.
   glm::dvec3 direction() {
     if (chance(0.15)) {
       glm::dvec3 axis(0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Marching with the midpoint rule in steps that are halved where halving changes the result, or where the
-// samples of a step came about by different decisions (knots, signs, holes), so that jumps are enclosed.
+// Marching with the midpoint rule. A step is halved if halving changes the result, or if its samples result
+// from different decisions (knots, signs, holes): this narrows down jumps.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -10,31 +10,31 @@
 
 namespace scolopax::random_scenes {
 
-/// What a point of a ray is, and a hash of all decisions on the way there.
+/// The field at a point of a ray, and a hash of all decisions in its computation.
 struct PointSample {
   double extinction = 0;   ///< per world unit
-  glm::dvec3 radiance{0};  ///< of what is hit there
+  glm::dvec3 radiance{0};  ///< of a collision there
   std::uint64_t decisions = 0;
 };
 
-/// A stretch of the ray seen from its beginning.
+/// A stretch of the ray, seen from its start.
 struct Stretch {
   double transmittance = 1;
   glm::dvec3 light{0};
 };
 
-/// A part of the ray in which all decisions are the same.
+/// A part of the ray with the same decisions throughout.
 struct Run {
   std::uint64_t decisions;
   double length, largestExtinction;
 };
 
 struct StepRules {
-  double step;         ///< length of those to begin with, at most
-  double tolerance;    ///< of what a halving may change, per step
+  double step;         ///< largest length of the initial steps
+  double tolerance;    ///< largest change by halving, per step
   double largestRate;  ///< bound of the extinction: a step across a decision may be as thick as `tolerance`
-  double largestRadiance;  ///< relative to which light is told
-  int most;                ///< samples after which no step is halved any more
+  double largestRadiance;  ///< light is measured relative to this
+  int most;                ///< number of samples after which no step is halved any more
 };
 
 /// sampleAt(t) gives the PointSample, decisionsAt(t) only its hash.
@@ -44,7 +44,8 @@ class SteppedMarch {
   SteppedMarch(const SampleAt& sampleAt, const DecisionsAt& decisionsAt, const StepRules& rules)
       : sampleAt_(sampleAt), decisionsAt_(decisionsAt), rules_(rules) {}
 
-  /// One stretch of the ray after the other; cuts between them lie where the field has a kink.
+  /// Marches the next stretch of the ray. Stretches must follow each other and end where the field has a
+  /// kink.
   void march(double begin, double end) {
     if (!(begin < end)) return;
     const int steps = int(std::ceil((end - begin) / rules_.step));
@@ -92,7 +93,7 @@ class SteppedMarch {
     const bool alike = before == left.decisions && left.decisions == middle.decisions &&
                        middle.decisions == right.decisions && right.decisions == after;
     const double most = alike ? change : all_.transmittance * -std::expm1(-rules_.largestRate * 2 * half);
-    // In a thick step all samples lie deep, and say nothing of what its front shows.
+    // In a thick step all samples lie deep inside and say nothing about its front.
     const bool thin = std::max({left.extinction, middle.extinction, right.extinction}) * 2 * half <= kThin;
     const bool enough = change <= rules_.tolerance && most <= rules_.tolerance && thin;
     samples_ += 2;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tester's own march meets: one channel's field and look, and the decisions that led to a sample.
+// The matter that directMarch() samples: one channel's field and appearance, and the decisions that led to a
+// sample.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -25,7 +26,7 @@ class Decisions {
   std::uint64_t hash_ = 0xcbf29ce484222325u;
 };
 
-/// One channel's values, and how it looks.
+/// One channel's values and appearance.
 struct Matter {
   int number;                  // of the channel
   std::vector<double> values;  // data values, x fastest
@@ -60,7 +61,7 @@ struct Matter {
     return mean(plane[0], plane[1], w[2]);
   }
 
-  /// Per voxel along each axis, by differences of one voxel; none where one of them is not finite.
+  /// Gradient per voxel along each axis, by differences of one voxel; none if one of them is not finite.
   std::optional<glm::dvec3> gradient(const glm::dvec3& p) const {
     glm::dvec3 g(0);
     for (int axis = 0; axis < 3; ++axis) {
@@ -82,7 +83,7 @@ struct Matter {
     return std::pow(share(value, look->rangeLo, look->rangeHi), look->gamma);
   }
 
-  /// The last knot at or before `position` and the next one; `of(knot)` is what is interpolated.
+  /// Interpolates `of(knot)` between the last knot at or before `position` and the next one.
   template <class Knots, class Of>
   static auto curve(const Knots& knots, double position, Decisions* decisions, Of of) {
     std::size_t next = 0;
@@ -94,14 +95,15 @@ struct Matter {
     return of(a) + (of(b) - of(a)) * ((position - a.position) / (b.position - a.position));
   }
 
-  /// What the opacity is multiplied by at a point; `worldFromGradient` is the grid's.
+  /// The factor of the opacity at a point; `worldFromGradient` is the grid's.
   double factor(const glm::dvec3& p, const glm::dmat3& worldFromGradient, Decisions* decisions) const {
     if (!look->gradientOpacity) return 1;
     const std::optional<glm::dvec3> perVoxel = gradient(p);
     decisions->note(perVoxel.has_value());
     if (!perVoxel) return 0;
     const glm::dvec3 g = worldFromGradient * *perVoxel;
-    // Where the gradient passes zero its length turns sharply, and the sign of its largest component changes.
+    // Where the gradient passes through zero, its length has a kink, and the sign of its largest component
+    // changes.
     int largest = 0;
     for (int axis = 1; axis < 3; ++axis)
       if (std::abs(g[axis]) > std::abs(g[largest]) * (1 + 1e-9)) largest = axis;  // not by rounding

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene drawn at random in the form in which clients send it, so that it can be printed and sent again; and
-// what the server makes of it.
+// A random scene in the form in which clients send it, so that it can be printed and sent again, and the
+// resolved scene that the server makes of it.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -20,9 +20,9 @@ struct RandomScene {
   Scene scene;  ///< `wire`, resolved
 };
 
-/// Scene `number`: the same on every machine, and whatever other fields there are.
+/// Scene `number`: the same on every machine. Fields added later do not change the others.
 RandomScene drawScene(std::uint64_t number);
-/// One line: what of the scene is likely to matter.
+/// One line with the properties of the scene that are most likely to matter.
 std::string describe(const RandomScene& scene);
 /// Writes scene.json and the volume's files to `folder`; returns the command that renders it.
 std::string writeScene(const RandomScene& scene, const std::string& folder);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small volumes of random voxels for the scene tester, and their files, with which a scene that failed can be
+// Small volumes of random voxels for the scene tester, and files of them, with which a failing scene can be
 // rendered again.
 #pragma once
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace scolopax::random_scenes {
 
-/// What Volume is made of, kept because a volume moves factors from its voxels to slope and intercept.
+/// The input of Volume, kept because Volume moves factors from its voxels to slope and intercept.
 struct VolumeSource {
   Grid grid;
   std::vector<ChannelSource> channels;
@@ -19,7 +19,7 @@ struct VolumeSource {
 
 /// 1 to 6 voxels a side, 1 to 4 channels of any type; grid, slopes and intercepts are floats.
 VolumeSource drawVolume(std::uint64_t scene);
-/// A short line: size, spacing, types, what voxels are like.
+/// A short line: size, spacing, types, and the kind of voxels.
 std::string describe(const VolumeSource& source);
 /// One NIfTI file per channel, channel_0.nii and so on, in `folder`, exactly as drawn.
 std::vector<std::filesystem::path> writeVolume(const VolumeSource& source,

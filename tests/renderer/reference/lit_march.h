@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The simplest program for a ray in light: tiny steps, every formula written again, and a bound of what the
-// steps cost. Shares no code with the renderer.
+// The simplest program for a lit ray: tiny steps, every formula written again, and a bound on the error of
+// the steps. Shares no code with the renderer.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -21,8 +21,8 @@ namespace scolopax::reference {
 
 struct March {
   glm::dvec4 rgba{0};
-  /// Of each component's error: the midpoint rule is wrong by at most step / 4 times the sum of the second
-  /// differences, at jumps, at kinks and where all is smooth.
+  /// Bound on each component's error: the midpoint rule is off by at most step / 4 times the sum of the
+  /// second differences, at jumps, at kinks and in smooth parts.
   double bound = 0;
 };
 
@@ -64,7 +64,7 @@ class LitMarcher {
  private:
   using Sigmas = std::array<double, kMaxChannels>;
 
-  /// What the midpoint rule may be wrong by, from its values one after the other.
+  /// Sums the second differences of successive values, for the error bound of the midpoint rule.
   struct SecondDifferences {
     double before = 0, last = 0, sum = 0;
     void add(double value) {
@@ -86,13 +86,13 @@ class LitMarcher {
         weight *= bit ? p[axis] - low[axis] : 1 - (p[axis] - low[axis]);
         index[axis] = std::min(int(low[axis]) + bit, dims_[axis] - 1);
       }
-      // A corner that is not finite counts, also with weight 0.
+      // A corner that is not finite counts, even with weight 0.
       sum += weight * fields_[n][std::size_t(index[0] + dims_.x * (index[1] + dims_.y * index[2]))];
     }
     return sum;
   }
 
-  /// In world space; none where a difference is not finite.
+  /// In world space; none if a difference is not finite.
   std::optional<glm::dvec3> gradient(std::size_t n, const glm::dvec3& point) const {
     glm::dvec3 perVoxel(0);
     const glm::dvec3 last(dims_ - 1), p = glm::clamp(point, glm::dvec3(0), last);
@@ -107,7 +107,7 @@ class LitMarcher {
     return glm::transpose(voxelFromWorld_) * perVoxel;
   }
 
-  /// Value of a curve; the later of two equal knots wins.
+  /// Value of a curve; of two knots at one position the later counts.
   template <class Knots, class Get>
   static auto curve(const Knots& knots, double position, Get value) {
     for (std::size_t i = knots.size(); i-- > 0;)
@@ -123,7 +123,7 @@ class LitMarcher {
     return std::pow(std::clamp((s - a.rangeLo) / (a.rangeHi - a.rangeLo), 0.0, 1.0), a.gamma);
   }
 
-  /// What |gradient| makes of the opacity.
+  /// The factor of the opacity, from |gradient|.
   double factor(std::size_t n, const glm::dvec3& point) const {
     const std::optional<GradientOpacity>& by = scene_.channels[n].gradientOpacity;
     if (!by) return 1;
@@ -134,7 +134,7 @@ class LitMarcher {
     return curve(by->factor, at, [](const OpacityKnot& k) { return k.value; });
   }
 
-  /// Extinction of every channel at a point; of one channel where `only` is not -1.
+  /// Extinction of every channel at a point; only of channel `only` if that is not -1.
   Sigmas sigmas(const glm::dvec3& point, int only) const {
     Sigmas sigma{};
     for (std::size_t n = 0; n < fields_.size(); ++n) {
@@ -152,7 +152,7 @@ class LitMarcher {
     return scene_.blend == BlendMode::max || scene_.blend == BlendMode::mix ? most : sum;
   }
 
-  /// Where a ray is in the box, of t in [0, length].
+  /// The part [begin, end] of t in [0, length] in which the ray is inside the box; false if there is none.
   bool clip(const glm::dvec3& o, const glm::dvec3& d, double length, double& begin, double& end) const {
     begin = 0;
     end = length;
@@ -168,7 +168,7 @@ class LitMarcher {
     return begin < end;
   }
 
-  /// Between a world point and a light; adds to `bound` what the steps may cost it.
+  /// Transmittance between a world point and a light. Sets `bound` to the possible error by its steps.
   double visibility(const glm::dvec3& point, const glm::dvec3& direction, double distance, int steps,
                     int only, double& bound) const {
     const glm::dvec3 o = voxelFromWorld_ * (point - zero_), d = voxelFromWorld_ * direction;
@@ -186,7 +186,7 @@ class LitMarcher {
     return std::exp(-depth);
   }
 
-  /// One light at one point.
+  /// One light's contribution at a point.
   struct Arriving {
     glm::dvec3 l, intensity, reaching;
   };

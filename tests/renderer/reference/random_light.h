@@ -11,7 +11,7 @@
 
 namespace scolopax::reference {
 
-/// A volume and a scene in which everything that light looks at is drawn at random.
+/// A volume and a scene in which everything that lighting depends on is random.
 struct RandomLight {
   explicit RandomLight(unsigned seed) : random(seed) {}
   std::mt19937 random;
@@ -51,7 +51,7 @@ struct RandomLight {
   ChannelAppearance appearance() {
     ChannelAppearance a;
     a.rangeLo = -20 + 60 * unit();
-    a.rangeHi = chance(0.3) ? a.rangeLo + 10 * unit() : 107 - 30 * unit();  // steep against flat
+    a.rangeHi = chance(0.3) ? a.rangeLo + 10 * unit() : 107 - 30 * unit();  // steep or flat curves
     if (chance(0.2)) std::swap(a.rangeLo, a.rangeHi);
     a.gamma = chance(0.7) ? 1 : 0.4 + 2 * unit();
     a.density = std::pow(10, 1.5 * unit() - 1);
@@ -78,7 +78,7 @@ struct RandomLight {
     for (int n = among(0, 3); n > 0; --n) {
       const LightType types[] = {LightType::directional, LightType::point, LightType::headlight};
       Light light{types[among(0, 2)], vector(), {unit(), unit(), unit()}, 0.4};
-      if (light.type == LightType::point)  // inside or near
+      if (light.type == LightType::point)  // inside the volume or near it
         light.vector = centre(volume) + size * light.vector;
       s.lights.push_back(light);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small volumes and appearances from which the tests of the reference compute what they expect.
+// Small volumes and appearances for which the tests of the reference compute the expected values.
 #pragma once
 #include <algorithm>
 #include <functional>
@@ -44,7 +44,7 @@ inline Volume rampAlongX(glm::ivec3 dims, glm::dvec3 spacing = glm::dvec3(1),
   return makeVolume(makeGrid(dims, spacing, origin), {[](int i, int, int) { return i; }});
 }
 
-/// Extinction `density` everywhere, one colour.
+/// Extinction `density` everywhere, in one colour.
 inline ChannelAppearance uniform(double density, glm::dvec3 color) {
   ChannelAppearance appearance;
   appearance.density = density;
@@ -53,7 +53,7 @@ inline ChannelAppearance uniform(double density, glm::dvec3 color) {
   return appearance;
 }
 
-/// Extinction rises from 0 at lo to `density` at hi, one colour.
+/// Extinction rises from 0 at lo to `density` at hi, in one colour.
 inline ChannelAppearance ramp(double lo, double hi, double density, glm::dvec3 color = glm::dvec3(1)) {
   ChannelAppearance appearance;
   appearance.rangeLo = lo;
@@ -69,8 +69,8 @@ inline Scene makeScene(std::vector<ChannelAppearance> channels) {
   return scene;
 }
 
-/// Figure 3 of the paper: three cubes with linear densities, red falling along x, green along -x, blue along
-/// -y.
+/// Figure 3 of the paper: three cubes with linear densities: red decreases along x, green along -x, blue
+/// along -y.
 struct Figure3 {
   static constexpr int n = 8;
   static constexpr double density = 0.9;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Somebody who works with the server while others attack it, and what the attack does to him and to the process."""
+"""A client that works with the server while others attack it, and the effect of the attack on it and on the process."""
 import argparse
 import asyncio
 import os
@@ -14,7 +14,7 @@ sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from protocol_client import Frame, Viewer, call, call_json  # noqa: E402
 from serving import PROGRAM, Server, write_volume  # noqa: E402
 
-# `make check` attacks with all it has, `make test` with as much as ends soon.
+# `make check` runs the full attacks, `make test` short ones.
 SANITIZED = bool(os.environ.get("SCOLOPAX_SANITIZED"))
 FULL = bool(os.environ.get("SCOLOPAX_HOSTILE_FULL"))
 SECONDS = 10 if FULL else 3
@@ -23,8 +23,8 @@ PERIOD = 0.05  # between two edits
 
 
 class Innocent:
-    """`with Innocent(server) as viewer:` edits a scene of 256 x 256 pixels twenty times a second and notes how long each
-    edit takes to be seen. In a process of his own: the attackers' work is not to delay his."""
+    """`with Innocent(server) as viewer:` edits a scene of 256 x 256 pixels twenty times a second and records how long
+    each edit takes to appear. It has its own process, so that the attackers' work does not delay it."""
 
     def __init__(self, server, dataset="blob-a-64x64x64-uint8"):
         self.latencies, self.ready = [], threading.Event()
@@ -50,7 +50,7 @@ class Innocent:
             self.ready.set()
 
     def watch(self, seconds):
-        """Latencies of the edits that are seen in this time."""
+        """Latencies of the edits that appear within this time."""
         first = len(self.latencies)
         time.sleep(seconds)
         return self.latencies[first:]
@@ -77,7 +77,7 @@ def percentile(values, p):
 
 
 class HostileTest(unittest.TestCase):
-    """Has a server with a small volume, for the innocent, and a large one."""
+    """A test with a server that has a small volume, for Innocent, and a large one."""
     options = ()
     orbitals = ORBITALS
 
@@ -104,12 +104,12 @@ class HostileTest(unittest.TestCase):
         return sum(float(line.split()[-1]) for line in text.splitlines() if line.startswith(name))
 
     def memory(self, field="VmRSS"):
-        """MiB."""
+        """A field of the process's status, in MiB."""
         with open(f"/proc/{self.server.process.pid}/status", encoding="utf-8") as file:
             return next(int(line.split()[1]) for line in file if line.startswith(field)) / 1024
 
     def assert_memory_below(self, found, bound):
-        """Of sanitizers' memory nothing is known."""
+        """Checks nothing with sanitizers, whose own memory is unknown."""
         if not SANITIZED:
             self.assertLess(found, bound)
 
@@ -117,8 +117,8 @@ class HostileTest(unittest.TestCase):
         return len(os.listdir(f"/proc/{self.server.process.pid}/fd"))
 
     def under(self, attack, seconds=SECONDS):
-        """Calls attack(over) while the innocent works. Asserts that he got on: a tenth of the frames that he gets by
-        himself, where a server that stalls gives him one or none; how late they were is printed."""
+        """Calls attack(over) while Innocent works. Asserts that it got at least a tenth of the frames that it gets
+        without an attack; a server that stalls sends one or none. Prints how late they were."""
         with Innocent(self.server) as viewer:
             before = viewer.watch(max(2, seconds / 3))
             over = threading.Event()

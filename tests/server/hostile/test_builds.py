@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes that take long to build: nobody else waits for them, and they end when nobody wants them."""
+"""Scenes that take long to build: no other client waits for them, and a build ends when no client needs it."""
 import asyncio
 import json
 import os
@@ -19,7 +19,7 @@ LARGE = {"dataset": "orbitals", "image": {"width": 64, "height": 64}}
 
 class Builds(HostileTest):
     def toggle(self, over, patches):
-        """A viewer of the large volume who edits ten times a second and does not wait."""
+        """A viewer of the large volume that edits ten times a second without waiting."""
         session = self.session(**LARGE)
 
         async def run():
@@ -98,7 +98,7 @@ class Ending(HostileTest):
         threading.Event().wait(0.2)
         begin = time.monotonic()
         self.server.process.send_signal(signal.SIGTERM)
-        # The grace of 3 s, and what joins take on a busy machine.
+        # The grace period of 3 s, and the time of thread joins on a busy machine.
         self.assertEqual(self.server.process.wait(timeout=10), 0)
         print(f"\nSIGTERM during builds: {time.monotonic() - begin:.2f} s of a grace of 3 s")
         for thread in threads:

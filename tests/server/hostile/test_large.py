@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Large pictures: they hold up nobody else, and their memory is bounded."""
+"""Large pictures: they delay no other client, and their memory is bounded."""
 import asyncio
 import json
 import os
@@ -13,7 +13,7 @@ from innocent import FULL, HostileTest, Viewer  # noqa: E402
 
 SIDE = 4096 if FULL else 2048
 BUDGET = 3072 if FULL else 1024  # MiB
-# What the budget does not count: stacks, sockets, JSON, what the allocator keeps.
+# MiB for what the budget does not count: stacks, sockets, JSON, memory that the allocator keeps.
 SLACK = 300
 
 
@@ -40,7 +40,7 @@ class Large(HostileTest):
                 if status == 200:
                     after = int(headers["Scolopax-Frame"])
         self.under(attack, 12 if FULL else 5)
-        # It gets on as well, if slowly; only a server that never shows it takes as long.
+        # The large picture makes progress too, if slowly; only a server that never shows it takes this long.
         statuses = {self.server.call("GET", f"/api/v1/sessions/{session['id']}/frame?timeout=1")[0]}
         for _ in range(300):
             if 200 in statuses:
@@ -59,7 +59,7 @@ class Large(HostileTest):
                 reading = asyncio.create_task(read())
                 while not over.is_set():
                     await viewer.patch({"integrator": {"seed": viewer.patches}})
-                    await asyncio.sleep(0.7)  # at rest in between: whole pictures
+                    await asyncio.sleep(0.7)  # pause between edits, so that whole pictures are rendered
                 reading.cancel()
         self.under(lambda over: asyncio.run(edit(over)), 12 if FULL else 5)
 
@@ -103,7 +103,7 @@ class Large(HostileTest):
         self.assertTrue(any("MiB" in detail for detail in refusals))
         for session in sessions:
             self.end(session)
-        # What ends gives back, also what was counted.
+        # Sessions that end release their memory, also in the budget's accounting.
         for _ in range(200):
             if sum(self.metric(f'scolopax_memory_bytes{{use="{use}"}}') for use in ("films", "pictures", "encodings")) == 0:
                 break

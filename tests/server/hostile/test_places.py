@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Who has no token takes no places from those who have; who has one cannot say what is not to be said."""
+"""Clients without a token take no connections from those with one; a token does not make forbidden input valid."""
 import asyncio
 import os
 import socket
@@ -76,7 +76,7 @@ class Places(HostileTest):
             self.assertEqual(self.server.call("GET", "/api/v1/datasets", headers={"Host": host})[0], expected, host)
 
     def cookie(self):
-        """As the browser gets it from the address of the ready line."""
+        """The cookie that a browser gets at the address of the ready line."""
         with socket.create_connection(("127.0.0.1", self.server.port)) as client:
             client.sendall(f"GET /?token={self.server.token} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
             head = b""

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Clients that do not read: what waits for them is bounded, and they are closed."""
+"""Clients that do not read: the data that waits for them is bounded, and they are disconnected."""
 import asyncio
 import json
 import os
@@ -15,7 +15,7 @@ from protocol_client import connect  # noqa: E402
 
 CLIENTS = 8 if FULL else 3
 CURVE = [[i / 4096, 0.12345678901] for i in range(4096)]
-# For each client two texts, and a socket's buffers; beside what the allocator keeps.
+# For each client, two texts and a socket's buffers; and what the allocator keeps.
 BOUND = 64 + 16 * CLIENTS  # MiB
 
 
@@ -23,7 +23,7 @@ class Unread(HostileTest):
     orbitals = 32
 
     async def flood(self, session, text, count, over):
-        """Sends without ever reading; True when the server has closed."""
+        """Sends without ever reading; True if the server has closed the connection."""
         async with connect(self.server, session["stream"], max_queue=1, read_limit=1024) as socket:
             for _ in range(count):
                 if over.is_set():

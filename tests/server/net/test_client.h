@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A client that shares no code with the server: a plain blocking socket, HTTP and WebSocket by hand, so that
-// it can also send what no library would. Every wait ends after kPatience and then fails the test.
+// A client that shares no code with the server: a plain blocking socket, with HTTP and WebSocket written by
+// hand, so that it can also send what no library would. Every wait ends after kPatience and then fails the
+// test.
 #pragma once
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -22,7 +23,7 @@ namespace scolopax::net {
 
 inline constexpr std::chrono::seconds kPatience{20};
 
-/// True as soon as `condition` is; false when it still is not after kPatience.
+/// Waits until `condition` is true; false if it is still false after kPatience.
 inline bool eventually(const std::function<bool()>& condition) {
   const auto end = std::chrono::steady_clock::now() + kPatience;
   while (!condition()) {
@@ -68,7 +69,7 @@ class TestClient {
 
   bool connected() const { return connected_; }
 
-  /// False when the server has closed.
+  /// False if the server has closed the connection.
   bool send(std::string_view data) {
     while (!data.empty()) {
       const ssize_t count = ::send(socket_, data.data(), data.size(), MSG_NOSIGNAL);
@@ -78,13 +79,13 @@ class TestClient {
     return true;
   }
 
-  /// Closes with a reset instead of a polite end.
+  /// Closes the connection with a reset instead of an orderly shutdown.
   void reset() {
     const linger hard{1, 0};
     setsockopt(socket_, SOL_SOCKET, SO_LINGER, &hard, sizeof hard);
   }
 
-  /// Next answer; 1xx ones are returned like any other. `toHead`: no body follows.
+  /// The next answer; 1xx answers are returned like any other. `toHead`: no body follows.
   Answer answer(bool toHead = false) {
     Answer out;
     std::size_t end = 0;
@@ -118,7 +119,7 @@ class TestClient {
     return answer(head.rfind("HEAD", 0) == 0);
   }
 
-  /// Whether the server ends the connection, now or soon, having sent nothing more.
+  /// Whether the server ends the connection, now or soon, without sending anything more.
   bool ended() { return received_.empty() && !receive(); }
 
   Answer upgrade(const std::string& path, const std::string& more = "") {
@@ -147,7 +148,7 @@ class TestClient {
   }
   bool sendText(const std::string& text) { return send(frame(1, text)); }
 
-  /// Next message, pings included.
+  /// The next message, including pings.
   Message message() {
     if (!receiveAtLeast(2)) return {};
     Message out;
@@ -169,7 +170,7 @@ class TestClient {
     return out;
   }
 
-  /// The code of the close message, whatever else comes before it; 0 when the connection ends without.
+  /// The code of the close message, whatever comes before it; 0 if the connection ends without one.
   int closeCode() {
     for (;;) {
       const Message next = message();
