@@ -7,6 +7,22 @@ import type { Histogram } from './histogram';
 
 type Fetch = (id: string, channel: number, abort: AbortSignal) => Promise<Histogram>;
 
+/** Pauses before asking again while the server is busy, milliseconds. */
+const kPausesMs = [1000, 2000, 4000, 8000, 16000];
+
+/** Resolves after the pause, or when `abort` fires. */
+function pause(milliseconds: number, abort: AbortSignal): Promise<void> {
+  return new Promise((resolve) => {
+    const end = () => {
+      clearTimeout(timer);
+      abort.removeEventListener('abort', end);
+      resolve();
+    };
+    const timer = setTimeout(end, milliseconds);
+    abort.addEventListener('abort', end);
+  });
+}
+
 export class GradientHistograms {
   /** Keyed by the list entry, not by its id: after reloading the list, the same id may be another volume. */
   private readonly known = new WeakMap<DatasetInfo, Signal<Histogram | undefined>[]>();
@@ -36,10 +52,17 @@ export class GradientHistograms {
   }
 
   private async load(dataset: DatasetInfo, channel: number, abort: AbortSignal): Promise<void> {
-    try {
-      this.entry(dataset, channel).value = await this.fetchOne(dataset.id, channel, abort);
-    } catch (error) {
-      if (error instanceof ApiError && !abort.aborted) this.say(error.message);
+    for (let attempt = 0; ; ++attempt) {
+      try {
+        this.entry(dataset, channel).value = await this.fetchOne(dataset.id, channel, abort);
+        return;
+      } catch (error) {
+        if (!(error instanceof ApiError) || abort.aborted) return;
+        const wait = error.status === 503 ? kPausesMs[attempt] : undefined;
+        if (wait === undefined) return this.say(error.message);
+        await pause(wait, abort);
+        if (abort.aborted) return;
+      }
     }
   }
 }

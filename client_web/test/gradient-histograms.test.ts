@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-import { describe, expect, it } from 'vitest';
+import { describe, expect, it, vi } from 'vitest';
 import { ApiError, type DatasetInfo } from '../src/api';
 import { GradientHistograms } from '../src/gradient-histograms';
 import type { Histogram } from '../src/histogram';
@@ -81,6 +81,35 @@ describe('the histogram of the gradient', () => {
     expect(histograms.of(dataset, 0).value).toBeUndefined();
     histograms.want(dataset, 0);
     expect(asked).toHaveLength(2);
+  });
+
+  it('is asked for again while the server is busy, until it has come or is no longer wanted', async () => {
+    vi.useFakeTimers();
+    try {
+      const { asked, said, histograms } = setUp();
+      const dataset = datasetOf('brain');
+      const busy = () => new ApiError(503, { detail: 'too many long requests at once' });
+      const giveUp = histograms.want(dataset, 0);
+      asked[0]!.fail(busy());
+      await vi.advanceTimersByTimeAsync(999);
+      expect(asked).toHaveLength(1);
+      await vi.advanceTimersByTimeAsync(1);
+      asked[1]!.fail(busy());
+      await vi.advanceTimersByTimeAsync(0);
+      giveUp();
+      await vi.advanceTimersByTimeAsync(60_000);
+      expect(asked).toHaveLength(2);
+      histograms.want(dataset, 0);
+      for (let i = 2; i < 8; ++i) {
+        asked[i]!.fail(busy());
+        expect(said).toEqual([]);
+        await vi.advanceTimersByTimeAsync(20_000);
+      }
+      expect(asked).toHaveLength(8);
+      expect(said).toEqual(['too many long requests at once']);
+    } finally {
+      vi.useRealTimers();
+    }
   });
 
   it('leaves it to the connection to say that the server is lost', async () => {
