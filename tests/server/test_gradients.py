@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Histograms of gradients and opacity by the gradient, over HTTP. The volume is serving.py's: its voxels near the border
-are 0."""
+"""Histograms of gradients and opacity by the gradient, over HTTP. The volume is serving.py's: its voxels near the
+border are 0."""
 import os
 import sys
 import unittest

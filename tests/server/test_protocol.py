@@ -427,7 +427,7 @@ class Stream(unittest.IsolatedAsyncioTestCase):
             for _ in range(2):
                 frames = [m for m in await silent.until(lambda m: isinstance(m, Frame), ack=False)]
                 self.assertEqual(frames[-1].revision, 11)
-            self.assertGreater(silent.frames[2].frame, silent.frames[1].frame + 1)  # the frames in between were replaced
+            self.assertGreater(silent.frames[2].frame, silent.frames[1].frame + 1)  # frames in between were replaced
             await self.edit(busy, 5)
             self.assertFalse([m for m in await silent.sent_before_pong() if isinstance(m, Frame)])
 

@@ -29,7 +29,7 @@ def connect(server, session):
 
 
 async def read(socket, wanted):
-    """Reads messages until a wanted one; acknowledges frames. Both frames and texts are returned as dicts."""
+    """The first wanted message; acknowledges frames. Frames and texts are both dicts."""
     while True:
         message = await asyncio.wait_for(socket.recv(), 60)
         if isinstance(message, bytes):
