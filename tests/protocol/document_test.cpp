@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// PROTOCOL.md: its section on fields is what the table says, and its examples are what they claim to be.
+// PROTOCOL.md: its section on fields matches the table of fields, and its examples are valid.
 #include <gtest/gtest.h>
 
 #include <sstream>
@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-/// The contents of the fenced blocks that begin with this line.
+/// The contents of the fenced code blocks whose opening fence is followed by `fence`.
 std::vector<std::string> blocks(const std::string& fence) {
   std::istringstream lines(readText(protocolFile("PROTOCOL.md")));
   std::vector<std::string> found;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of protocol/ that tests read, and rewrite when asked.
+// Files of protocol/ that tests read, and rewrite on request.
 #pragma once
 #include <gtest/gtest.h>
 

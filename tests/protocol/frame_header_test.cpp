@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The frame header against bytes that were written by another program (Python's struct) from the
-// documentation; the TypeScript client checks the same file.
+// Compares the frame header with bytes that another program (Python's struct) wrote from the documentation;
+// the TypeScript client checks the same file.
 #include "protocol/frame_header.h"
 
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ FrameHeader headerOf(const json& fields) {
   return header;
 }
 
-/// NaN equals NaN here.
+/// As EXPECT_EQ, but NaN equals NaN.
 void expectEqual(FrameHeader a, FrameHeader b) {
   if (std::isnan(a.error) && std::isnan(b.error)) a.error = b.error = 0;
   EXPECT_EQ(a, b);

@@ -10,7 +10,7 @@
 namespace scolopax::protocol {
 namespace {
 
-/// The status of the error that reading ends with, 0 when it does not.
+/// The status of the error that parsing the text throws; 0 if it throws none.
 int refusal(std::string_view text, const Limits& limits = {}) {
   try {
     parseJson(text, limits);

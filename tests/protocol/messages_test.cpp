@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::json;
 
-/// The message of that name among the server's fixtures.
+/// The server's message with this name in the fixtures.
 json serverFixture(const std::string& name) {
   const json fixtures = readFixture("messages.json");
   for (const json& fixture : fixtures["server"]) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Patches: RFC 7396, list entries by index, pairs that exclude each other; and over random scenes.
+// Patches: RFC 7396, list entries by index, pairs that exclude each other, and properties over random scenes.
 #include "protocol/patch.h"
 
 #include <gtest/gtest.h>
@@ -183,8 +183,8 @@ TEST(MergePatchBetween, NamesTheEditedMemberOfAnObjectThatMayBeAbsent) {
             json::parse(R"({"gradientOpacity": {"range": [1, 3]}})"));
 }
 
-/// Sparse scenes with every field in and out, small lists, few different values, so that equal parts are
-/// common.
+/// Sparse scenes in which every field is sometimes present, with small lists and few different values, so
+/// that equal parts are common.
 class RandomScenes {
  public:
   explicit RandomScenes(unsigned seed) : random_(seed) {}
@@ -204,7 +204,7 @@ class RandomScenes {
     return out;
   }
 
-  /// A patch of the wire's own forms: nulls, whole lists, entries by index.
+  /// A patch in all forms of the protocol: nulls, whole lists, entries by index.
   json patch() {
     json out = scene();
     for (const char* name : {"dataset", "channels", "camera", "image"}) {

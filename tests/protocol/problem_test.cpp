@@ -31,7 +31,7 @@ TEST(ProblemJson, EchoesNoMoreThanALineOfWhatItWasSent) {
   EXPECT_EQ(shortened("1234\xC3\xBC"
                       "6789",
                       8),
-            "1234...");  // not in the middle of a character
+            "1234...");  // does not cut a character in half
   const std::string key(1 << 20, 'k');
   EXPECT_LT(problemJson(ProtocolError(422, "/" + key, key)).size(), 2000u);
 }

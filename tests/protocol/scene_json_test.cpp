@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reading scenes: defaults, every rule of "Exact meaning", and that each error names its field.
+// Reading scenes: defaults, every rule of "Exact meaning", and the field that each error names.
 #include "protocol/scene_json.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ using nlohmann::json;
 
 Scene parsed(const json& document) { return parseScene(document, server::rendererLists()); }
 
-/// The pointer of the error that reading ends with; "none" when it does not.
+/// The pointer of the error that reading throws; "none" if it throws none.
 std::string refusedAt(const json& document) {
   try {
     parsed(document);
@@ -109,7 +109,7 @@ TEST(ParseScene, ReadsEveryField) {
   EXPECT_EQ(scene.image.filter, "point");
   EXPECT_EQ(scene.stop.samples, 16777216U);
   EXPECT_EQ(scene.stop.error, 0.01);
-  // What was set comes back as it was; the other defaults beside it.
+  // The members that were set come back unchanged; the others have their defaults.
   json expected = document;
   expected["channels"][1].update(
       {{"visible", true},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is generated from the table of fields stands in the repository as it is generated; and the schema's
-// own words agree with what reading takes. SCOLOPAX_UPDATE=1 rewrites the files.
+// The files generated from the table of fields are up to date in the repository, and the schema agrees with
+// what the parser accepts. SCOLOPAX_UPDATE=1 rewrites the files.
 #include "protocol/schema.h"
 
 #include <gtest/gtest.h>
@@ -22,14 +22,14 @@ const json& schema() {
   return parsed;
 }
 
-/// The reference to an object, also of one that may be null; null where there is none.
+/// The reference to an object in a field's schema, even if the field may be null; null if there is none.
 json referenceIn(const json& field) {
   if (field.contains("$ref")) return field;
   const json choices = field.value("anyOf", json::array());
   return !choices.empty() && choices[0].contains("$ref") ? choices[0] : json();
 }
 
-/// Calls f(path of the field in a scene, its schema) for every field that is no object and no list of
+/// Calls f(path of the field in a scene, its schema) for every field that is neither an object nor a list of
 /// objects.
 template <class F>
 void forEachSchemaField(const json& object, const json::json_pointer& at, const F& f) {
@@ -47,7 +47,7 @@ void forEachSchemaField(const json& object, const json::json_pointer& at, const 
   }
 }
 
-/// A scene with one value set.
+/// A scene in which only one value is set.
 json sceneWith(const json::json_pointer& path, const json& value) {
   json scene = json::object();
   if (path.to_string().rfind("/channels", 0) == 0) scene["channels"] = json::array();

@@ -167,7 +167,7 @@ TEST(Api, RefusesOneRenderTooManyWith503) {
   };
   EXPECT_EQ(api.call("POST", "/api/v1/render", kSmallRender).status, 200);
   EXPECT_EQ(nested, 503);
-  EXPECT_EQ(api.call("POST", "/api/v1/render", kSmallRender).status, 200);  // the place is free again
+  EXPECT_EQ(api.call("POST", "/api/v1/render", kSmallRender).status, 200);  // the slot is free again
   EXPECT_EQ(headerOf(errorResponse(ProtocolError(503, "", "busy")), "Retry-After"), "1");
 }
 
@@ -257,7 +257,7 @@ TEST(Api, RefusesOneWaitingScriptTooManyWith429) {
   std::vector<std::thread> waiting;
   for (std::size_t i = 0; i < Session::kMaxPolls; ++i)
     waiting.emplace_back([&] { session->waitForFrame({}, 60s); });
-  // The render request lists who waits.
+  // The render request lists the waiting scripts.
   while (session->request().pollSamples.size() < Session::kMaxPolls) std::this_thread::yield();
   EXPECT_EQ(api.errorOf("GET", "/api/v1/sessions/" + session->id() + "/frame").first, 429);
   session->close("enough");
@@ -275,7 +275,7 @@ TEST(Api, RefusesAPickThatIsNone) {
   EXPECT_EQ(api.errorOf("GET", path + "?x=1&y=-1"), Expected(422, "/y"));
   EXPECT_EQ(api.errorOf("GET", path + "?x=1&y=1&x2=2&y2=48"), Expected(422, "/y2"));
   EXPECT_EQ(api.errorOf("GET", path + "?x=1&y=1&x2=2"), Expected(422, "/y2"));
-  EXPECT_EQ(api.errorOf("GET", path + "?x=1&y=1").first, 503);  // nobody renders, and there is no time
+  EXPECT_EQ(api.errorOf("GET", path + "?x=1&y=1").first, 503);  // nothing renders it, and the timeout is 0
 }
 
 TEST(Api, WeighsTheAcceptHeader) {

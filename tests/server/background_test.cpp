@@ -9,7 +9,7 @@
 namespace scolopax::server {
 namespace {
 
-/// As long as it lives, the system gives no thread: each asks for a stack that there is no room for.
+/// During its lifetime no thread can be created: each would need a stack for which there is no room.
 class NoThreads {
  public:
   NoThreads() {

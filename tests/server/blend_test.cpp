@@ -15,8 +15,8 @@ Image constant(int width, int height, float value) {
 }
 
 TEST(Blend, EnlargesALinearRampExactlyAboutTheCentre) {
-  // A pixel of 134 x 100 is as large as 3 of 400 x 300; its picture is 402 of those wide, one more on each
-  // side.
+  // A pixel of 134 x 100 is as large as 3 x 3 pixels of 400 x 300; the small picture is 402 of those wide,
+  // one more on each side.
   Image small{134, 100, {}};
   for (int y = 0; y < 100; ++y)
     for (int x = 0; x < 134; ++x)
@@ -41,7 +41,7 @@ TEST(Blend, TakesAllOfAPictureWithoutError) {
   Image image = constant(2, 2, 1);
   EXPECT_EQ(mixIn(constant(2, 2, 0), 0, &image), 1);
   EXPECT_EQ(image.pixels, constant(2, 2, 1).pixels);
-  EXPECT_EQ(mixIn(constant(2, 2, 1), 0.5, &image), 1);  // no difference: either will do
+  EXPECT_EQ(mixIn(constant(2, 2, 1), 0.5, &image), 1);  // no difference: any share is right
 }
 
 TEST(Blend, TakesNothingOfAPictureThatIsAllNoise) {
@@ -51,7 +51,7 @@ TEST(Blend, TakesNothingOfAPictureThatIsAllNoise) {
 }
 
 TEST(Blend, LooksAtAlphaAsErrorDoes) {
-  // Half of the squared difference is the error's: an equal share of both.
+  // The error explains half of the squared difference: equal shares of both.
   Image image{1, 1, {{0, 0, 0, 1}}};
   EXPECT_NEAR(mixIn({1, 1, {{0, 0, 0, 0}}}, std::sqrt(0.5 / 4), &image), 0.5, 1e-12);
 }
@@ -71,7 +71,7 @@ TEST(Blend, OfTwoNoisyPicturesIsBetterThanBothByTheLawOfIndependentErrors) {
       double squares = 0;
       for (const glm::vec4& p : image.pixels) squares += double(glm::dot(p, p));
       const double best = 1 / std::sqrt(1 / (error * error) + 1 / (errorBefore * errorBefore));
-      // 160,000 numbers know a variance to 0.4 % (1 sigma), and with it the share to at most 1.2 % (3 sigma).
+      // From 160,000 numbers the variance is known to 0.4 % (1 sigma), and so the share to 1.2 % (3 sigma).
       EXPECT_GT(std::sqrt(squares / (4 * 200 * 200)), 0.99 * best) << errorBefore << " " << error;
       EXPECT_LT(std::sqrt(squares / (4 * 200 * 200)), 1.01 * std::hypot(best, 0.012 * error))
           << errorBefore << " " << error;

@@ -79,7 +79,7 @@ TEST(DatasetStore, KeepsOnlyTheGradientsThatWereAskedForLast) {
   const std::size_t bytes = store.measuredGradients(*store.all()[0], 0, {})->sizeBytes();
   for (std::size_t i = 1; i < DatasetStore::kMostGradients; ++i)
     store.measuredGradients(*store.all()[i], 0, {});
-  EXPECT_NE(store.gradients(*store.all()[0], 0), nullptr);  // and so it is not the one that goes
+  EXPECT_NE(store.gradients(*store.all()[0], 0), nullptr);  // used last, so it is not the one evicted
   store.measuredGradients(*store.all().back(), 0, {});
   EXPECT_NE(store.gradients(*store.all()[0], 0), nullptr);
   EXPECT_EQ(store.gradients(*store.all()[1], 0), nullptr);

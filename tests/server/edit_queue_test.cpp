@@ -75,7 +75,7 @@ TEST(EditQueue, MakesAnEditWaitForItsMeasuringAndNobodyElse) {
   editor.patch(seedPatch(7));
   EXPECT_EQ(workshop.background.waiting.size(), 1u);
   EXPECT_EQ(editor.revision(), 1u);
-  // Another session, another client of this one, and the render thread go on.
+  // Another session, another client of this one, and the render thread are not delayed.
   other.patch(seedPatch(8));
   EXPECT_EQ(other.revision(), 2u);
   editor.session->patch(seedPatch(9), {});
@@ -87,7 +87,7 @@ TEST(EditQueue, MakesAnEditWaitForItsMeasuringAndNobodyElse) {
   EXPECT_EQ(editor.resolved()["integrator"]["seed"], 7) << "in their order";
   EXPECT_EQ(editor.resolved()["channels"][0]["gradientOpacity"]["range"].size(), 2u);
   EXPECT_TRUE(editor.failures.empty());
-  // It is known from now on.
+  // The measurement is known from now on.
   other.patch(gradientPatch());
   EXPECT_EQ(other.revision(), 3u);
   EXPECT_TRUE(workshop.background.waiting.empty());

@@ -12,7 +12,7 @@ using namespace std::chrono_literals;
 
 const RenderPolicy kPolicy;
 
-/// A film of revision 1 that was begun while edits arrived, and the request that made it.
+/// A film of revision 1 that was begun while edits arrived, and its render request.
 struct Edited {
   FilmState film;
   RenderRequest request;
@@ -30,15 +30,15 @@ TEST(FilmState, IsStaleForAnotherRevisionAndWhenAFinerPictureIsDue) {
   EXPECT_TRUE(e.film.stale(e.request));
   e.request.revision = 1;
   e.request.interactive = false;
-  EXPECT_FALSE(e.film.stale(e.request));  // it is whole
+  EXPECT_FALSE(e.film.stale(e.request));  // it has full size
   e.film.divisor = 2;
   EXPECT_TRUE(e.film.stale(e.request));
   e.film.small = false;
-  EXPECT_FALSE(e.film.stale(e.request));  // a step on the way, which is shown first
+  EXPECT_FALSE(e.film.stale(e.request));  // an intermediate size, which is shown first
   e.film.restShown = true;
   EXPECT_TRUE(e.film.stale(e.request));
   e.film = {};
-  EXPECT_TRUE(e.film.stale(e.request));  // there is none
+  EXPECT_TRUE(e.film.stale(e.request));  // there is no film
 }
 
 TEST(FilmState, KeepsThePassOfASmallPictureForAsLongAsItsShield) {
@@ -49,7 +49,7 @@ TEST(FilmState, KeepsThePassOfASmallPictureForAsLongAsItsShield) {
   e.request.revision = 2;
   EXPECT_TRUE(e.film.keepsPass(e.request, kPolicy, begin + kPolicy.shield - 1us));
   EXPECT_FALSE(e.film.keepsPass(e.request, kPolicy, begin + kPolicy.shield));
-  e.film.shown.revision = 1;  // it would only refine what is on screen
+  e.film.shown.revision = 1;  // the pass would only refine the picture on screen
   EXPECT_FALSE(e.film.keepsPass(e.request, kPolicy, begin));
 }
 

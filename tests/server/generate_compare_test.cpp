@@ -37,7 +37,7 @@ class Commands : public testing::Test {
     CLI::App app;
     addGenerateCommand(app);
     addCompareCommand(app);
-    std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes a vector
+    std::reverse(arguments.begin(), arguments.end());  // CLI11 expects a vector in reverse order
     testing::internal::CaptureStdout();
     try {
       app.parse(arguments);
@@ -63,7 +63,7 @@ TEST_F(Commands, GenerateLeavesTheFileBeforeWhenItCannotWriteAll) {
   getrlimit(RLIMIT_FSIZE, &before);
   const auto handler = std::signal(SIGXFSZ, SIG_IGN);
   rlimit small = before;
-  small.rlim_cur = 1024;  // as a disk that runs full
+  small.rlim_cur = 1024;  // like a disk that runs full
   setrlimit(RLIMIT_FSIZE, &small);
   EXPECT_THROW(run({"generate", "orbitals", file, "--size", "8"}), Error);
   setrlimit(RLIMIT_FSIZE, &before);

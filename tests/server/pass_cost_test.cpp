@@ -8,7 +8,7 @@
 namespace scolopax::server {
 namespace {
 
-/// Small pictures cost more by pixel.
+/// The true cost: small pictures cost more per pixel.
 double truth(std::uint64_t pixels) { return 5e-4 + 1e-7 * double(pixels); }
 
 TEST(PassCost, KnowsNothingBeforeTheFirstPass) {
@@ -31,7 +31,7 @@ TEST(PassCost, TellsTheFixedPartFromThatOfThePixelsByTwoSizes) {
   EXPECT_NEAR(cost.fixedSeconds(), 5e-4, 1e-9);
   EXPECT_NEAR(cost.secondsPerPixel(), 1e-7, 1e-12);
   EXPECT_NEAR(cost.seconds(700'000), truth(700'000), 1e-6);
-  // And keeps it while all passes are of one size, whose cost may drift.
+  // And keeps it while all passes have one size, even if their cost drifts.
   for (const double drift : {1.0, 1.2})
     for (int i = 0; i < 10; ++i) cost.add(50'000, drift * truth(50'000));
   EXPECT_NEAR(cost.fixedSeconds(), 5e-4, 1e-9);
@@ -43,7 +43,7 @@ TEST(PassCost, HasNoNegativePart) {
   dearer.add(1000, 1e-5);  // more than proportional
   dearer.add(100'000, 0.1);
   EXPECT_GE(dearer.fixedSeconds(), 0);
-  cheaper.add(1000, 0.1);  // the larger one was quicker
+  cheaper.add(1000, 0.1);  // the larger pass was faster
   cheaper.add(100'000, 0.01);
   for (const std::uint64_t pixels : {0, 1, 1000, 1'000'000}) {
     EXPECT_GE(dearer.seconds(pixels), 0);
@@ -114,7 +114,7 @@ TEST(PassCost, FollowsASceneThatCostsTenTimesAsMuchOrAsLittleWithinTwoPasses) {
 TEST(PassCost, TakesAPassThatIsLateToBeHalfDone) {
   PassCost cost;
   for (const std::uint64_t pixels : {20'000, 50'000}) cost.add(pixels, truth(pixels));
-  cost.addUnfinished(50'000, 0.5 * truth(50'000));  // not late: says nothing
+  cost.addUnfinished(50'000, 0.5 * truth(50'000));  // not late: no information
   EXPECT_NEAR(cost.seconds(50'000), truth(50'000), 1e-9);
   cost.addUnfinished(50'000, 0.075);
   EXPECT_NEAR(cost.seconds(50'000), 0.15, 1e-9);

@@ -52,7 +52,7 @@ TEST(PickArea, IsRefusedOutsideOfThePicture) {
   EXPECT_EQ(pointerOf({0, 0, {}, 3}), "/x2");
 }
 
-/// A session and what it is answered.
+/// A session and the answers to its picks.
 struct Picker {
   Workshop workshop;
   std::shared_ptr<Session> session = workshop.store.create(seedPatch(5));
@@ -61,7 +61,7 @@ struct Picker {
   void pick(const PickQuery& query = {1, 2}) {
     session->pick(query, [this](const PickAnswer& answer) { answers.push_back(answer); });
   }
-  /// At a voxel position of the fakes' volume.
+  /// A hit at a voxel position of the fake volume.
   Picked at(glm::dvec3 voxel) const { return {voxel, voxel, 1, 7.5}; }
 };
 
@@ -72,7 +72,7 @@ TEST(Pick, TellsTheValuesOfAllChannelsAlsoOfHiddenOnes) {
   picker.pick();
   picker.workshop.step();
   ASSERT_EQ(picker.answers.size(), 1u);
-  // Of 4 x 3 x 2 voxels, (2, 1, 1) is the one of index 18.
+  // Of 4 x 3 x 2 voxels, (2, 1, 1) has index 18.
   EXPECT_EQ(picker.answers[0].found, (json{{"revision", 2},
                                            {"hit", true},
                                            {"point", {2.0, 1.0, 1.0}},
@@ -188,7 +188,7 @@ TEST(Pick, ThatTakesLongLeavesThePictureEveryOtherTurn) {
   EXPECT_EQ(picker.workshop.control->passes.size(), passes + 3);
   picker.workshop.step();
   EXPECT_EQ(picker.answers.size(), 1u);
-  EXPECT_EQ(picker.workshop.control->picks.size(), 1u);  // it went on where it was
+  EXPECT_EQ(picker.workshop.control->picks.size(), 1u);  // the pick continued where it had stopped
 }
 
 TEST(Pick, BeginsAnewAfterAnEdit) {
@@ -238,7 +238,7 @@ TEST(Pick, OneTooManyIsRefusedWith429) {
   } catch (const ProtocolError& error) {
     EXPECT_EQ(error.status, 429);
   }
-  // One that waits in vain makes room again.
+  // A pick that waited in vain makes room again.
   picker.workshop.steps(2 * int(Session::kMaxPicks));
   EXPECT_EQ(picker.answers.size(), Session::kMaxPicks);
   for (std::size_t i = 0; i <= Session::kMaxPicks; ++i)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the render loop has others do: building scenes, adding up and encoding large pictures, and measuring
-// errors that take long.
+// Background work of the render loop: building scenes, accumulating and encoding large pictures, and
+// measuring errors that take long.
 #include "server/render_loop.h"
 
 #include <gtest/gtest.h>
@@ -52,7 +52,7 @@ TEST(RenderLoop, TriesAgainAfterASecondWhatOthersMemoryKeptItFrom) {
   workshop.clock.advance(Session::kRetryTime);
   workshop.steps(3);
   EXPECT_EQ(workshop.control->renderersMade, 2);
-  EXPECT_EQ(viewer->failures.size(), 1u);  // is not told again of a retry in vain
+  EXPECT_EQ(viewer->failures.size(), 1u);  // an unsuccessful retry is not reported again
   session->addViewer(second);
   workshop.steps(3);
   EXPECT_EQ(second->failures.size(), 1u);
@@ -90,7 +90,7 @@ TEST(RenderLoop, RendersTheSceneThatReplacedOneWhosePictureCouldNotBeMade) {
   };
   workshop.clock.advance(600ms);
   for (int i = 0; i < 4 && viewer->failures.empty(); ++i) {
-    // The picture is being made when the edit comes.
+    // The edit arrives while the picture is being made.
     if (i == 2) session->patch({{"image", {{"width", 64}, {"height", 64}}}}, {});
     workshop.background.finish();
     workshop.render.step();
@@ -114,7 +114,8 @@ TEST(RenderLoop, BuildsInTheBackgroundWhileOthersHaveTheirTurns) {
   other->addViewer(otherViewer);
   workshop.steps(10);
   EXPECT_EQ(workshop.background.waiting.size(), 1u);
-  EXPECT_EQ(workshop.control->passes, std::vector<std::uint32_t>(11, 1));  // one turn began the build
+  EXPECT_EQ(workshop.control->passes,
+            std::vector<std::uint32_t>(11, 1));  // one turn was spent on starting the build
   EXPECT_TRUE(otherViewer->frames.empty());
   const int wakes = workshop.renderWakes;
   workshop.background.finish();
@@ -148,7 +149,7 @@ TEST(RenderLoop, GivesUpABuildThatNobodyWaitsForAnyMore) {
   workshop.step();
   EXPECT_TRUE(workshop.last.abandoned);
   EXPECT_TRUE(viewer->failures.empty());
-  // Whoever comes next begins it anew.
+  // The next viewer starts the build again.
   workshop.background.atOnce = true;
   session->addViewer(viewer);
   workshop.steps(2);
@@ -207,7 +208,7 @@ TEST(RenderLoop, AddsUpAndMakesLargePicturesInTheBackground) {
   EXPECT_EQ(workshop.background.waiting.size(), 1u);
   EXPECT_EQ(viewer->frames.size(), before);
   EXPECT_GT(smallViewer->frames.size(), smallBefore);
-  // A sample is added, its picture made and encoded, before the next pass, which takes long, is at its end.
+  // A sample is added and its picture encoded before the next pass, which takes long, ends.
   workshop.clock.advance(600ms);
   small->close("");
   workshop.control->incompletePasses = 1000;
@@ -218,7 +219,7 @@ TEST(RenderLoop, AddsUpAndMakesLargePicturesInTheBackground) {
   EXPECT_EQ(viewer->frames.size(), before + 1);
 }
 
-/// A small picture of 16 samples whose error is being measured, until the background is told to finish it.
+/// A small picture of 16 samples whose error is being measured, until the background is told to finish.
 struct Measured {
   Workshop workshop;
   std::shared_ptr<FakeViewer> viewer = std::make_shared<FakeViewer>(), other = std::make_shared<FakeViewer>();
@@ -274,7 +275,7 @@ TEST(RenderLoop, GivesUpMeasuringTheErrorOfASceneThatAnEditReplaces) {
   test.workshop.background.finish();
   EXPECT_EQ(test.stopped, 1);
   test.workshop.steps(2);
-  EXPECT_FALSE(test.workshop.last.abandoned);  // no build was
+  EXPECT_FALSE(test.workshop.last.abandoned);  // no build was abandoned
   EXPECT_EQ(test.viewer->frames.back().info.revision, 2u);
   EXPECT_TRUE(test.viewer->failures.empty());
 }
@@ -311,7 +312,7 @@ TEST(EncodeLoop, EncodesALargePictureInTheBackgroundAndTheSmallOneAfterAnEditAtO
   }
   ASSERT_FALSE(viewer->frames.empty());
   EXPECT_EQ(viewer->frames.front().info.revision, 2u);
-  // The one before comes too late.
+  // The encoding of the picture before the edit ends too late.
   const auto count = viewer->frames.size();
   workshop.background.finish();
   workshop.encode.step();

@@ -30,7 +30,7 @@ TEST(RenderLoop, ShowsDoublingSampleCountsThenAFrameEveryHalfSecond) {
   const auto viewer = std::make_shared<FakeViewer>();
   session->addViewer(viewer);
   workshop.steps(40);
-  // 50 ms a pass: ten passes are half a second; powers of two come anyway and start the wait anew.
+  // 50 ms a pass: ten passes are half a second. Powers of two are always shown, and restart that wait.
   EXPECT_EQ(samplesOf(*viewer), (std::vector<std::uint32_t>{1, 2, 4, 8, 16, 26, 32}));
 }
 
@@ -43,7 +43,7 @@ TEST(RenderLoop, StopsAtTheSampleCountAndFlagsTheLastFrame) {
   EXPECT_EQ(samplesOf(*viewer), (std::vector<std::uint32_t>{1, 2, 3}));
   EXPECT_FALSE(viewer->frames[1].info.final);
   EXPECT_TRUE(viewer->frames[2].info.final);
-  // Nothing to do: no time to wake at except the session's end, which a viewer keeps away.
+  // Nothing to do: the only time to wake up is the session's end, which a viewer postpones.
   EXPECT_GE(*workshop.render.step(), workshop.hooks.now() + 300s);
 }
 
@@ -117,7 +117,7 @@ TEST(RenderLoop, KeepsTheFilmOfACancelledPass) {
   const auto viewer = std::make_shared<FakeViewer>();
   session->addViewer(viewer);
   workshop.steps(2);
-  // The edit interrupts the pass; undoing it within the pass leaves the scene the film is of.
+  // The edit interrupts the pass; undoing it within the pass restores the film's scene.
   workshop.control->duringPass = [&] {
     workshop.control->duringPass = nullptr;
     session->patch(seedPatch(5), {});
@@ -135,14 +135,14 @@ TEST(RenderLoop, GivesOthersTheirTurnWhileAPassIsTooLongForOneSlice) {
   const auto slow = workshop.store.create(json::object());
   const auto slowViewer = std::make_shared<FakeViewer>();
   slow->addViewer(slowViewer);
-  workshop.control->incompletePasses = 3;  // of the first session: it alone is there
+  workshop.control->incompletePasses = 3;  // of the first session, the only one so far
   workshop.steps(3);
   EXPECT_TRUE(slowViewer->frames.empty());
   const auto other = workshop.store.create(json::object());
   const auto otherViewer = std::make_shared<FakeViewer>();
   other->addViewer(otherViewer);
   workshop.steps(2);
-  EXPECT_FALSE(slowViewer->frames.empty());  // its pass went on where it had stopped
+  EXPECT_FALSE(slowViewer->frames.empty());  // its pass continued where it had stopped
   EXPECT_FALSE(otherViewer->frames.empty());
 }
 
@@ -193,7 +193,7 @@ TEST(RenderLoop, GetsFromSmallToWholeInStepsWhereAPassTakesLong) {
   workshop.step();
   session->patch(seedPatch(1), {});
   workshop.step();
-  EXPECT_EQ(viewer->frames.back().height, 19);  // 49 ms: less than this is not asked for
+  EXPECT_EQ(viewer->frames.back().height, 19);  // 49 ms: smaller pictures are not requested
   workshop.clock.advance(Session::kInteractiveTime);
   viewer->frames.clear();
   workshop.steps(4);
@@ -218,23 +218,23 @@ TEST(RenderLoop, MixesTheSmallPictureIntoTheNoisyWholeOneInTheProportionOfLeastE
   workshop.step();
   session->patch(seedPatch(1), {});
   workshop.steps(8);
-  // Green is the number of samples: the difference between two pictures, a quarter of it in the mean of r, g,
-  // b and alpha.
+  // Green is the number of samples. It is the only difference between two pictures, so the mean squared
+  // difference over r, g, b and alpha is a quarter of its square.
   const auto green = [&] { return double(session->latestFrame()->image->pixels[0].g); };
   ASSERT_EQ(viewer->frames.back().info.samples, 8u);
   ASSERT_TRUE(viewer->frames.back().info.interactive);
   workshop.clock.advance(Session::kInteractiveTime);
   workshop.step();
   EXPECT_EQ(viewer->frames.back().width, 400);
-  EXPECT_DOUBLE_EQ(green(), 8);  // one sample has an error of 1.5 sqrt(8), more than it differs
+  EXPECT_DOUBLE_EQ(green(), 8);  // one sample has an error of 1.5 sqrt(8), more than the difference
   workshop.step();
   const double share = 1 - 1.5 * 1.5 / (6 * 6 / 4.0);
   EXPECT_NEAR(green(), 8 * (1 - share) + 2 * share, 1e-5);
   EXPECT_FALSE(viewer->frames.back().info.interactive);
-  EXPECT_EQ(session->waitForFrame({}, 0ms), nullptr);  // a script gets samples alone
+  EXPECT_EQ(session->waitForFrame({}, 0ms), nullptr);  // a script gets only unmixed samples
   workshop.steps(8);
   ASSERT_TRUE(viewer->frames.back().info.final);
-  EXPECT_DOUBLE_EQ(green(), 9);  // and so is the final picture
+  EXPECT_DOUBLE_EQ(green(), 9);  // the final picture is unmixed, too
   EXPECT_NE(session->waitForFrame({}, 0ms), nullptr);
 }
 
@@ -282,7 +282,7 @@ TEST(RenderLoop, SleepsUntilQualityIsDueWhenTheSmallPictureIsDone) {
   workshop.step();
   EXPECT_TRUE(viewer->frames.back().info.final);
   EXPECT_FALSE(viewer->frames.back().info.interactive);
-  EXPECT_EQ(workshop.control->passes.size(), 3u);  // it was whole already: the film goes on
+  EXPECT_EQ(workshop.control->passes.size(), 3u);  // it had full size already: the film continues
 }
 
 TEST(RenderLoop, SharesTheTimeForAPassBetweenTheSessionsThatAreEdited) {
@@ -302,7 +302,7 @@ TEST(RenderLoop, SharesTheTimeForAPassBetweenTheSessionsThatAreEdited) {
   workshop.clock.advance(Session::kInteractiveTime);
   for (const auto& session : sessions) session->patch(seedPatch(2), {});
   workshop.step();
-  EXPECT_EQ(viewers[1]->frames.back().width, 100);  // 10 ms, one of four that have 50 together
+  EXPECT_EQ(viewers[1]->frames.back().width, 100);  // 10 ms: one of four sessions, which share 50 ms
 }
 
 TEST(RenderLoop, LetsSessionsTakeTurns) {
@@ -332,7 +332,7 @@ TEST(RenderLoop, GivesTheFirstPictureAfterAnEditItsTurnBeforeAllOthers) {
     workshop.step();
     EXPECT_EQ(workshop.control->passes.back(), seed);
     workshop.clock.advance(Session::kInteractiveTime);
-    workshop.step();  // somebody else's turn
+    workshop.step();  // another session's turn
   }
 }
 
@@ -377,7 +377,7 @@ TEST(RenderLoop, LetsTheFirstPictureAfterAnEditEndAndInterruptsWhatOnlyRefinesIt
     workshop.control->duringPass = nullptr;
     session->patch(seedPatch(3), {});
   };
-  workshop.steps(2);  // the second sample of seed 2 is not taken to its end
+  workshop.steps(2);  // the second sample of seed 2 is not completed
   EXPECT_EQ(workshop.control->passes, (std::vector<std::uint32_t>{0, 1, 2, 3}));
 }
 
@@ -390,7 +390,7 @@ TEST(RenderLoop, LetsAnEditedSessionStarveNobody) {
   std::uint32_t seed = 1;
   workshop.control->duringPass = [&] { busy->patch(seedPatch(++seed), {}); };
   workshop.steps(40);
-  // The first edit interrupts the first turn; from then on every second one is the other's.
+  // The first edit interrupts the first turn; from then on every second turn is the other session's.
   EXPECT_EQ(std::count(workshop.control->passes.begin(), workshop.control->passes.end(), 1000u), 19);
 }
 

@@ -9,7 +9,7 @@
 namespace scolopax::server {
 namespace {
 
-/// Of passes that cost so much by the pixel.
+/// The cost model after passes with this cost per pixel.
 PassCost costOf(double secondsPerPixel) {
   PassCost cost;
   cost.add(100'000, 100'000 * secondsPerPixel);
@@ -51,8 +51,7 @@ TEST(Resolution, ShowsAsMuchInASmallPictureAsInTheWholeAndLessThanAPixelMore) {
     }
 }
 
-/// A drag of the whole picture of `pixels`, whose passes take what `seconds` says; the divisors it goes
-/// through.
+/// The divisors during a drag of a whole picture of `pixels`, whose passes take `seconds(...)`.
 template <class Seconds>
 std::vector<double> drag(ResolutionPolicy& policy, std::uint64_t pixels, int pictures, Seconds&& seconds) {
   std::vector<double> divisors;
@@ -66,7 +65,7 @@ std::vector<double> drag(ResolutionPolicy& policy, std::uint64_t pixels, int pic
 
 const RenderPolicy kPolicy;  // 25 ms
 constexpr std::uint64_t kPixels = 944 * 770;
-/// Of a ray 274 ns at 61 x 50 and 99 ns at 944 x 770.
+/// Seconds of a pass: 274 ns a ray at 61 x 50 and 99 ns at 944 x 770.
 double measured(std::uint64_t pixels) { return 5.3e-4 + 0.98e-7 * double(pixels); }
 
 TEST(Resolution, ComesFromASmallPictureToTheOneThatFits) {
@@ -77,7 +76,7 @@ TEST(Resolution, ComesFromASmallPictureToTheOneThatFits) {
 }
 
 TEST(Resolution, IsNotSmallInVainWhereOthersUseTheProcessors) {
-  // Of a pass of any size, 18 or 30 ms are waiting for a processor.
+  // A pass of any size spends 18 or 30 ms waiting for a processor.
   for (const double waiting : {0.018, 0.030}) {
     ResolutionPolicy policy(kPolicy);
     drag(policy, kPixels, 40, [](std::uint64_t pixels, int) { return 0.1 + 1e-5 * double(pixels); });
@@ -100,7 +99,7 @@ TEST(Resolution, IsBackWithinTwoPicturesOfADisturbance) {
   drag(policy, kPixels, 12, [](std::uint64_t pixels, int) { return measured(pixels); });
   policy.passGivenUp(true, kPixels / 4, 0.075);
   const auto divisors = drag(policy, kPixels, 12, [](std::uint64_t pixels, int) { return measured(pixels); });
-  EXPECT_GE(divisors[0], 4);  // the picture that somebody waits for is to come soon all the same
+  EXPECT_GE(divisors[0], 4);  // the first picture after an edit must still come soon
   for (std::size_t i = 2; i < divisors.size(); ++i) EXPECT_LE(divisors[i], 2) << i;
 }
 
@@ -127,7 +126,7 @@ TEST(Resolution, BeginsWithASmallPictureAndWithAWholeOneWhereNobodyEdits) {
   ResolutionPolicy policy(kPolicy);
   EXPECT_EQ(policy.atRest(kPixels, std::nullopt), 1);
   EXPECT_EQ(policy.whileEdited(kPixels, 0), 4);
-  policy.passDone(false, kPixels, 0.39);  // another kind of pass is a first guess
+  policy.passDone(false, kPixels, 0.39);  // another kind of pass serves as a first guess
   EXPECT_EQ(policy.whileEdited(kPixels, 0), 4);
   policy.passDone(false, kPixels, 0.02);
   policy.passDone(false, kPixels, 0.02);

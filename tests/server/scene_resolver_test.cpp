@@ -16,7 +16,7 @@ using protocol::ProtocolError;
 
 SceneResolver resolver() { return {testing::smallStore(), {64, 1'000'000}}; }
 
-/// Status and pointer of the error that a scene gives.
+/// Status and pointer of the error that resolving a scene throws.
 std::pair<int, std::string> errorOf(const json& scene) {
   try {
     resolver().replace(scene);
@@ -160,7 +160,7 @@ TEST(SceneResolver, FillsInWhereClippingIs) {
   ASSERT_TRUE(clipped->render.crop);
   EXPECT_EQ(clipped->render.crop->low, glm::dvec3(-0.5, 1, -0.5));
   EXPECT_EQ(clipped->render.crop->regions, Crop::kInnermost);
-  // Sent back, it is the same scene.
+  // Sent back, the resolved scene is the same scene.
   EXPECT_EQ(resolver.replace(clipped->resolved)->render, clipped->render);
 }
 
@@ -205,7 +205,7 @@ SceneResolver resolverOfBalls() {
 
 json rangeFrom(double lo) { return {{"channels", {{{"range", {lo, 255}}, {"density", 1}}}}}; }
 
-/// From the camera to what it looks at.
+/// Distance from the eye to the target.
 double distanceOf(const ResolvedScene& scene) {
   return glm::length(scene.render.camera.eye - scene.render.camera.target);
 }
@@ -229,7 +229,7 @@ TEST(SceneResolver, KeepsItsViewWhileCurvesAreEditedUntilItIsAskedForAnew) {
   EXPECT_EQ(edited->render.camera, first->render.camera);
   EXPECT_EQ(resolve.patch(*edited, {{"channels", {{"0", {{"visible", false}}}}}})->render.camera,
             first->render.camera);
-  // Another angle of view shows the same.
+  // Another angle of view frames the same.
   const auto wide = resolve.patch(*edited, {{"camera", {{"fovY", 60}}}});
   EXPECT_EQ(wide->render.camera.target, first->render.camera.target);
   EXPECT_LT(distanceOf(*wide), distanceOf(*first));
@@ -250,8 +250,8 @@ TEST(SceneResolver, FramesAnotherDatasetByItself) {
   EXPECT_EQ(other->render.camera, resolve.replace({{"dataset", "other"}})->render.camera);
 }
 
-/// Values 0, 1, 4, 9 and 16 in a row, two world units apart, so that they are 1, 2, 4, 6 and 7 a voxel steep
-/// and the steepest 3.5 a world unit; and a data set that is flat.
+/// Values 0, 1, 4, 9 and 16 in a row, two world units apart: their gradients are 1, 2, 4, 6 and 7 per voxel,
+/// and the steepest 3.5 per world unit; and a data set without a gradient.
 SceneResolver resolverOfSquares() {
   Grid grid;
   grid.dims = {5, 1, 1};
@@ -269,10 +269,10 @@ SceneResolver resolverOfSquares() {
   return {std::make_shared<const DatasetStore>(std::move(datasets)), {64, 1'000'000}};
 }
 
-/// Where the automatic range of the squares ends when the last of `count` voxels that count is in this bin.
+/// End of the automatic range of resolverOfSquares() if `count` voxels count and the steepest is in this bin.
 double rangeEnd(int bin, int count) { return (bin + 1 - 0.005 * count) / 256 * 3.5; }
 
-/// The first channel, with opacity that rises from lo to hi, and by the gradient.
+/// A scene whose first channel has opacity that rises from lo to hi, and opacity by the gradient.
 json steepFrom(double lo, double hi) {
   return {{"channels", {{{"range", {lo, hi}}, {"gradientOpacity", json::object()}}}}};
 }
@@ -291,7 +291,7 @@ TEST(SceneResolver, LeavesOpacityByTheGradientOutWhereItIsNotAskedFor) {
 
 TEST(SceneResolver, ChoosesTheRangeOfGradientsByWhatHasOpacity) {
   const auto resolve = resolverOfSquares();
-  // 0, 1 and 4; 9 has no opacity. Of 7 a voxel, 4 is in bin 146.
+  // 0, 1 and 4 have opacity, 9 has none. A gradient of 4 per voxel, of at most 7, is in bin 146.
   const auto gentle = resolve.replace(steepFrom(9, 0));
   EXPECT_EQ(steepnessOf(gentle).rangeLo, 0);
   EXPECT_DOUBLE_EQ(steepnessOf(gentle).rangeHi, rangeEnd(146, 3));
@@ -300,12 +300,12 @@ TEST(SceneResolver, ChoosesTheRangeOfGradientsByWhatHasOpacity) {
             (json{{"range", {0, steepnessOf(gentle).rangeHi}}, {"points", {{0, 0}, {1, 1}}}}));
   EXPECT_FALSE(gentle->render.channels[1].gradientOpacity);
   EXPECT_DOUBLE_EQ(steepnessOf(resolve.replace(steepFrom(4, 16))).rangeHi, rangeEnd(255, 2));
-  // Nothing has opacity: all voxels. Nothing is steep: any range.
+  // If nothing has opacity, all voxels count. If there is no gradient, the range is [0, 1].
   EXPECT_DOUBLE_EQ(steepnessOf(resolve.replace(steepFrom(100, 200))).rangeHi, rangeEnd(255, 5));
   json flat = steepFrom(0, 10);
   flat["dataset"] = "flat";
   EXPECT_EQ(resolve.replace(flat)->resolved["channels"][0]["gradientOpacity"]["range"], json({0, 1}));
-  // Sent back, it is the same scene.
+  // Sent back, the resolved scene is the same scene.
   EXPECT_EQ(resolve.replace(gentle->resolved)->render, gentle->render);
   EXPECT_EQ(resolve.replace(gentle->resolved)->resolved, gentle->resolved);
 }

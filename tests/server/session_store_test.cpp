@@ -55,9 +55,9 @@ TEST(SessionStore, KeepsTheFilmBetweenTwoViewers) {
   resumed->addViewer(viewer);
   workshop.encode.step();
   workshop.steps(100);
-  EXPECT_EQ(viewer->frames.front().info.samples, 8u);  // the last that had been shown
+  EXPECT_EQ(viewer->frames.front().info.samples, 8u);  // the last frame that had been shown
   EXPECT_EQ(viewer->frames.back().info.samples, 100u);
-  EXPECT_EQ(workshop.control->passes.size(), 100u);  // none of them twice
+  EXPECT_EQ(workshop.control->passes.size(), 100u);  // no sample was rendered twice
 }
 
 TEST(SessionStore, RefusesOneSessionTooManyWith503) {

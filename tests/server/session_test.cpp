@@ -109,7 +109,7 @@ TEST(Session, SaysInEachFrameWhichOfTheViewersPatchesItContains) {
   session->patch(seedPatch(1), {id, 41, {}});
   workshop.control->duringPass = [&] {
     workshop.control->duringPass = nullptr;
-    session->patch(seedPatch(2), {id, 42, {}});  // comes too late for this pass
+    session->patch(seedPatch(2), {id, 42, {}});  // too late for this pass
   };
   workshop.step();
   workshop.step();
@@ -166,7 +166,7 @@ TEST(Session, GivesAScriptTheFrameItWaitsFor) {
   Workshop workshop;
   const auto session = workshop.store.create(json::object());
   EXPECT_EQ(session->waitForFrame({}, 0ms), nullptr);
-  // The waiting script is what makes the session render: another thread drives the loops meanwhile.
+  // The session renders only because a script waits, so another thread drives the loops meanwhile.
   std::atomic<bool> done{false};
   std::thread loops([&] {
     while (!done) workshop.step();
@@ -197,9 +197,9 @@ TEST(Session, MakesARevisionWhenAovsAreAskedForFirst) {
   session->addViewer(viewer);
   workshop.steps(5);
   ASSERT_TRUE(viewer->frames.back().info.final);
-  EXPECT_EQ(session->waitForFrame({0, 1, true}, 0ms), nullptr);  // that one has none
+  EXPECT_EQ(session->waitForFrame({0, 1, true}, 0ms), nullptr);  // that frame has no AOVs
   workshop.steps(8);
-  // Nothing better may follow a final frame of one revision, so these are of the next.
+  // Nothing better may follow a final frame of a revision, so these frames are of the next one.
   EXPECT_EQ(viewer->frames.back().info.revision, 2u);
   const auto frame = session->waitForFrame({0, 1, true}, 0ms);
   ASSERT_NE(frame, nullptr);
@@ -238,7 +238,7 @@ TEST(Session, TellsViewersAndScriptsThatASceneCannotBeRendered) {
   workshop.steps(3);
   EXPECT_EQ(viewer->failures, std::vector<std::string>{"macrocell: expected more memory"});
   EXPECT_THROW(session->waitForFrame({}, 0ms), Error);
-  // The next edit is another chance.
+  // The next edit makes the session try again.
   workshop.control->failure.clear();
   session->patch(seedPatch(1), {});
   workshop.steps(1);

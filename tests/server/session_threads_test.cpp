@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Everything at once, for the thread sanitizer: what holds must hold under any interleaving.
+// Everything at once, for the thread sanitizer: the invariants must hold under any interleaving.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -85,11 +85,11 @@ TEST(SessionThreads, KeepRevisionsApartWhateverComesTogether) {
       if (const auto frame = session->waitForFrame({after, 1}, 10ms)) after = frame->info.number;
   });
   for (auto& thread : threads) thread.join();
-  // Edits are over: the last revision is shown.
+  // After the edits, the last revision is shown.
   const auto last = session->waitForFrame({0, 2}, 60s);
   ASSERT_NE(last, nullptr);
   EXPECT_EQ(last->info.revision, 181u);
-  session->close("the end");  // after which nothing is offered
+  session->close("the end");  // nothing is offered after this
 
   ASSERT_FALSE(watching->frames.empty());
   std::uint32_t number = 0, revision = 0;
@@ -100,7 +100,7 @@ TEST(SessionThreads, KeepRevisionsApartWhateverComesTogether) {
     number = frame.info.number;
     revision = frame.info.revision;
   }
-  // Each edit was told, in order.
+  // The viewer was told of each edit, in order.
   ASSERT_EQ(watching->scenes.size(), 180u);
   for (std::size_t i = 0; i < watching->scenes.size(); ++i) EXPECT_EQ(watching->scenes[i].first, i + 2);
 }

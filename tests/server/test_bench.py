@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`scolopax bench`: its numbers agree with each other and with what is known of the methods."""
+"""`scolopax bench`: its numbers are consistent with each other and with the known properties of the methods."""
 import json
 import os
 import unittest
@@ -30,7 +30,7 @@ class Bench(CommandTest):
         for method in ("superposed", "cumulative", "sync-dda", "n-dda"):
             # 16 times the samples: about a quarter of the error, or less.
             self.assertLess(points[method, 64, None]["rmse"], 0.4 * points[method, 4, None]["rmse"])
-            # Every point is measured from its first sample on.
+            # Times include every sample of a point.
             self.assertEqual(points[method, 64, None]["samplesTimed"], 64)
             self.assertEqual(points[method, 4, None]["samplesTimed"], 4)
         self.assertLess(points["raymarch", 64, 0.25]["rmse"], points["raymarch", 64, 2]["rmse"])
@@ -38,7 +38,7 @@ class Bench(CommandTest):
         self.assertEqual([t["method"] for t in told["timeToError"]],
                          ["superposed", "cumulative", "sync-dda", "n-dda", "raymarch", "hybrid"])
         for t in told["timeToError"][:4]:
-            # A tenth of the error of a tracker takes a hundred times the samples.
+            # For a tenth of the error, a tracker needs a hundred times the samples.
             self.assertAlmostEqual(t["secondsToRmse0.001"], 100 * t["secondsToRmse0.01"], delta=t["secondsToRmse0.01"])
 
     def test_takes_its_truth_from_a_picture_of_the_same_pixel_centres(self):
@@ -57,7 +57,7 @@ class Bench(CommandTest):
                 told[name] = json.load(file)["points"][0]
         self.assertEqual(told["read"]["rmse"], told["rendered"]["rmse"])
         self.assertNotIn("rmse", told["times"])
-        # Rays beside the truth's would make errors as large as the picture's detail, about 0.1.
+        # Rays other than those of the reference picture would give errors as large as its detail, about 0.1.
         self.assertLess(told["smaller"]["rmse"], 3 * told["rendered"]["rmse"])
         done = self.bench("--truth", truth[2])
         self.assertEqual(done.returncode, 1)
@@ -79,7 +79,7 @@ class Bench(CommandTest):
             self.skipTest("a sanitizer's heap is not counted")
         memory = {m["macrocell"]: m for m in told["memory"]}
         self.assertEqual(memory[2]["data"], 2 * 16**3)
-        # 8^3 cells of two channels, at least two bytes each; a 64th of them.
+        # 8^3 cells of two channels, at least two bytes each; with larger cells a 64th of that.
         self.assertGreaterEqual(memory[2]["macrocells"], 8**3 * 2 * 2)
         self.assertLess(memory[8]["macrocells"], memory[2]["macrocells"])
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Histograms of gradients and opacity by them, from outside. The volume is serving.py's: no border of it is near what is
-not 0."""
+"""Histograms of gradients and opacity by the gradient, over HTTP. The volume is serving.py's: its voxels near the
+border are 0."""
 import os
 import sys
 import unittest
@@ -12,13 +12,13 @@ from serving import Server  # noqa: E402
 
 
 def value_at(channel, x, y, z):
-    """Of the volume: a ball of radius 16/3 and the cube of the 7^3 voxels less than 4 from the centre."""
+    """A voxel's value: a ball of radius 16/3, and the cube of the 7^3 voxels less than 4 from the centre."""
     inside = (x - 8)**2 + (y - 8)**2 + (z - 8)**2 < (16 / 3)**2 if channel == 0 else max(map(abs, (x - 8, y - 8, z - 8))) < 4
     return ((200, 100) if inside else (0, 0))[channel]
 
 
 def steepness_at(channel, *voxel):
-    """Central differences."""
+    """|gradient| by central differences."""
     def shifted(axis, by):
         return value_at(channel, *(v + by * (i == axis) for i, v in enumerate(voxel)))
     return sum(((shifted(axis, 1) - shifted(axis, -1)) / 2)**2 for axis in range(3))**0.5
@@ -75,7 +75,7 @@ class Gradients(unittest.TestCase):
         chosen = edit({"gradientOpacity": {}})
         self.assertEqual((chosen["range"][0], chosen["points"]), (0, [[0, 0], [1, 1]]))
         self.assertAlmostEqual(chosen["range"][1], (last + share) / 256 * most)
-        # Under another curve all voxels count, which are less steep.
+        # With another curve all voxels would count, whose gradients are smaller; the chosen range stays.
         bent = edit({"range": [-1, 200], "gradientOpacity": {"points": [[0, 1], [1, 0]]}})
         self.assertEqual(bent, {"range": chosen["range"], "points": [[0, 1], [1, 0]]})
         anew = edit({"gradientOpacity": {"range": None}})
@@ -88,7 +88,7 @@ class Gradients(unittest.TestCase):
 
 class Waiting(unittest.IsolatedAsyncioTestCase):
     async def test_edits_wait_in_their_order_for_what_they_need_and_other_sessions_do_not(self):
-        with Server() as server:  # that has measured nothing
+        with Server() as server:  # a server that has measured nothing yet
             scene = {"image": {"width": 64, "height": 48}}
             sessions = [server.json("POST", "/api/v1/sessions", {"scene": scene})[1] for _ in range(2)]
             async with Viewer(server, sessions[0]) as viewer, Viewer(server, sessions[1]) as other:

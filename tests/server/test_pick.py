@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What protocol/PROTOCOL.md says of picking, on serving.py's volume: channel 0 a ball of 200, 1 a box of 100."""
+"""Picking as specified in protocol/PROTOCOL.md, on serving.py's volume: channel 0 is a ball of 200, 1 a box of 100."""
 import asyncio
 import os
 import sys
@@ -24,8 +24,8 @@ def tearDownModule():
 
 
 class Picks(unittest.IsolatedAsyncioTestCase):
-    """Of the ball and the box around voxel (8, 8, 8), seen from +z by parallel rays: the pixel in the middle shows the
-    centre, and one pixel is a quarter of a voxel."""
+    """Picks of the ball and the box around voxel (8, 8, 8), seen from +z with parallel rays: the middle pixel shows the
+    centre, and a pixel is a quarter of a voxel wide."""
     BOX = [{"visible": False}, {"range": [25, 75], "density": 1e4, "name": "box"}]
 
     def scene(self, channels):
@@ -71,7 +71,7 @@ class Picks(unittest.IsolatedAsyncioTestCase):
 
     def test_of_a_rectangle_are_the_voxels_of_the_face(self):
         session = self.begin(self.scene(self.BOX))
-        told = self.pick(session, "x=56&y=56&x2=25&y2=25")  # four voxels to every side of the middle
+        told = self.pick(session, "x=56&y=56&x2=25&y2=25")  # four voxels on every side of the middle
         self.assertFalse(told["truncated"])
         voxels = [tuple(hit["voxel"]) for hit in told["hits"]]
         self.assertEqual(len(set(voxels)), len(voxels))

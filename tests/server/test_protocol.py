@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What protocol/PROTOCOL.md says, checked by a client that was written from it (protocol_client.py), also over a line
-that is slow. Only counts decide, no times; the volume is serving.py's: channel 0 a ball of 200, 1 a box of 100."""
+"""Checks the server against protocol/PROTOCOL.md with a client that was written from it (protocol_client.py), also over
+a slow connection. Only counts are checked, no times. The volume is serving.py's: channel 0 is a ball of 200, 1 a box
+of 100."""
 import asyncio
 import json
 import os
@@ -33,7 +34,7 @@ def tearDownModule():
 
 
 def begin(test, scene):
-    """A session that ends with the test."""
+    """Creates a session that ends with the test."""
     status, session = call_json(server, "POST", "/api/v1/sessions", {"scene": scene})
     test.assertEqual(status, 201, session)
     cleanup = getattr(test, "addAsyncCleanup", None)
@@ -247,7 +248,7 @@ class Sessions(unittest.TestCase):
         for kind, magic in PICTURES.items():
             status, headers, picture = call(server, "GET", f"{wait}?format={kind.replace('x-', '').split('/')[1]}")
             self.assertEqual((status, headers["Content-Type"], picture[:len(magic)]), (200, kind, magic))
-        status, headers, _ = call(server, "GET", f"{wait}?minSamples=1000")  # the final one is enough
+        status, headers, _ = call(server, "GET", f"{wait}?minSamples=1000")  # the final picture is enough
         self.assertEqual((status, headers["Scolopax-Samples"]), (200, "6"))
         told = call_json(server, "GET", path_of(session))[1]
         self.assertEqual((told["id"], told["revision"], told["viewers"]), (session["id"], 2, 0))
@@ -261,7 +262,7 @@ class Sessions(unittest.TestCase):
         self.assertEqual((status, headers["Scolopax-Final"]), (200, "1"))
         color = session["scene"]["channels"][0]["color"]
         first = tuple(int(color[i:i + 2], 16) for i in (1, 3, 5))
-        # The picture is done, but nothing was recorded: it begins anew, as a revision of its own.
+        # The picture is final but was made without AOVs: it restarts, as a new revision.
         status, headers, picture = call(server, "GET", f"{wait}?aov=channel&format=png&minSamples=4")
         self.assertEqual((status, headers["Scolopax-Samples"], headers["Scolopax-Revision"]), (200, "4", "2"))
         self.assertEqual(png_colors(picture), {first, (0, 0, 0)})
@@ -294,11 +295,11 @@ class Stream(unittest.IsolatedAsyncioTestCase):
     SCENE = {"image": SMALL, "stop": ENDLESS}
 
     async def edit(self, viewer, count):
-        """Edits of which each is in a frame before the next is made."""
+        """Makes edits, each only when the previous one has appeared in a frame."""
         for _ in range(count):
             number = await viewer.patch({"camera": {"fovY": 30 + len(viewer.frames) % 30}})
             await viewer.frame(lambda frame: frame.patch == number)
-        await viewer.frame()  # so that others were given those before
+        await viewer.frame()  # so that the earlier frames have been offered to the other viewers
 
     async def closed(self, viewer):
         with self.assertRaises(websockets.ConnectionClosed) as caught:
@@ -366,7 +367,7 @@ class Stream(unittest.IsolatedAsyncioTestCase):
         self.assertEqual(await self.refused(session["stream"]), 404)
 
     async def test_shows_each_edit_in_frames_of_one_revision_alone(self):
-        # Nothing but a background of one of two colours: of one size, there are then two pictures.
+        # Only the background, in one of two colours: so there are only two different pictures of a size.
         hidden = {"image": {**SMALL, "background": "#c04010"}, "stop": ENDLESS, "channels": [{"visible": False}] * 2}
         session = begin(self, hidden)
         async with Viewer(server, session) as viewer:
@@ -406,10 +407,10 @@ class Stream(unittest.IsolatedAsyncioTestCase):
                 self.assertEqual(read, (200, {"revision": revision, "scene": scene}), patch)
             self.assertEqual(scene, session["scene"])
             frame = await other.frame(lambda frame: frame.revision == revision)
-            self.assertEqual(frame.patch, 0)  # none of its own
+            self.assertEqual(frame.patch, 0)  # it contains no patch of this viewer
             await editor.frame(lambda frame: frame.revision == revision)
             await asyncio.to_thread(call, server, "PATCH", path_of(session, "/scene"), {"camera": {"fovY": 12}})
-            for viewer in (editor, other):  # the editor's first
+            for viewer in (editor, other):  # for the editor this is the first `scene` message
                 self.assertEqual((await viewer.text("scene"))["revision"], revision + 1)
 
     async def test_sends_two_frames_without_ack_and_then_the_newest(self):
@@ -422,11 +423,11 @@ class Stream(unittest.IsolatedAsyncioTestCase):
             await self.edit(busy, 5)
             self.assertFalse([m for m in await silent.sent_before_pong() if isinstance(m, Frame)])
 
-            await silent.send("ack", frame=silent.frames[1].frame)  # for both
+            await silent.send("ack", frame=silent.frames[1].frame)  # acknowledges both
             for _ in range(2):
                 frames = [m for m in await silent.until(lambda m: isinstance(m, Frame), ack=False)]
                 self.assertEqual(frames[-1].revision, 11)
-            self.assertGreater(silent.frames[2].frame, silent.frames[1].frame + 1)  # those between were replaced
+            self.assertGreater(silent.frames[2].frame, silent.frames[1].frame + 1)  # frames in between were replaced
             await self.edit(busy, 5)
             self.assertFalse([m for m in await silent.sent_before_pong() if isinstance(m, Frame)])
 
@@ -435,7 +436,7 @@ class Stream(unittest.IsolatedAsyncioTestCase):
         async with Viewer(server, session) as hidden, Viewer(server, session) as busy:
             await hidden.frame()
             await hidden.send("view", visible=False)
-            for _ in range(2):  # what was being made then may still come
+            for _ in range(2):  # frames that were being made then may still arrive
                 await hidden.sent_before_pong(ack=True)
                 await self.edit(busy, 1)
             await hidden.sent_before_pong(ack=True)
@@ -459,7 +460,7 @@ class Stream(unittest.IsolatedAsyncioTestCase):
         async with Viewer(server, first) as viewer:
             before = await viewer.frame(lambda frame: frame.samples >= 16)
         async with Viewer(server, second) as viewer:
-            await viewer.send("resume", token=second["token"])  # the session that it has
+            await viewer.send("resume", token=second["token"])  # the viewer's current session
             self.assertFalse([m for m in await viewer.sent_before_pong(ack=True) if not isinstance(m, Frame)])
             await viewer.send("resume", token=first["token"])
             hello = await viewer.text("hello")
@@ -474,9 +475,9 @@ class Stream(unittest.IsolatedAsyncioTestCase):
 
 
 class SlowLine(unittest.IsolatedAsyncioTestCase):
-    """Frames here are some tens of kB of noise."""
+    """Viewers over a slow connection. Frames are some tens of kB of noise."""
     SCENE = {"image": {"width": 320, "height": 240}, "stop": ENDLESS}
-    TEXT = 4096  # bytes, and more, of the messages that are no frames
+    TEXT = 4096  # upper bound of the bytes of all other messages
 
     async def test_of_200_kB_a_second_shows_the_last_edit_within_few_frames(self):
         session = begin(self, self.SCENE)
@@ -490,7 +491,7 @@ class SlowLine(unittest.IsolatedAsyncioTestCase):
                     await asyncio.sleep(0.02)
                 before = len(viewer.frames)
                 await asyncio.wait_for(reading, PATIENCE)
-                # Two on their way and at most two that were made before the server read the last edit.
+                # Two frames on their way, and at most two that were made before the server read the last edit.
                 self.assertLessEqual(len(viewer.frames) - before, 5)
                 self.assertEqual(viewer.frames[-1].revision, 81)
                 self.assertLessEqual(proxy.most_held, 2 * max(frame.bytes for frame in viewer.frames) + self.TEXT)
@@ -513,7 +514,7 @@ class SlowLine(unittest.IsolatedAsyncioTestCase):
                 last.set_result(direct.frames[-1].revision)
                 await proxy.allow(1 << 30)
                 await asyncio.wait_for(reading, PATIENCE)
-                # At least 64 pictures were made, and the line had room for the bytes of 8 and the first one's rest.
+                # At least 64 pictures were made; the connection passed the bytes of 8 and the rest of the first one.
                 self.assertLessEqual(received, 16)
                 self.assertLessEqual(len(slow.frames) - received, 3)  # two on their way and the newest
                 self.assertEqual(slow.frames[-1].revision, 65)

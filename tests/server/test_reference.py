@@ -35,7 +35,7 @@ class Reference(CommandTest):
             told = self.picture("reference", name, "--samples-per-axis", strata)
             noise.append(float(told.split("noise of the picture ")[1].split()[0]))
         self.assertLess(noise[1], 0.5 * noise[0])
-        # The difference of the two has the noise of both.
+        # The difference of the two pictures contains the noise of both.
         expected = (noise[0] ** 2 + noise[1] ** 2) ** 0.5
         self.assertLess(0.7 * expected, self.rmse("a.exr", "b.exr"))
         self.assertGreater(1.4 * expected, self.rmse("a.exr", "b.exr"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`scolopax render`: what its options ask for."""
+"""`scolopax render`: its options have their effect."""
 import json
 import unittest
 
@@ -17,14 +17,14 @@ class Render(CommandTest):
             return json.load(file)
 
     def test_takes_a_step_that_the_error_asked_for_allows(self):
-        # With a step for another error the estimate, bias and all, would stay above this one for ever.
+        # With a step chosen for another error, the estimate, which includes the bias, would never reach this error.
         steps = []
         for error in (2e-2, 5e-4):
             told = self.stats("--error", str(error), "--seconds", "60")
             self.assertEqual(told["method"], "raymarch")
             self.assertLessEqual(told["estimatedError"], error)
             steps.append(told["step"])
-            # A scene that asks for it gets the same.
+            # A scene that sets this error gets the same step.
             self.assertEqual(self.stats("--samples", "1", "--set", f"stop.error={error}")["step"], steps[-1])
         self.assertLess(steps[1], steps[0])
 

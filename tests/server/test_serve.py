@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The program from outside: options, HTTP, limits, streams, resuming, stopping."""
+"""Tests of the program as a process: options, HTTP, limits, streams, resuming, stopping."""
 import asyncio
 import json
 import os
@@ -29,7 +29,7 @@ def connect(server, session):
 
 
 async def read(socket, wanted):
-    """Messages until one is wanted; frames are acknowledged as they come. A frame is a dict, a text as well."""
+    """The first wanted message; acknowledges frames. Frames and texts are both dicts."""
     while True:
         message = await asyncio.wait_for(socket.recv(), 60)
         if isinstance(message, bytes):
@@ -111,7 +111,7 @@ class CommandLine(unittest.TestCase):
                 used = bad if arguments[0] != "render" else {**bad, "SCOLOPAX_THREADS": "1"}
                 result = run(*arguments, environment=used)
                 self.assertEqual((result.returncode, result.stderr), (0, ""), arguments)
-            # The flag wins over the environment.
+            # The option takes precedence over the environment.
             render = ["render", "--data", volume, "-o", picture, "--samples", "1"]
             result = run(*render, environment={"SCOLOPAX_THREADS": "abc"})
             self.assertEqual(result.returncode, 2)
@@ -141,7 +141,7 @@ class CommandLine(unittest.TestCase):
     def test_a_place_that_cannot_be_written_to_is_refused_before_rendering(self):
         with tempfile.TemporaryDirectory() as folder:
             picture = os.path.join(folder, "a.png")
-            data = ["--data", "/nowhere/brain.nrrd"]  # is not even opened
+            data = ["--data", "/nowhere/brain.nrrd"]  # must not even be opened
             for out, place in ((["-o", "/nowhere/x.png"], "/nowhere/x.png"), (["-o", folder + "/x.png/y.png"], "y.png"),
                                (["-o", picture, "--stats", "/nowhere/s.json"], "/nowhere/s.json"),
                                (["-o", picture, "--stats", folder], folder)):
@@ -346,9 +346,9 @@ class Http(unittest.TestCase):
         call = ("POST", "/api/v1/render", RENDER)
         try:
             for _ in range(600):
-                if self.server.call(*call)[0] == 503:  # both places are taken
+                if self.server.call(*call)[0] == 503:  # both slots are taken
                     break
-                for i, client in enumerate(clients):  # one may have come while this call had its place
+                for i, client in enumerate(clients):  # a client may have been refused while this call had its slot
                     if select.select([client], [], [], 0)[0]:
                         client.close()
                         clients[i] = begin()
@@ -499,7 +499,7 @@ class Ending(unittest.TestCase):
         with Server("--keep-session", "0.2") as server:
             session = server.json("POST", "/api/v1/sessions", {})[1]["id"]
             for _ in range(600):
-                # Asking for metrics does not touch the session.
+                # A request for metrics does not keep the session alive.
                 if "scolopax_sessions 0" in server.call("GET", "/metrics")[2].decode():
                     break
                 threading.Event().wait(0.1)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""TLS from outside: pages, calls and streams over it, and what is said of files that cannot serve."""
+"""TLS: pages, calls and streams over it, and the errors for unusable certificate files."""
 import asyncio
 import http.client
 import json
@@ -23,7 +23,7 @@ RENDER = {"image": {"width": 48, "height": 32}, "stop": {"samples": 4}}
 
 
 def make_certificate(folder, name, *key):
-    """A self-signed certificate for 127.0.0.1 and its key, as files."""
+    """Makes a self-signed certificate for 127.0.0.1 and its key, as files."""
     files = [os.path.join(folder, f"{name}.{kind}.pem") for kind in ("cert", "key")]
     subprocess.run(["openssl", "req", "-x509", "-nodes", "-days", "2", "-subj", "/CN=127.0.0.1",
                     "-addext", "subjectAltName=IP:127.0.0.1", "-newkey", *(key or ("rsa:2048",)),
@@ -62,7 +62,7 @@ class Tls(unittest.TestCase):
             cookie = answer.getheader("Set-Cookie")
             self.assertEqual("; Secure" in cookie, secure)
             answer.read()
-            # The same connection goes on, and the cookie opens the page's calls.
+            # The connection stays open, and the cookie authorises the page's calls.
             connection.request("GET", "/api/v1/datasets", headers={"Cookie": cookie.split(";")[0]})
             self.assertEqual(connection.getresponse().status, 200)
             connection.close()
@@ -89,7 +89,7 @@ class Tls(unittest.TestCase):
                         frame = frame_header(message)
                         await stream.send(json.dumps({"type": "ack", "frame": frame["frame"]}))
                 self.assertEqual((frame["width"], frame["height"]), (48, 32))
-                # Texts both ways at once.
+                # Text messages in both directions at once.
                 for _ in range(20):
                     for i in range(200):
                         await stream.send(json.dumps({"type": "ping", "id": i}))
@@ -112,7 +112,7 @@ class Tls(unittest.TestCase):
         plain.close()
         self.assertEqual(self.server.call("GET", "/healthz", token=False)[0], 200)
         silent.settimeout(60)
-        self.assertEqual(silent.recv(1000), b"")  # its time for the handshake is up
+        self.assertEqual(silent.recv(1000), b"")  # the time limit of the handshake has passed
         silent.close()
 
     def test_it_stops_in_order(self):

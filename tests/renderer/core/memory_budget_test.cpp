@@ -17,7 +17,7 @@ std::shared_ptr<MemoryBudget> budgetOf(std::uint64_t mebibytes) {
   return std::make_shared<MemoryBudget>(mebibytes * kMiB);
 }
 
-/// Code and message of what is refused.
+/// Code and message of the Error by which a request is refused.
 std::pair<ErrorCode, std::string> refusal(const std::shared_ptr<MemoryBudget>& budget,
                                           std::uint64_t mebibytes) {
   try {
@@ -62,7 +62,7 @@ TEST(MemoryBudget, StaysAsItWasWhenAShareCannotGrow) {
   EXPECT_THROW(share.resize(200 * kMiB), Error);
   EXPECT_EQ(share.bytes(), 60 * kMiB);
   EXPECT_EQ(budget->used(MemoryUse::films), 60 * kMiB);
-  share.resize(90 * kMiB);  // its own does not count against it
+  share.resize(90 * kMiB);  // its previous size does not count against it
 }
 
 TEST(MemoryBudget, LeavesTheLastQuarterToOrdinaryShares) {

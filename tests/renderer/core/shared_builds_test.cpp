@@ -11,7 +11,7 @@ namespace {
 
 using Builds = SharedBuilds<int, int>;
 
-/// Holds a build until it is opened or the build is asked to stop.
+/// Blocks a build until it is opened or the build is requested to stop.
 class Gate {
  public:
   Builds::Result pass(const std::stop_token& stop) {
@@ -86,7 +86,7 @@ TEST(SharedBuilds, EndABuildWhenTheLastWhoWaitedHasGone) {
   two.join();
   EXPECT_EQ(firstCode, ErrorCode::cancelled);
   EXPECT_EQ(secondCode, ErrorCode::cancelled);
-  EXPECT_EQ(gate.stopped, gate.entered);  // whether the second found the first's build or began its own
+  EXPECT_EQ(gate.stopped, gate.entered);  // whether the second joined the first's build or began its own
 }
 
 TEST(SharedBuilds, BeginNothingForWhoeverHasGoneAlready) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The negative controls of the statistical tests: mistakes of the kinds that renderers have, sown on purpose,
-// each of which the comparison with the reference must notice.
+// The negative controls of the statistical tests: typical defects of renderers, seeded on purpose, each of
+// which the comparison with the reference must detect.
 //
-// Two it cannot notice. One scrambling shared by all pixels leaves every pixel's expected value as it is;
-// LowDiscrepancy.LeavesNoiseWithoutStructure sees it. A sample that is lost, or counted twice, and divided by
-// the number that is left, is as unbiased as any; CpuRenderer.KeepsASampleIndependentOfHowManyCameBefore sees
+// It cannot detect two. One scrambling shared by all pixels does not change the expected value of any pixel;
+// LowDiscrepancy.LeavesNoiseWithoutStructure detects it. A sample that is lost, or counted twice, is unbiased
+// if the sum is divided by the actual count; CpuRenderer.KeepsASampleIndependentOfHowManyCameBefore detects
 // it.
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ using kernel::SceneView;
 /// Shadow rays are those that begin inside the box: the eyes of the test scenes are outside.
 bool isShadowRay(kernel::Interval inside) { return !(inside.enter > 0); }
 
-/// Shading sees the light where it is, shadow rays look for it on the other side.
+/// Shading uses the right direction of the light; shadow rays go the opposite way.
 struct FlippedShadows {
   template <class Blend>
   static std::optional<kernel::Collision> track(const SceneView& scene, kernel::Ray ray,
@@ -42,7 +42,7 @@ struct FlippedShadows {
   }
 };
 
-/// Shadow rays do not see the last channel.
+/// Shadow rays ignore the last channel.
 struct ShadowsWithoutTheLastChannel {
   template <class Blend>
   static std::optional<kernel::Collision> track(const SceneView& scene, const kernel::Ray& ray,
@@ -56,7 +56,7 @@ struct ShadowsWithoutTheLastChannel {
   }
 };
 
-/// Shadow rays that see nothing within half a voxel: the usual cure for noise that is none.
+/// Shadow rays ignore the first half voxel: a common but wrong remedy for noise.
 struct ShadowsThatBeginLate {
   template <class Blend>
   static std::optional<kernel::Collision> track(const SceneView& scene, const kernel::Ray& ray,
@@ -68,7 +68,7 @@ struct ShadowsThatBeginLate {
   }
 };
 
-/// Shadow rays see what planes and crop cut away.
+/// Shadow rays include what clip planes and crop cut away.
 struct ShadowsOfWhatIsClipped {
   template <class Blend>
   static std::optional<kernel::Collision> track(SceneView scene, const kernel::Ray& ray,
@@ -92,7 +92,7 @@ class Defect : public testing::Test {
     made_.scene.shadows = shadows;
     expected_ = reference::renderReference(*made_.volume, made_.scene, 1);
   }
-  /// The scene drawn by this kernel, with a view that `change` has spoilt.
+  /// Compares the scene rendered by this kernel, with a defect that `change` puts into the view.
   template <class Tracker, class Blend, class Features = LightFeatures<false, false>, class Change>
   ::testing::AssertionResult passes(Change&& change) {
     const auto found = replicateKernel<Analog<Tracker>, Blend, Features>(made_.volume, made_.scene, change);
@@ -102,19 +102,19 @@ class Defect : public testing::Test {
   ::testing::AssertionResult passes() {
     return passes<Tracker, Blend, Features>([](SceneView&) {});
   }
-  /// The backend drawing another scene than the reference did.
+  /// Compares the backend's picture of a changed scene with the reference's of the original.
   ::testing::AssertionResult passesWith(const std::function<void(Scene&)>& change) {
     Scene spoilt = made_.scene;
     change(spoilt);
     return haveMean(replicate(made_.volume, spoilt, Method::superposed), made_.scene, expected_);
   }
-  /// Copies what the view points at, so that a test can write to it.
+  /// Copies the channels that the view points to, so that a test can modify them.
   std::vector<kernel::ChannelView>& ownChannels(SceneView& view) {
     channels_.assign(view.channels, view.channels + view.channelCount);
     view.channels = channels_.data();
     return channels_;
   }
-  /// Bounds of all channels together, and of each, that a test can write to.
+  /// Copies of the bounds, of all channels together and of each, that a test can modify.
   struct Bounds {
     std::vector<kernel::TotalCode> totals;
     std::vector<kernel::BoundTable> tables;
@@ -181,7 +181,7 @@ TEST_F(Defect, OfTheBoundOfMaxInBlendModeDensityIsFound) {
 }
 
 TEST_F(Defect, OfTheOrderThatListing3PrintsIsFound) {
-  // Channels that alternate between thin and dense along the ray, out of step with each other.
+  // Channels that alternate between thin and dense along the ray, with different phases.
   const glm::ivec3 dims(16, 16, 32);
   const auto layers = [](int phase) {
     return [phase](int, int, int z) { return (z / 4 + phase) % 2 ? 255 : 4; };
@@ -267,7 +267,7 @@ TEST_F(Defect, OfHalfAVoxelIsFound) {
       (passes<kernel::Superposed, kernel::BlendDensity>([](SceneView& view) { view.rays.origin0 += 0.5f; })));
 }
 
-/// A plane of all channels, one of the first, and regions that are not a box.
+/// A clip plane for all channels, one for the first channel, and regions that do not form a box.
 void clipOften(Scene& scene, const Grid& grid) {
   const glm::dvec3 centre(grid.worldFromVoxel * glm::dvec4(glm::dvec3(grid.dims - 1) * 0.5, 1));
   scene.clip = {{centre, {0.2, -1, 0.4}, {}}, {centre, {1, 0.3, -0.2}, std::vector<int>{0}}};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every tracker against the reference, and against each other, in blend modes, lights and scenes: pairwise,
-// or with SCOLOPAX_STATISTICS above 1 in all combinations.
+// Every tracker against the reference, and against the others, in blend modes, lights and scenes: every pair
+// of settings or, with SCOLOPAX_STATISTICS above 1, all combinations.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -56,7 +56,7 @@ TEST(Settings, OfTheQuickTestsHaveEveryPairOfSceneBlendModeAndLight) {
 
 class PaperFigure3 : public testing::TestWithParam<BlendMode> {};
 
-/// The picture that is written down in closed form.
+/// The expected picture in closed form.
 reference::ReferenceImage figure3(const Scene& scene) {
   reference::ReferenceImage expected{{scene.width, scene.height, {}}, {}, 0};
   for (int y = 0; y < scene.height; ++y)

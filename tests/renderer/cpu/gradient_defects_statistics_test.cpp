@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mistakes in opacity by the gradient, sown on purpose, each of which the comparison with the reference must
-// notice: what defects_statistics_test.cpp is for the rest.
+// Defects in opacity by the gradient, seeded on purpose, each of which the comparison with the reference must
+// detect; defects_statistics_test.cpp has the other defects.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -20,7 +20,7 @@ using kernel::SceneView;
 using Unlit = kernel::LightFeatures<false, false>;
 using Shadowed = kernel::LightFeatures<false, true>;
 
-/// Shadow rays, which begin inside the box, take opacity as if there were no factor.
+/// Shadow rays, which begin inside the box, use the opacity without the factor.
 struct ShadowsWithoutFactors {
   template <class Blend>
   static std::optional<kernel::Collision> track(SceneView scene, const kernel::Ray& ray,
@@ -60,7 +60,7 @@ class GradientDefect : public testing::Test {
         replicateKernel<kernel::RayMarch, kernel::BlendDensity, Unlit>(made_.volume, made_.scene, change);
     return compareImages(found.pictures[0], expected_.image).rmse;
   }
-  /// Calls change(factor) for the view's channels, of which it makes copies.
+  /// Calls change(factor) for copies of the view's channels.
   auto inFactors(std::function<void(kernel::GradientFactorView&)> change) {
     return [this, change](SceneView& view) {
       channels_.assign(view.channels, view.channels + view.channelCount);
@@ -93,7 +93,7 @@ TEST_F(GradientDefect, OfAFactorThatIsIgnoredIsFound) {
   const auto ignored = inFactors([](kernel::GradientFactorView& factor) { factor.curve.count = 0; });
   EXPECT_FALSE(trackerPasses(ignored));
   EXPECT_GT(marcherError(ignored), 10 * kQuadratureError);
-  // In the bounds as well, which otherwise cut off what is too much.
+  // In the bounds as well, which would otherwise limit the excess.
   Scene without = made_.scene;
   for (ChannelAppearance& channel : without.channels) channel.gradientOpacity.reset();
   EXPECT_FALSE(haveMean(replicate(made_.volume, without, Method::superposed), made_.scene, expected_));
@@ -134,8 +134,7 @@ TEST_F(GradientDefect, OfARangeOfStoredValuesIsFound) {
 
 TEST_F(GradientDefect, OfARangeThatIsShiftedIsFound) {
   use(TestScene::lumps);
-  EXPECT_FALSE(
-      trackerPasses(inFactors([](kernel::GradientFactorView& factor) { factor.offset += 0.1f; })));
+  EXPECT_FALSE(trackerPasses(inFactors([](kernel::GradientFactorView& factor) { factor.offset += 0.1f; })));
 }
 
 }  // namespace

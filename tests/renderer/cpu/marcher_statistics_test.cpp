@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What quadrature owes: convergence to the reference as its step shrinks, lit and unlit, in every blend mode;
-// and a true word on how far it is from there.
+// Quadrature must converge to the reference as its step shrinks, lit and unlit, in every blend mode, and its
+// error estimate must be right.
 #include <gtest/gtest.h>
 
 #include "renderer/engine/step_bias.h"
@@ -31,7 +31,8 @@ TEST_P(Quadrature, ApproachesTheReferenceAsItsStepShrinks) {
                            expected)
           .rmse;
     };
-    // Of order 2 where the field is smooth; at voxels' faces it is not, and the order is between 1 and 2.
+    // The order is 2 where the field is smooth. At voxels' faces it is not, so the overall order is between 1
+    // and 2.
     const double coarse = errorAt(2), middle = errorAt(1), fine = errorAt(0.25);
     EXPECT_LT(middle, coarse / 2) << "lit " << lit;
     EXPECT_LT(fine, middle / 4) << "lit " << lit;
@@ -62,7 +63,7 @@ TEST_P(Estimates, OfBiasIsThatOfTheReference) {
       scene.shading = scene.shadows = lit;
       scene.step = step;
       const Image expected = reference::renderReference(*made->volume, scene, 1).image;
-      // What two pictures with noise of their own have in common.
+      // The common part of two pictures with independent noise.
       const Image one = renderSamples(made->volume, scene, 128);
       scene.seed = 1;
       const Image other = renderSamples(made->volume, scene, 128);
@@ -75,7 +76,7 @@ TEST_P(Estimates, OfBiasIsThatOfTheReference) {
       const auto launcher = makeCpuLauncher(0);
       const RenderPlan plan(made->volume, scene);
       const double found = estimateBias(*launcher, plan);
-      // Quadrature ends at a transmittance of 1e-4, which no step tells.
+      // Quadrature stops at a transmittance of 1e-4, an error that does not depend on the step.
       EXPECT_GT(found, truth / 3 - 1e-4) << "lit " << lit << " step " << step;
       EXPECT_LT(found, truth * 3 + 1e-4) << "lit " << lit << " step " << step;
     }
@@ -107,7 +108,7 @@ TEST(Automatic, StaysBelowTheErrorThatIsAskedFor) {
   }
 }
 
-/// Detail finer than a voxel, in black: nothing of it shows but alpha.
+/// Detail finer than a voxel, in black: only alpha shows it.
 VolumeAndScene blackNoise() {
   const glm::ivec3 dims(12, 12, 12);
   std::uint32_t state = 5;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays that are marched many at a time give the bits of marching one after the other.
+// Rays marched many at a time give the same bits as rays marched one by one.
 #include "renderer/cpu/ray_packets.h"
 
 #include <gmock/gmock.h>
@@ -23,7 +23,7 @@ namespace {
 
 using namespace test;
 
-/// What is drawn at random about a scene comes from here.
+/// The random choices for a scene.
 struct Draw {
   std::mt19937 random;
   explicit Draw(unsigned seed) : random(seed) {}
@@ -35,7 +35,7 @@ struct Draw {
   }
 };
 
-/// Blobs in much nothing, with noise; floats have voxels that are not finite.
+/// Blobs in mostly empty space, with noise; floats include voxels that are not finite.
 template <class T>
 ChannelSource blobs(Draw& draw, glm::ivec3 dims) {
   glm::dvec3 centres[3];
@@ -98,7 +98,7 @@ Light anyLight(Draw& draw, const Grid& grid) {
   return light;
 }
 
-/// Planes of all channels and of some, and regions of crop.
+/// Random clip planes of all or some channels, and crop regions.
 void clipAnyhow(Draw& draw, const Volume& volume, Scene& scene) {
   const glm::dvec3 size(volume.grid().dims);
   const auto inside = [&] {
@@ -116,7 +116,7 @@ void clipAnyhow(Draw& draw, const Volume& volume, Scene& scene) {
   scene.crop = Crop{glm::min(a, b), glm::max(a, b), draw.of({Crop::kInnermost, 0x5a3c96bu, 0x3ffdfffu})};
 }
 
-/// Opacity by the gradients that blobs have, of some channels.
+/// Opacity by the gradient for some channels, with ranges typical of the blobs.
 void factorAnyhow(Draw& draw, Scene& scene) {
   for (ChannelAppearance& a : scene.channels) {
     if (draw.upTo(1)) continue;
@@ -130,7 +130,7 @@ void factorAnyhow(Draw& draw, Scene& scene) {
   }
 }
 
-/// From outside or within, in any light.
+/// A random scene seen from outside or inside, in any light.
 Scene anyScene(Draw& draw, const Volume& volume) {
   Scene scene = frontScene(volume, 1 + draw.upTo(40), 1 + draw.upTo(40));
   if (draw.upTo(3) > 0) scene.camera = framingCamera(volume.grid(), 35, 1);
@@ -153,7 +153,7 @@ Scene anyScene(Draw& draw, const Volume& volume) {
   return scene;
 }
 
-/// Some pixels, what they cost and what their rays met first.
+/// Pixels, their costs, and the first collisions of their rays.
 struct Picture {
   std::vector<glm::vec4> pixels;
   std::vector<kernel::SampleCost> cost;
@@ -165,7 +165,7 @@ class RayPackets : public testing::TestWithParam<InstructionSet> {
   void SetUp() override {
     if (!available(GetParam())) GTEST_SKIP() << "this processor does not have the instruction set";
   }
-  /// False where packets leave the scene to single rays.
+  /// False if packets leave the scene to single rays.
   bool take(const std::shared_ptr<const Volume>& volume, const Scene& scene) {
     scene_ = scene;
     plan_.emplace(volume, scene);
@@ -175,7 +175,7 @@ class RayPackets : public testing::TestWithParam<InstructionSet> {
   }
   std::size_t count() const { return std::size_t(scene_.width) * std::size_t(scene_.height); }
 
-  /// Of the pixels that are not done; the others get 3.
+  /// Renders the pixels that are not done; the others get 3.
   Picture packets(std::uint32_t sample, std::vector<std::uint8_t> done) const {
     const std::atomic<bool> never = false;
     Picture picture{std::vector<glm::vec4>(count(), glm::vec4(3)), std::vector<kernel::SampleCost>(count()),
@@ -206,7 +206,7 @@ class RayPackets : public testing::TestWithParam<InstructionSet> {
     });
     return picture;
   }
-  /// Compares by value: a zero is as good as another. Counts pixels that show something, and opaque ones.
+  /// Compares by value, so that 0 equals -0. Counts pixels that are not empty, and opaque ones.
   void expectSameBits(std::uint32_t sample, const std::vector<std::uint8_t>& done) {
     const Picture found = packets(sample, done), expected = single(sample, done);
     for (std::size_t i = 0; i < count(); ++i) {
@@ -242,7 +242,7 @@ TEST_P(RayPackets, HaveTheBitsOfOneRayAfterTheOther) {
     const auto volume = std::make_shared<const Volume>(
         gridOf(dims, {draw.between(0.5, 2), draw.between(0.5, 2), draw.between(0.5, 2)}), std::move(sources));
     ASSERT_TRUE(take(volume, anyScene(draw, *volume)));
-    // Some pixels are done: they stay as they are.
+    // Some pixels are done: they must stay unchanged.
     std::vector<std::uint8_t> done(count());
     for (std::size_t i = 0; i < done.size(); i += 7) done[i] = 1;
     for (const std::uint32_t sample : {0u, 70u}) {
@@ -263,7 +263,7 @@ TEST_P(RayPackets, SeeNothingBesideTheVolumeHoweverSteepTheirWay) {
   scene.method = Method::raymarch;
   scene.channels[0] = solid(0.1);
   scene.camera.eye = {0, -100, 7.5};
-  scene.camera.target = {1e-40, 0, 7.5};  // the way to the planes along x is beyond floats
+  scene.camera.target = {1e-40, 0, 7.5};  // the distance to the planes along x overflows a float
   scene.camera.up = {0, 0, 1};
   scene.camera.orthoHeight = 30;
   ASSERT_TRUE(take(volume, scene));
@@ -272,8 +272,8 @@ TEST_P(RayPackets, SeeNothingBesideTheVolumeHoweverSteepTheirWay) {
 }
 
 TEST_P(RayPackets, CountEveryRaysSegmentsForItself) {
-  // Every second ray is in cells of matter all the way, which is more segments than a ray may have; beside it
-  // one has half of them, near or far.
+  // Every second ray is in cells with matter all the way, which is more segments than a ray may have; the ray
+  // next to it has half as many, near or far.
   const glm::ivec3 dims(8, 8, 400);
   const auto volume = volumeOf(gridOf(dims, {1, 1, 40}), channelOf<std::uint8_t>(dims, [](int, int y, int z) {
                                  return ((y + 1) / 2 % 2 == 0) == (z < 200) ? 200 : 0;
@@ -298,13 +298,13 @@ TEST_P(RayPackets, CountEveryRaysSegmentsForItself) {
     else
       whole += expected.pixels[i].a > 0;
   }
-  EXPECT_EQ(whole, 3 * 4);  // rows 1, 3 and 5 are between cells of one kind, the last in that of row 6
+  EXPECT_EQ(whole, 3 * 4);  // rows 1, 3 and 5 lie between cells of the same kind, the last in that of row 6
   EXPECT_EQ(cut, 5 * 4);
 }
 
 TEST_P(RayPackets, CountRaysThatEndInTheirLastSegmentAsWhole) {
-  // Nearly nothing up to a wall, which from ray to ray stands half a step nearer to the eye and in the middle
-  // one is met after as many segments as a ray may have. Single rays look some segments ahead.
+  // Almost nothing up to a wall, which is half a step nearer to the eye from ray to ray; the middle ray
+  // reaches it after as many segments as a ray may have. Single rays look some segments ahead.
   const glm::ivec3 dims(8, 8, 400);
   const double spacing = 40, step = 0.01;
   const double wall = kernel::kMaxSegments * step / spacing - 0.5;  // in voxels; the box begins at -1/2

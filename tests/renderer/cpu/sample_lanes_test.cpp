@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sampling many points at once gives the bits of sampling them one by one, in every instruction set.
+// Sampling many points at once gives the same bits as sampling them one by one, in every instruction set.
 #include "tests/support/sample_lanes.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ class LaneSampling : public testing::TestWithParam<InstructionSet> {
   }
 };
 
-/// Random bits: all values that a type has, with floats' infinities and NaNs among them.
+/// Random bits: all values of a type, including infinities and NaNs of floats.
 VoxelBuffer randomVoxels(ScalarType type, glm::ivec3 dims, std::mt19937& random) {
   VoxelBuffer voxels(type, std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z));
   for (std::size_t i = 0; i < voxels.sizeBytes(); ++i) voxels.data()[i] = std::byte(random());
@@ -35,7 +35,7 @@ VoxelBuffer randomVoxels(ScalarType type, glm::ivec3 dims, std::mt19937& random)
   return voxels;
 }
 
-/// A view of channels over one volume, every one of which can be seen.
+/// A view of the channels of one volume, all of them visible.
 struct Channels {
   Volume volume;
   std::vector<kernel::ChannelView> views;
@@ -81,7 +81,7 @@ TEST_P(LaneSampling, HasTheBitsOfSamplingOneChannelAtOnePointAfterTheOther) {
       const Channels made(dims, types, random);
       const std::uint32_t all = (1u << types.size()) - 1;
       for (int round = 0; round < 100; ++round) {
-        // Along a ray, of which parts lie outside, on faces and on voxels; or anywhere, which costs nothing.
+        // Along a ray with parts outside, on faces and on voxels; or anywhere.
         glm::vec3 points[kMostLanes];
         const glm::vec3 size(dims), origin = glm::vec3(within(random), within(random), within(random)) * size;
         const glm::vec3 step = glm::vec3(within(random), within(random), within(random)) * 0.6f;
@@ -105,7 +105,7 @@ TEST_P(LaneSampling, HasTheBitsOfSamplingOneChannelAtOnePointAfterTheOther) {
             }
             const float expected = kernel::sampleStored(made.views[std::size_t(n)], dims, points[i]);
             ++compared;
-            if (!std::isfinite(expected)) {  // a NaN is as good as another
+            if (!std::isfinite(expected)) {  // any NaN will do
               ASSERT_FALSE(std::isfinite(found));
               continue;
             }
@@ -120,7 +120,7 @@ TEST_P(LaneSampling, HasTheBitsOfSamplingOneChannelAtOnePointAfterTheOther) {
 }
 
 TEST_P(LaneSampling, ReachesVoxelsBeyondIndicesOf32Bits) {
-  // 2^32 voxels, of which the memory that is touched is all that is taken.
+  // 2^32 voxels; only the memory that is touched is allocated.
   const glm::ivec3 dims(1 << 12, 1 << 12, (1 << 8) + 2);
   const std::size_t slice = std::size_t(dims.x) * std::size_t(dims.y);
   VoxelBuffer voxels(ScalarType::u8, slice * std::size_t(dims.z));

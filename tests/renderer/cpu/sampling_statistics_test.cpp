@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What low-discrepancy sampling must keep and must bring: the expected picture, noise without structure, and
-// less of it than independent samples have.
+// Low-discrepancy sampling must keep the expected picture, leave noise without structure, and have less noise
+// than independent samples.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -39,9 +39,9 @@ class LowDiscrepancy : public testing::Test {
 };
 
 TEST_F(LowDiscrepancy, HasTheExpectedPictureOfTheReference) {
-  // Squared deviation of the mean over replicates from the reference, in units of what their spread allows: 1
-  // with a standard deviation of about sqrt(2 / 2304) times a correlation of components below 4: 0.12. A bias
-  // of the size of one replicate's noise / 8 makes it 2.
+  // Squared deviation of the mean over replicates from the reference, in units of its expected value by their
+  // spread: 1, with a standard deviation of about sqrt(2 / 2304) times a correlation of components below 4:
+  // 0.12. A bias of 1/8 of one replicate's noise makes it 2.
   constexpr int kReplicates = 32, kSamples = 16;
   for (const Method method : kTrackers) {
     scene_.method = method;
@@ -75,7 +75,7 @@ TEST_F(LowDiscrepancy, LeavesLessNoiseThanIndependentSamples) {
     }
     return sum;
   };
-  // One sample is as good as any other; with more there must be a gain. (How much depends on the scene:
+  // With one sample there is no gain; with more there must be one. (Its size depends on the scene:
   // tests/bench measures it.) Over 4 x 2304 pixels a ratio is known to about 4 %.
   const auto gain = [&](int samples) {
     return squaredError(Sampling::independent, samples) / squaredError(Sampling::lowDiscrepancy, samples);
@@ -87,8 +87,8 @@ TEST_F(LowDiscrepancy, LeavesLessNoiseThanIndependentSamples) {
 }
 
 TEST_F(LowDiscrepancy, LeavesNoiseWithoutStructure) {
-  // Deviations of neighbouring pixels, in units of what independent samples would have, are uncorrelated: the
-  // sum of 2304 products within 5 of its standard deviations. One scrambling for all pixels fails at once.
+  // Deviations of neighbouring pixels, in units of those of independent samples, are uncorrelated: the sum of
+  // 2304 products is within 5 standard deviations. One scrambling for all pixels fails at once.
   for (const int samples : {1, 4, 16}) {
     const Image image = renderSamples(volume_, scene_, samples);
     const auto deviation = [&](int x, int y) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light in thin media, where a stratum of absorbed light reaches far: what is lit and what lies in shadow
-// must be lit where it is. Every method, in every blend mode and light.
+// Light in thin media, where a stratum of absorbed light extends far along the ray: its lit and shadowed
+// parts must each be lit at their own place. Every method, in every blend mode and light.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,8 +27,8 @@ ChannelAppearance slab(glm::dvec3 color, double density) {
   return a;
 }
 
-/// Two thin slabs of 5 voxels one behind the other, red in the light and green in the shadow of a wall that
-/// stands beside the rays.
+/// Two thin slabs of 5 voxels, one behind the other: red in the light, and green in the shadow of a wall
+/// beside the rays.
 VolumeAndScene litAndShadowed(double density) {
   const glm::ivec3 dims(12, 6, 20);
   const auto between = [](int lo, int hi) {
@@ -51,8 +51,8 @@ VolumeAndScene litAndShadowed(double density) {
   return {volume, scene};
 }
 
-/// One channel whose gradient turns along the ray: it rises towards the middle of x where z is small, towards
-/// its ends where z is large. The lamp stands inside.
+/// One channel whose gradient rotates along the ray: values rise towards the middle of x where z is small,
+/// and towards its ends where z is large. The light is inside.
 VolumeAndScene turningNormal(double density) {
   const glm::ivec3 dims(9, 7, 16);
   const auto value = [](int x, int, int z) {
@@ -74,11 +74,11 @@ VolumeAndScene turningNormal(double density) {
   return {volume, scene};
 }
 
-/// Quadrature is biased. At a step of 1/8 spacing its error, which is of order 2, is below this share of the
-/// brightest component of the picture.
+/// Bound on the bias of quadrature at a step of 1/8 spacing, relative to the brightest component of the
+/// picture. The bias is of order 2 in the step.
 constexpr double kBias = 5e-3;
 
-/// A mistake: what is seen is shaded at one place, and the light that reaches it is taken at another.
+/// A defect: a collision is shaded at one place, but the light that reaches it is computed at another.
 struct LitAtPlacesApart {
   template <class Blend, class Features>
   static glm::vec4 sample(const kernel::SceneView& scene, const kernel::Ray& ray, kernel::Interval inside,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Both trackers against closed forms and against the double-precision reference, per pixel.
+// The trackers against closed forms and against the double-precision reference, per pixel.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -17,7 +17,7 @@ using namespace test;
 
 constexpr glm::dvec3 kRed(1, 0, 0), kGreen(0, 1, 0), kBlue(0, 0, 1), kWhite(1, 1, 1);
 
-/// A picture with one value everywhere, as the closed form of a scene that looks the same in every pixel.
+/// A picture with one value everywhere: the closed form of a scene whose pixels are all the same.
 reference::ReferenceImage flat(const Scene& scene, glm::dvec4 value) {
   const std::size_t pixels = std::size_t(scene.width) * std::size_t(scene.height);
   return {{scene.width, scene.height, std::vector<glm::vec4>(pixels, glm::vec4(value))}, {}, 0};
@@ -72,7 +72,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, HomogeneousBox, testing::ValuesIn(kTrackers), 
   return name;
 });
 
-/// Colours of zeros and ones for every channel, so that the pixels are binomial.
+/// Gives every channel a colour of zeros and ones, so that the pixels are binomial.
 void paintPrimaries(Scene& scene) {
   const glm::dvec3 colors[] = {kRed, kGreen, kBlue, kWhite};
   for (std::size_t i = 0; i < scene.channels.size(); ++i) scene.channels[i].color = {{0, colors[i % 4]}};
@@ -141,7 +141,7 @@ TEST(Trackers, MatchTheReferenceOnNoiseWithJumpsSpikesAndGamma) {
 }
 
 TEST(Trackers, AreCaughtWhenTheirBoundIsTooLow) {
-  // The negative control of the harness: a picture whose extinction is 5 % off must not pass.
+  // The negative control of this test: a picture whose extinction is 5 % off must not pass.
   const glm::ivec3 dims(8, 8, 8);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int) { return 1; }));
   Scene scene = frontScene(*volume, 32, 32);

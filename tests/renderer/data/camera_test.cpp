@@ -10,7 +10,7 @@
 namespace scolopax {
 namespace {
 
-/// Directions and pixel axes are orthonormal in the world: a ray's parameter is a length there.
+/// The direction and pixel axes are orthonormal in world space, so that a ray's parameter is a world length.
 void expectOrthonormal(const Camera& camera) {
   const kernel::CameraRays rays = makeCameraRays(camera, test::gridOf({3, 6, 6}), 4, 4);
   EXPECT_NEAR(glm::length(rays.direction0), 1, 1e-6);
@@ -20,7 +20,8 @@ void expectOrthonormal(const Camera& camera) {
   for (const float x : {0.5f, 3.5f}) EXPECT_NEAR(glm::length(rays(x, x).direction), 1, 1e-6) << x;
 }
 
-// Of vectors that are parallel but for rounding the cross product is rounding alone, and not across either.
+// The cross product of vectors that are parallel except for rounding is pure rounding error, and
+// perpendicular to neither.
 TEST(Camera, WhoseUpIsTheViewButForRoundingSeesWithoutDistortion) {
   Camera camera{{-6.725710453241779, 15.959062078250131, -31.561726230520883},
                 {-1.164896011352539, 0.18242764472961426, 3.6595970392227173},

@@ -40,7 +40,7 @@ TEST(ClipView, OfRegionsThatAreABoxIsThatBox) {
     EXPECT_EQ(view->low.z, low) << regions;
     EXPECT_NEAR(view->high.z, high, 1e-6) << regions;
   }
-  // One beside another, but that has no volume: still a box.
+  // Two neighbouring regions, one of which has no volume: still a box.
   const auto view = viewOf({}, Crop{glm::dvec3(-0.5, 2, 2), glm::dvec3(9.5, 6, 6), 5u << 12});
   EXPECT_FALSE(view);
   EXPECT_TRUE(viewOf({}, Crop{glm::dvec3(2), glm::dvec3(6), 5u << 12})->parts);
@@ -54,7 +54,7 @@ TEST(ClipView, TellsPlanesOfAllVisibleChannelsFromThoseOfSome) {
                            std::nullopt);
   ASSERT_TRUE(view);
   EXPECT_EQ(view->wholePlanes, 2);
-  EXPECT_EQ(view->planeCount, 3);  // one clips nothing that can be seen
+  EXPECT_EQ(view->planeCount, 3);  // one plane clips only invisible channels
   EXPECT_EQ(view->planes[2].channels, 2u);
   EXPECT_TRUE(view->parts);
 }
@@ -75,7 +75,7 @@ TEST(ClipView, LeavesOfARayTheSamePartsAsOfItsPoints) {
     int parts = 0;
     while (!spans.done(true)) {
       const auto span = spans.next(true);
-      ASSERT_GE(span.enter, reached);  // what has no channel is left out
+      ASSERT_GE(span.enter, reached);  // parts without a channel are left out
       ASSERT_LT(++parts, 20);
       reached = span.exit;
       for (const float share : {0.01f, 0.3f, 0.99f}) {

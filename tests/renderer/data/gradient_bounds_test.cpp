@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bounds of the extinction where opacity depends on the gradient: a search for samples above them, and that
-// they are 0 where nothing is steep.
+// Bounds of the extinction where opacity depends on the gradient: searches for samples above them, and checks
+// that they are 0 where the field is flat.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ using namespace test;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// What the search draws.
+/// The random inputs of the search.
 struct Draw {
   std::mt19937 random;
   explicit Draw(unsigned seed) : random(seed) {}
@@ -29,7 +29,7 @@ struct Draw {
   int among(int lo, int hi) { return lo + int(random() % unsigned(hi - lo + 1)); }
   bool chance(double p) { return unit() < p; }
 
-  /// Down to one voxel along an axis; orthogonal and not, of equal spacing and not, at any scale.
+  /// Down to one voxel along an axis; orthogonal or not, isotropic or not, at any scale.
   Grid grid() {
     glm::ivec3 dims;
     for (int axis = 0; axis < 3; ++axis) dims[axis] = chance(0.3) ? among(1, 3) : among(4, 11);
@@ -59,7 +59,7 @@ struct Draw {
     return knots;
   }
 
-  /// Over some of the gradients that there are, to the last bit: there rounding decides what a sample is.
+  /// A range between gradients of the data, exact to the last bit: there rounding decides a sample's value.
   GradientOpacity opacity(const std::vector<double>& magnitudes) {
     const auto one = [&] {
       if (magnitudes.empty()) return unit();
@@ -74,8 +74,8 @@ struct Draw {
   }
 };
 
-/// A coordinate in a macrocell that begins at voxel `low`: anywhere, and where something changes, to the last
-/// bit. The outermost cells reach half a voxel beyond the outer voxels' centres.
+/// A coordinate in a macrocell that begins at voxel `low`: anywhere, or where something changes, exact to the
+/// last bit. The outermost cells extend half a voxel beyond the outer voxels' centres.
 float coordinateIn(Draw& draw, int low, int size, int count) {
   const float begin = low == 0 ? -0.5f : float(low),
               end = low + size >= count - 1 ? float(count) - 0.5f : float(low + size);
@@ -127,8 +127,8 @@ int expectBound(Draw& draw, const RenderPlan& plan, int samplesPerCell) {
   return seen;
 }
 
-/// Values of one kind a volume: noise, few values, ramps, constants with a spike, large ones with small
-/// differences; in floats some that are not finite.
+/// A volume with one kind of values: noise, few values, ramps, constants with a spike, or large values with
+/// small differences; floats include some that are not finite.
 template <class T>
 ChannelSource drawChannel(Draw& draw, glm::ivec3 dims) {
   constexpr double kMost = std::is_integral_v<T> ? double(std::numeric_limits<T>::max()) : 1000.0;
@@ -189,7 +189,7 @@ void searchForViolations(unsigned seed) {
       if (testing::Test::HasFailure()) return;
     }
   }
-  EXPECT_GT(seen, 100000);  // else there was nothing to be above a bound
+  EXPECT_GT(seen, 100000);  // otherwise the search tested too few samples
 }
 
 TEST(GradientBounds, AreNeverBelowTheClassifiedValueForBytes) { searchForViolations<std::uint8_t>(1); }
@@ -200,8 +200,8 @@ TEST(GradientBounds, AreNeverBelowTheClassifiedValueForFloats) {
   searchForViolations<float>(5);
 }
 
-/// A block of one value in another: macrocells of four voxels, of which those in the middle of either are
-/// flat, whatever is added or multiplied.
+/// A block of one value inside another value, with macrocells of four voxels. Macrocells in the interior of
+/// either are flat, whatever the offset and scale.
 template <class T>
 std::shared_ptr<const Volume> block() {
   const glm::ivec3 dims(33);
@@ -229,7 +229,7 @@ void expectNothingWhereNothingIsSteep() {
   for (int z = 0; z < 8; ++z)
     for (int y = 0; y < 8; ++y)
       for (int x = 0; x < 8; ++x, ++cell) {
-        // Voxels whose differences reach over the block's faces: 9, 10, 24 and 25.
+        // Voxels whose differences cross the block's faces: 9, 10, 24 and 25.
         const auto outside = [](int i) { return i <= 1 || i == 7; };  // up to voxel 8, from voxel 28 on
         const auto inside = [](int i) { return i == 3 || i == 4; };   // from voxel 12 to voxel 20
         const auto at = [](int i) { return i == 2 || i == 6; };       // 8 to 12 and 24 to 28
@@ -249,7 +249,7 @@ TEST(GradientBounds, AreZeroWhereNothingIsSteep) {
 }
 
 TEST(GradientBounds, AreTightWhereTheGradientIsOne) {
-  // A ramp: the factor is the same in every cell, and bounds are not above it but for rounding.
+  // A ramp: the factor is the same in every cell, and bounds exceed it only by rounding.
   const glm::ivec3 dims(17);
   const auto volume = volumeOf(gridOf(dims, {1, 2, 0.5}),
                                channelOf<std::uint8_t>(dims, [](int x, int, int) { return 10 * x; }));
@@ -260,7 +260,7 @@ TEST(GradientBounds, AreTightWhereTheGradientIsOne) {
   const kernel::MajorantView bounds = plan.view().majorants;
   for (std::size_t cell = 0; cell < 64; ++cell) {
     EXPECT_GE(bounds.bound(cell, 0), 0.25f * (1 - 1e-5f));
-    EXPECT_LE(bounds.bound(cell, 0), 0.25f * 1.01f);  // differences of bytes are known to far less
+    EXPECT_LE(bounds.bound(cell, 0), 0.25f * 1.01f);  // differences of bytes are known much more accurately
   }
 }
 
@@ -309,7 +309,7 @@ TEST(GradientBounds, AreAfterAnySeriesOfEditsWhatAFreshPlanHas) {
     changed += kind >= 5 && now != before;
     before = std::move(now);
   }
-  EXPECT_GT(changed, 10);  // by edits of a factor alone
+  EXPECT_GT(changed, 10);  // by edits of the factor only
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ using namespace test;
 
 constexpr std::size_t kBins = GradientHistogram::kBins;
 
-/// Axes that are neither of one length nor at right angles.
+/// A grid whose axes have different lengths and are not perpendicular.
 Grid tiltedGrid(glm::ivec3 dims) {
   Grid grid;
   grid.dims = dims;
@@ -36,8 +36,8 @@ std::uint64_t totalOf(const std::vector<std::uint64_t>& counts) {
 }
 
 TEST(GradientHistogram, OfALinearRampIsOneSteepnessUpToTheBorder) {
-  // The data's gradient in the world is (4, -2, 6): along the voxels' axes 8, -2 and 5 a voxel. The slope of
-  // -2 turns the stored values around.
+  // The data's gradient in world space is (4, -2, 6): 8, -2 and 5 per voxel along the voxel axes. The slope
+  // of -2 reverses the stored values.
   const auto stored = [](int x, int y, int z) { return (8 * x - 2 * y + 5 * z) / -2.0; };
   const auto volume = volumeOf(tiltedGrid({5, 4, 3}), channelOf<float>({5, 4, 3}, stored, -2, 7));
   const GradientHistogram h = measureGradientHistogram(*volume, 0);
@@ -49,7 +49,7 @@ TEST(GradientHistogram, OfALinearRampIsOneSteepnessUpToTheBorder) {
   EXPECT_EQ(h.bins(), expected);
 }
 
-/// Values 0, 1, 4, 9 and 16, two world units apart: 1, 2, 4, 6 and 7 a voxel steep.
+/// Values 0, 1, 4, 9 and 16, two world units apart: gradients of 1, 2, 4, 6 and 7 per voxel.
 std::shared_ptr<const Volume> squares() {
   return volumeOf(gridOf({5, 1, 1}, {2, 5, 7}),
                   channelOf<std::uint8_t>({5, 1, 1}, [](int x, int, int) { return x * x; }));
@@ -59,7 +59,7 @@ TEST(GradientHistogram, TakesOneSidedDifferencesAtTheBorderAndNoneAlongAnAxisOfO
   const GradientHistogram h = measureGradientHistogram(*squares(), 0);
   EXPECT_DOUBLE_EQ(h.maximum, 3.5);
   ASSERT_EQ(h.counts.size(), kBins * kBins);
-  // By value, of which 16 is the largest, and by slope, of which 7 is.
+  // Rows by value, at most 16; columns by gradient, at most 7.
   for (const auto& [value, slope] : {std::pair(0, 1), {1, 2}, {4, 4}, {9, 6}, {16, 7}}) {
     const std::size_t row = std::min<std::size_t>(std::size_t(value * 16), 255);
     const std::size_t column = std::min<std::size_t>(std::size_t(slope * 256 / 7), 255);
@@ -79,7 +79,7 @@ TEST(GradientHistogram, LeavesOutWhatHasNoFiniteGradient) {
   };
   const auto volume = volumeOf(gridOf(glm::ivec3(5)), channelOf<float>(glm::ivec3(5), value));
   const GradientHistogram h = measureGradientHistogram(*volume, 0);
-  // The one inside and its six neighbours; the one in the corner and its three.
+  // The voxel inside and its six neighbours; the one in the corner and its three.
   EXPECT_EQ(h.nonFiniteCount, 7u + 4u);
   EXPECT_EQ(h.finiteCount, 125u - 11u);
   EXPECT_EQ(totalOf(h.counts), h.finiteCount);
@@ -147,16 +147,16 @@ TEST(GradientHistogram, AgreesWithAPlainLoopOverInterleavedChannels) {
     for (const double steepness : expected)
       ++bins[std::min(std::size_t(steepness / maximum * double(kBins)), kBins - 1)];
     const GradientHistogram h = measureGradientHistogram(*volume, channel);
-    EXPECT_NEAR(h.maximum, maximum, 1e-12 * maximum);  // two orders of summing in double
+    EXPECT_NEAR(h.maximum, maximum, 1e-12 * maximum);  // the sums in double have different orders
     EXPECT_EQ(h.bins(), bins);
-    // By value it is the channel's own histogram.
+    // Summed over gradients, it is the channel's own histogram.
     std::vector<std::uint64_t> values(kBins);
     for (std::size_t i = 0; i < h.counts.size(); ++i) values[i / kBins] += h.counts[i];
     EXPECT_EQ(values, volume->channels()[std::size_t(channel)].histogram.bins);
   }
 }
 
-/// Of the five squares, at a curve over [lo, hi].
+/// Quantile of the gradients of squares() under a curve over [lo, hi].
 double quantileOfSquares(double lo, double hi, double p,
                          std::vector<OpacityKnot> opacity = {{0, 0}, {1, 1}}) {
   const auto volume = squares();
@@ -164,23 +164,23 @@ double quantileOfSquares(double lo, double hi, double p,
   look.rangeLo = lo;
   look.rangeHi = hi;
   look.opacity = std::move(opacity);
-  look.density = 0;                              // is of no account
-  look.gradientOpacity = GradientOpacity{5, 6};  // nor is this
+  look.density = 0;                              // has no effect
+  look.gradientOpacity = GradientOpacity{5, 6};  // nor has this
   return gradientQuantile(measureGradientHistogram(*volume, 0), volume->channels()[0], look, p);
 }
 
-/// The place in the bin of the slope of `perVoxel`, of which 7 is the largest: 3.5 per world unit.
+/// The gradient at `share` of the bin that holds `perVoxel`; the largest, 7 per voxel, is 3.5 per world unit.
 double inBinOf(int perVoxel, double share) { return (std::min(perVoxel * 256 / 7, 255) + share) / 256 * 3.5; }
 
 TEST(GradientQuantile, IsOfTheVoxelsThatHaveOpacity) {
-  // 9 and 16; 4 has none.
+  // 9 and 16 have opacity; 4 has none.
   EXPECT_DOUBLE_EQ(quantileOfSquares(4, 16, 0.25), inBinOf(6, 0.5));
   EXPECT_DOUBLE_EQ(quantileOfSquares(4, 16, 0.5), inBinOf(6, 1));
   EXPECT_DOUBLE_EQ(quantileOfSquares(4, 16, 0.75), inBinOf(7, 0.5));
   EXPECT_DOUBLE_EQ(quantileOfSquares(4, 16, 1), 3.5);
-  // A range that is reversed: 0, 1 and 4; 9 has none.
+  // A reversed range: 0, 1 and 4 have opacity; 9 has none.
   EXPECT_DOUBLE_EQ(quantileOfSquares(9, 0, 1), inBinOf(4, 1));
-  // A window that only 4 lies in.
+  // A window that contains only 4.
   EXPECT_DOUBLE_EQ(quantileOfSquares(3, 5, 1, {{0, 0}, {0.5, 1}, {1, 0}}), inBinOf(4, 1));
 }
 
@@ -190,7 +190,7 @@ TEST(GradientQuantile, IsOfAllVoxelsWhereNoneHasOpacity) {
 }
 
 TEST(GradientQuantile, TakesBinsThatHaveOpacityInPartOnlyWhereNoneHasItAtBothEnds) {
-  // 0.4 and 0.6 share a bin of values, and only what lies between them has opacity.
+  // 0.4 and 0.6 share a bin of values, and only values between them have opacity.
   constexpr double kValues[] = {0, 0.4, 0.6, 100};
   const auto volume =
       volumeOf(gridOf({4, 1, 1}), channelOf<float>({4, 1, 1}, [&](int x, int, int) { return kValues[x]; }));
@@ -201,11 +201,11 @@ TEST(GradientQuantile, TakesBinsThatHaveOpacityInPartOnlyWhereNoneHasItAtBothEnd
   look.rangeLo = 0.4;
   look.rangeHi = 0.6;
   look.opacity = {{0, 0}, {0.5, 1}, {1, 0}};
-  // The steeper of the two is half of 99.6 steep; the steepest voxel of all 99.4.
+  // The larger gradient of the two is half of 99.6; the largest of all voxels is 99.4.
   EXPECT_NEAR(gradientQuantile(h, channel, look, 1), 129.0 / 256 * 99.4, 1e-4);  // voxels are floats
   look.rangeHi = 100;
   look.opacity = {{0, 0}, {0.001, 1}, {0.9, 0}, {1, 1}};
-  // 100 has opacity, and 0.6 but not 0.4.
+  // 100 and 0.6 have opacity, 0.4 has none.
   EXPECT_NEAR(gradientQuantile(h, channel, look, 0.5), 255.5 / 256 * 99.4, 1e-4);
 }
 

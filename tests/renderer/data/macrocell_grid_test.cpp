@@ -16,7 +16,7 @@ namespace {
 
 using namespace test;
 
-/// Least and largest finite voxel that interpolation in a cell may read, by plain loops over the cell.
+/// Smallest and largest finite voxel that interpolation in a cell may read, by plain loops over the cell.
 ValueInterval voxelsOf(const Volume& volume, std::size_t channel, glm::ivec3 cell, int size) {
   const glm::ivec3 dims = volume.grid().dims;
   ValueInterval v{INFINITY, -INFINITY};
@@ -34,7 +34,7 @@ ValueInterval voxelsOf(const Volume& volume, std::size_t channel, glm::ivec3 cel
   return v;
 }
 
-/// Every cell's interval holds its voxels, ends at levels, and at the nearest ones.
+/// Every cell's interval contains its voxels and ends at the nearest levels.
 void expectNearestLevels(const Volume& volume, int size) {
   const MacrocellGrid grid = buildMacrocells(volume, size);
   for (std::size_t channel = 0; channel < volume.channels().size(); ++channel) {
@@ -53,7 +53,7 @@ void expectNearestLevels(const Volume& volume, int size) {
           if (!(voxels.lo <= voxels.hi)) continue;
           ASSERT_LE(found.lo, voxels.lo);
           ASSERT_GE(found.hi, voxels.hi);
-          // Nothing but rounding lies between a level and the voxels that is nearer.
+          // No level is nearer to the voxels, except within rounding.
           const float slack = 2 * 0x1p-20f * std::max(std::abs(finite.front()), std::abs(finite.back()));
           const auto codes = grid.intervals[index * volume.channels().size() + channel];
           ASSERT_TRUE(codes.lo + 1u >= finite.size() || finite[codes.lo + 1u] > voxels.lo - slack);
@@ -101,7 +101,7 @@ TEST(MacrocellGrid, KeepsEveryValueOfBytesAndOfChannelsWithFewValues) {
 }
 
 TEST(MacrocellGrid, GrowsNoIntervalByMoreThanAPartOfTheRangeAndFrequentValuesByNothing) {
-  // Mostly an empty background; few voxels have values that spread over six decades.
+  // Mostly empty background; a few voxels have values over six decades.
   std::mt19937 random(3);
   std::uniform_real_distribution<double> uniform(0, 1);
   const glm::ivec3 dims(64, 33, 33);
@@ -125,7 +125,8 @@ TEST(MacrocellGrid, GrowsNoIntervalByMoreThanAPartOfTheRangeAndFrequentValuesByN
         }
       }
   EXPECT_EQ(empty, 39u * 32 * 32);
-  // The other half of the levels follows the values' density: even ones alone would double most.
+  // The other half of the levels follows the density of the values; evenly spaced levels alone would double
+  // most of the values.
   EXPECT_LT(doubled, (index - empty) / 50);
 }
 

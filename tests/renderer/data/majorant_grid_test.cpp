@@ -34,7 +34,7 @@ std::vector<OpacityKnot> randomCurve(std::mt19937& random) {
   return knots;
 }
 
-/// The bounds of one channel alone.
+/// The bounds of a single channel.
 MajorantGrid majorantsOf(const std::shared_ptr<const MacrocellGrid>& cells,
                          const TransferFunction& transfer) {
   return MajorantGrid(cells, {buildBounds(cells->levels[0], transfer, 0)}, true, false);
@@ -43,7 +43,7 @@ std::shared_ptr<const MacrocellGrid> macrocellsOf(const Volume& volume, int size
   return std::make_shared<const MacrocellGrid>(buildMacrocells(volume, size));
 }
 
-/// Every point that a tracker can fetch for a cell: corners, faces and the inside.
+/// Tests points that a tracker can fetch in a cell: corners, faces and the interior.
 template <class T, class F>
 void expectBound(F&& value, glm::ivec3 dims, double rangeLo, double rangeHi, unsigned seed) {
   std::mt19937 random(seed);
@@ -160,7 +160,7 @@ TEST(MajorantGrid, IsNeverBelowTheClassifiedValueForConstantVolumesAndAStepAtThe
 }
 
 TEST(MajorantGrid, IsZeroExactlyWhereNoSampleOfTheCellHasExtinction) {
-  // One bright voxel in the middle: only the cells its interpolation reaches may be other than zero.
+  // One bright voxel in the middle: only cells that its interpolation reaches may have a bound above zero.
   const glm::ivec3 dims(17);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int x, int y, int z) {
                                  return x == 8 && y == 8 && z == 8 ? 255 : 0;
@@ -315,8 +315,8 @@ TEST(MajorantGrid, WorksOutOnlyTheCellsWhoseValuesAnEditChanges) {
   EXPECT_EQ(update(), 0u);
   looks[2].color = {{0, {1, 0, 0}}};
   EXPECT_EQ(update(), 0u);
-  // Bytes are told apart exactly: a bump over values 60 to 70 is the business of cells that have some of them
-  // and of no others. At its ends rounding decides.
+  // Bytes are distinguished exactly: a bump over values 60 to 70 affects only cells that contain such values.
+  // At its ends rounding decides.
   std::size_t least = 0, most = 0;
   for (std::size_t cell = 0; cell < macrocells->cellCount(); ++cell) {
     const ValueInterval v = macrocells->interval(cell, 0);
@@ -363,7 +363,7 @@ TEST(MajorantGrid, LeavesTheOneBeforeAsItWasAndSharesWhatIsNotNew) {
 }
 
 TEST(MajorantGrid, KnowsHowFarAroundABlockNothingIsAndWhichBoxHasEverything) {
-  // A few bright voxels; blocks are cut at the far sides.
+  // A few bright voxels; the outer blocks are incomplete at the far sides.
   std::mt19937 random(20);
   const glm::ivec3 dims(42, 10, 14);
   for (const int bright : {0, 1, 2, 12}) {

@@ -17,7 +17,7 @@ std::vector<FirstCollision> samplesOf(std::size_t through, std::vector<FirstColl
 
 TEST(VisibleSample, IsTheMedianOfTheChannelInWhichMostEnd) {
   EXPECT_EQ(visibleSample(samplesOf(0, {{9, 1}, {2, 0}, {7, 1}, {1, 0}, {8, 1}})), 4u);
-  // The nearer of the two in the middle; of channels with equally many, the first.
+  // Of two samples in the middle the nearer; of channels with equally many samples the first.
   EXPECT_EQ(visibleSample(samplesOf(3, {{9, 1}, {4, 0}, {3, 0}, {8, 1}})), 2u);
   EXPECT_EQ(visibleSample(samplesOf(0, {{5, 2}, {5, 2}, {5, 2}})), 1u);
 }
@@ -52,7 +52,7 @@ TEST(PixelsToPick, AreARegularLatticeOfALargeArea) {
     EXPECT_EQ(columns.size() * rows.size(), pixels.size());
     EXPECT_LE(pixels.size(), std::size_t(kMaxPickPixels));
     EXPECT_GT(pixels.size(), std::size_t(kMaxPickPixels) * 9 / 10) << width << "x" << height;
-    // No stretch of the area is left out that is longer than two cells of the lattice.
+    // No gap between sampled places is longer than two cells of the lattice.
     const auto spread = [](const std::set<int>& places, int first, int length) {
       int before = first - 1, largest = 0;
       for (const int place : places) largest = std::max(largest, place - before), before = place;

@@ -29,7 +29,7 @@ std::vector<std::uint32_t> words(std::uint32_t pixel, std::uint32_t sample, std:
 }
 
 TEST(Sobol, BeginsAsPublished) {
-  // The first points in two dimensions, as every text on the sequence prints them.
+  // The first points in two dimensions, as in the literature on the sequence.
   const double expected[8][2] = {{0, 0},         {0.5, 0.5},     {0.25, 0.75},   {0.75, 0.25},
                                  {0.125, 0.625}, {0.625, 0.125}, {0.375, 0.375}, {0.875, 0.875}};
   for (std::uint32_t i = 0; i < 8; ++i)
@@ -37,8 +37,8 @@ TEST(Sobol, BeginsAsPublished) {
 }
 
 TEST(Sobol, EveryCoordinateVisitsEveryInterval) {
-  // Of the first 2^m points one lies in each of the 2^m intervals of a coordinate: fails for any m_i or
-  // polynomial that is not a proper one.
+  // Of the first 2^m points, one lies in each of the 2^m intervals of a coordinate. This fails for any
+  // invalid m_i or polynomial.
   for (int d = 0; d < kSobolDimensions; ++d)
     for (const std::uint32_t m : {1u, 4u, 10u}) {
       std::vector<int> counts(1u << m);
@@ -48,7 +48,7 @@ TEST(Sobol, EveryCoordinateVisitsEveryInterval) {
 }
 
 TEST(Sobol, CoordinatesAreNotCopiesOfEachOther) {
-  // Two that use one polynomial or one set of m_i twice would lie on a line; these fill cells of 1/16.
+  // Two dimensions with the same polynomial or m_i would lie on a line; these fill cells of 1/16.
   for (int a = 0; a < kSobolDimensions; ++a)
     for (int b = 0; b < a; ++b) {
       std::map<std::uint32_t, int> cells;
@@ -68,13 +68,13 @@ TEST(Sampling, SpreadsEveryWordOfAReplicateEvenly) {
         ++places[(w[0] >> 29) * 8 + (w[1] >> 29)];
       }
       for (const auto& one : counts) EXPECT_EQ(std::count(one.begin(), one.end(), 1), 64);
-      // The place in the pixel: one sample in every cell of 1/8 x 1/8.
+      // Positions in the pixel: one sample in every cell of 1/8 x 1/8.
       EXPECT_EQ(std::count(places.begin(), places.end(), 1), 64);
     }
 }
 
 TEST(Sampling, LeavesEverySampleUniform) {
-  // Over pixels, and over replicates of one pixel, the word of a fixed sample is uniform: what makes the
+  // Over pixels, and over replicates of one pixel, the word of a fixed sample is uniform; this makes the
   // estimator unbiased. Chi-square with 255 degrees of freedom exceeds 347 with probability 1e-4; 36 tables.
   for (const std::uint32_t sample : {0u, 37u})
     for (const bool overPixels : {true, false}) {

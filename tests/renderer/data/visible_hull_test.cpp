@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kFovY = 35, kAspect = 1.25;
 
-/// How far from the middle of the frame a voxel's centre is shown: 1 at its edge.
+/// Distance of a voxel's centre from the middle of the frame; 1 at the frame's edge.
 double placeInFrame(const Camera& camera, const Grid& grid, glm::dvec3 voxel) {
   const glm::dvec3 p = glm::dvec3(grid.worldFromVoxel * glm::dvec4(voxel, 1)) - camera.eye;
   const glm::dvec3 forward = glm::normalize(camera.target - camera.eye);
@@ -57,7 +57,7 @@ void forVoxels(F&& f) {
       for (int x = 0; x < kDims.x; ++x) f(glm::dvec3(x, y, z));
 }
 
-/// Nearest to and farthest from the middle of the frame that the ball's voxels get.
+/// Largest distance of the ball's voxels from the middle of the frame.
 double reachOfBall(const Camera& camera, const Grid& grid, glm::dvec3 centre, double radius) {
   double reach = 0;
   forVoxels([&](glm::dvec3 p) {
@@ -82,7 +82,8 @@ TEST(VisibleHull, FillsTheFrameWithWhatCanBeSeenAndNotWithTheBox) {
 }
 
 TEST(VisibleHull, LeavesOutNothingThatCanBeSeen) {
-  // One voxel just above the threshold, far from all else: what is interpolated around it is seen too.
+  // One voxel just above the threshold, far from everything else: the values interpolated around it are
+  // visible too.
   const auto value = [](int x, int y, int z) {
     if (x == 117 && y == 87 && z == 3) return 12.0;
     return inBall({x, y, z}, {30, 40, 30}, 10) ? 200.0 : 3.0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Depth, channel, transmittance and cost against closed forms and counts, by every method.
+// Depth, channel, transmittance and cost against closed forms and counts, for every method.
 #include "renderer/data/aov.h"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ std::unique_ptr<Renderer> rendered(const std::shared_ptr<const Volume>& volume, 
   return renderer;
 }
 
-/// 8^3 voxels: channel 0 in the half that is seen first, channel 1 in the other.
+/// 8^3 voxels: channel 0 in the front half, channel 1 in the back half.
 struct Halves {
   std::shared_ptr<const Volume> volume;
   Scene scene;
@@ -39,9 +39,9 @@ struct Halves {
                       channelOf<std::uint8_t>(dims, [](int, int, int z) { return z < 4 ? 1 : 0; }),
                       channelOf<std::uint8_t>(dims, [](int, int, int z) { return z < 4 ? 0 : 1; }));
     scene = frontScene(*volume, 6, 6);
-    scene.step = 0.02;  // of the marcher, so small that its bias is below what is asked for
+    scene.step = 0.02;  // of the marcher: its bias is below the tolerances
     for (std::size_t i = 0; i < 2; ++i) {
-      // A step: 1 from half way between the two layers of voxels on.
+      // A step: opacity 1 from half way between the two layers of voxels on.
       scene.channels[i].rangeLo = scene.channels[i].rangeHi = 0.5;
       scene.channels[i].density = i == 0 ? frontDensity : backDensity;
     }
@@ -57,7 +57,7 @@ TEST(Aovs, OfAnOpaqueFrontAreItsFaceAndItsChannel) {
       const auto renderer = rendered(halves.volume, halves.scene, 4);
       const auto depth = renderer->aov(Aov::depth), channel = renderer->aov(Aov::channel);
       ASSERT_EQ(depth.values.size(), 36u);
-      // The eye is one box diagonal from the centre, the face half an edge of 4 nearer.
+      // The eye is one box diagonal from the centre; the face is nearer by half of the edge, 4.
       const double face = halves.volume->grid().diagonal() - 2;
       for (std::size_t i = 0; i < 36; ++i) {
         EXPECT_NEAR(depth.values[i], face, 0.011) << nameOf(method) << " " << nameOf(blend);
@@ -68,9 +68,9 @@ TEST(Aovs, OfAnOpaqueFrontAreItsFaceAndItsChannel) {
 }
 
 TEST(Aovs, OfAHomogeneousMediumAreTheMeanFreeFlightInIt) {
-  // Extinction a over the length l: of the rays that collide, the mean depth is 1/a - l / (e^(al) - 1). A
-  // depth within l has a standard deviation below l / sqrt(12), and four fifths of 36 x 512 rays collide: 6
-  // sigma, and half a step of the marcher.
+  // Extinction a over the length l: the mean depth of the rays that collide is 1/a - l / (e^(al) - 1). A
+  // depth within l has a standard deviation below l / sqrt(12), and four fifths of 36 x 512 rays collide.
+  // Tolerance: 6 sigma, and half a step of the marcher.
   const double a = 0.4, length = 4;
   for (const Method method : kAllMethods) {
     Halves halves(a, a);
@@ -90,13 +90,13 @@ TEST(Aovs, OfAHomogeneousMediumAreTheMeanFreeFlightInIt) {
 }
 
 TEST(Aovs, NameTheChannelInWhichMostRaysEnd) {
-  // In front 1 - e^-0.4 = 0.33 of the rays end, of the rest nearly all behind: 0.67.
+  // 1 - e^-0.4 = 0.33 of the rays end in front, and nearly all of the others behind: 0.67.
   for (const Method method : kAllMethods) {
     Halves halves(0.2, 1e3);
     halves.scene.method = method;
     for (const float channel : rendered(halves.volume, halves.scene, 512)->aov(Aov::channel).values)
       EXPECT_EQ(channel, 1) << nameOf(method);
-    // Counted as the volume's channel, also when the one before it is not in the plan.
+    // The index is that in the volume, even if the channel before it is not in the plan.
     halves.scene.channels[0].visible = false;
     for (const float channel : rendered(halves.volume, halves.scene, 4)->aov(Aov::channel).values)
       EXPECT_EQ(channel, 1) << nameOf(method);
@@ -165,7 +165,7 @@ TEST(Aovs, BeginAnewWithTheFilm) {
   EXPECT_EQ(renderer->samples(), 0u);
   renderer->renderSample(kNever);
   for (const float v : renderer->aov(Aov::channel).values) EXPECT_EQ(v, 0);
-  // Another scene: nothing of the first is left.
+  // Another scene: nothing of the first may remain.
   halves.scene.channels[0].visible = false;
   renderer->setScene(halves.scene);
   for (const float v : renderer->aov(Aov::channel).values) EXPECT_TRUE(std::isnan(v));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the CPU backend chooses when a scene leaves the method to it.
+// The CPU backend's choice of a method for scenes with the method `auto`.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -65,7 +65,7 @@ TEST(Automatic, DependsOnSceneAndDataAlone) {
   large.height *= 4;
   Scene fine = scene;
   fine.targetError = 1e-4;
-  // However the renderer came to the scene.
+  // The choice must not depend on earlier scenes of the renderer.
   const auto renderer = makeCpuRenderer(volume, 1);
   for (const Scene& before : {large, fine}) {
     renderer->setScene(before);
@@ -154,7 +154,7 @@ TEST(Automatic, CountsItsBiasAsErrorFromTheFirstEstimateOn) {
   scene.step = renderer->choice().step;
   renderer->setScene(scene);
   for (int i = 0; i < 2; ++i) renderer->renderSample(kNever);
-  EXPECT_GT(found, renderer->estimatedError());  // of noise alone
+  EXPECT_GT(found, renderer->estimatedError());  // the renderer's estimate includes only noise
 }
 
 TEST(Automatic, KeepsTheFilmUnlessItsChoiceChanges) {

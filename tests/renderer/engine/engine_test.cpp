@@ -43,7 +43,7 @@ TEST(CpuRenderer, GivesTheSameBitsForAnyNumberOfThreads) {
 }
 
 TEST(CpuRenderer, KeepsASampleIndependentOfHowManyCameBefore) {
-  // Sample 3 is sample 3, also when the first two were rendered by another renderer: no sample is lost or
+  // A sample is the same, even if another renderer rendered the ones before it: no sample is lost or
   // repeated.
   const auto volume = orbitals();
   const Scene scene = orbitalScene(*volume);
@@ -86,8 +86,8 @@ TEST(CpuRenderer, GoesOnWithAPassThatUsedUpItsBudget) {
 }
 
 TEST(CpuRenderer, StopsWithinARayOfACancelHoweverDenseTheScene) {
-  // A dense channel over empty space: a ray takes up to a million tentative collisions. The test would time
-  // out if a cancel waited for the end of a tile, let alone of the pass.
+  // A dense channel over empty space: a ray has up to a million tentative collisions. The test would time out
+  // if cancelling waited for the end of a tile, let alone of the pass.
   const glm::ivec3 dims(32, 32, 32);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int x, int y, int z) {
                                  return (x + y + z) % 7 == 0 ? 255 : 0;
@@ -182,7 +182,7 @@ TEST(CpuRenderer, DrawsAfterAnySequenceOfEditsWhatAFreshRendererDraws) {
   for (std::size_t i = 0; i < edits.size(); ++i) {
     edits[i](scene);
     edited->setScene(scene);
-    EXPECT_EQ(edited->samples(), 0u);  // no mixing of two scenes in one image
+    EXPECT_EQ(edited->samples(), 0u);  // two scenes must not be mixed in one image
     edited->renderSample(kNever);
     EXPECT_TRUE(sameBits(edited->image(), render(volume, scene, 1, 2))) << "edit " << i;
   }
@@ -382,8 +382,8 @@ TEST(CpuRenderer, SpendsNothingOnChannelsThatCannotBeSeen) {
 }
 
 TEST(CpuRenderer, EstimatesTheErrorThatIsThere) {
-  // Over 1850 pixels, estimate and true error agree to a few percent: independent samples, and replicates
-  // of dependent ones.
+  // Over 1850 pixels, estimate and true error agree to a few percent, for independent samples and for
+  // replicates of dependent ones.
   const auto volume = orbitals();
   Scene scene = orbitalScene(*volume);
   scene.filter = PixelFilter::point;  // where the reference is exact
@@ -397,7 +397,7 @@ TEST(CpuRenderer, EstimatesTheErrorThatIsThere) {
   };
   EXPECT_NEAR(ratioAt(Sampling::independent, 16), 1, 0.1);
   EXPECT_NEAR(ratioAt(Sampling::lowDiscrepancy, 1024), 1, 0.1);
-  // Too few replicates: more error is claimed than there is, never less.
+  // Too few replicates: the estimate is too high, never too low.
   EXPECT_GT(ratioAt(Sampling::lowDiscrepancy, 64), 1);
   EXPECT_TRUE(std::isnan(makeCpuRenderer(volume, 1)->estimatedError()));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is picked is what the picture shows: closed forms for every method and blend mode.
+// Picks agree with the picture: closed forms for every method and blend mode.
 #include "renderer/data/pick.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ std::vector<Picked> pickedIn(const std::shared_ptr<const Volume>& volume, const 
   return pickedIn(*renderer, scene, area);
 }
 
-/// An opaque ball, the level set of a distance, in voxels of unequal sides; a second channel is empty.
+/// An opaque ball, a level set of a distance, in anisotropic voxels; a second channel is empty.
 struct Ball {
   static constexpr double kRadius = 5;
   const glm::dvec3 spacing{0.5, 0.75, 1};
@@ -57,8 +57,8 @@ struct Ball {
   }
 };
 
-/// Interpolation of a distance between voxels is wrong by at most the sum of spacing^2 / (8 x distance); and
-/// a step of the marcher.
+/// Interpolating a distance between voxels is off by at most the sum of spacing^2 / (8 x distance); plus a
+/// step of the marcher.
 const double kBallTolerance = (0.25 + 0.5625 + 1) / (8 * 4.5) + 0.03;
 
 TEST(Pick, OfAnOpaqueBallIsItsSurface) {
@@ -86,7 +86,7 @@ TEST(Pick, OfAnOpaqueBallIsItsSurface) {
           EXPECT_NEAR(hit.depth, hit.point.z - camera.eye.z, 1e-4);
           const glm::dmat4 voxelFromWorld = glm::inverse(ball.volume->grid().worldFromVoxel);
           EXPECT_LT(glm::length(glm::dvec3(voxelFromWorld * glm::dvec4(hit.point, 1)) - hit.voxel), 1e-6);
-          // It is seen in the pixel: the view goes along z with y up, so right is -x.
+          // The point projects into the pixel: the view is along z with y up, so right is -x.
           const double scale =
               perspective
                   ? 24 / (2 * std::tan(camera.fovY * 3.14159265358979 / 360) * (hit.point.z - camera.eye.z))
@@ -133,7 +133,7 @@ TEST(Pick, FindsNothingWhereNothingIsSeen) {
 
 TEST(Pick, OfAnAreaIsThatOfItsPixels) {
   const Ball ball;
-  // 8 x 8 pixels have as many samples each as one alone, and show the same.
+  // Each of 8 x 8 pixels has as many samples as a single pixel, and gives the same hit.
   const auto found = pickedIn(ball.volume, ball.scene, {8, 2, 8, 8});
   std::size_t at = 0;
   for (int y = 2; y < 10; ++y)
@@ -147,7 +147,7 @@ TEST(Pick, OfAnAreaIsThatOfItsPixels) {
   EXPECT_LT(at, 64u);
 }
 
-/// A slab of 4 x 4 x 4 world units, the half in front of channel 0 and that behind of channel 1.
+/// A slab of 4 x 4 x 4 world units: the front half is channel 0, the back half channel 1.
 struct Slab {
   std::shared_ptr<const Volume> volume;
   Scene scene;
@@ -170,7 +170,7 @@ TEST(Pick, IsOfTheChannelInWhichMostSamplesEnd) {
   for (const Method method : kAllMethods)
     for (const BlendMode blend : kBlends) {
       SCOPED_TRACE(testing::Message() << nameOf(method) << " " << nameOf(blend));
-      // In front 1 - e^-0.4 = 0.33 of the rays end, the others at the face of what is behind.
+      // 1 - e^-0.4 = 0.33 of the rays end in front, the others at the face of the back half.
       Slab slab(0.2, 1e4);
       slab.scene.method = method;
       slab.scene.blend = blend;
@@ -178,8 +178,8 @@ TEST(Pick, IsOfTheChannelInWhichMostSamplesEnd) {
       ASSERT_EQ(found.size(), 1u);
       EXPECT_EQ(found[0].channel, 1);
       EXPECT_NEAR(found[0].depth, slab.depthOfMiddle(), 0.06);
-      // With 1 - e^-4 = 0.98 it is the front, where half of those end within ln 2 / 2 (of which 64 samples
-      // leave an uncertainty).
+      // With 1 - e^-4 = 0.98 the front is hit, and half of the rays end within ln 2 / 2 (with an uncertainty
+      // from 64 samples).
       slab.scene.channels[0].density = 2;
       found = pickedIn(slab.volume, slab.scene, {3, 3, 1, 1});
       ASSERT_EQ(found.size(), 1u);
@@ -190,7 +190,7 @@ TEST(Pick, IsOfTheChannelInWhichMostSamplesEnd) {
 
 TEST(Pick, TakesWhatIsFaintButNotWhatIsHardlyThere) {
   for (const Method method : kAllMethods) {
-    // Of 64 samples, 16 and 0.3 are expected to end.
+    // Of 64 samples, 16 are expected to end, and then 0.3.
     Slab slab(0, -std::log(1 - 0.25) / 2);
     slab.scene.method = method;
     EXPECT_EQ(pickedIn(slab.volume, slab.scene, {2, 4, 1, 1}).size(), 1u) << nameOf(method);
@@ -208,7 +208,7 @@ TEST(Pick, IsTheSameWhateverIsLitOrDrawnForAWhile) {
     Scene lit = slab.scene;
     lit.shading = lit.shadows = true;
     EXPECT_EQ(pickedIn(slab.volume, lit, {3, 2, 1, 1}).at(0).point, plain[0].point) << nameOf(method);
-    // While edits arrive, the renderer has a smaller and coarser picture.
+    // While edits arrive, the renderer makes a smaller and coarser picture.
     Scene coarse = slab.scene;
     coarse.width = coarse.height = 3;
     coarse.filter = PixelFilter::point;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long small pictures of a scene may take: until nobody waits for them, and no finer than a ray can be.
+// Limits on small pictures of a scene: they stop when cancelled, and their steps are no finer than a ray
+// allows.
 #include "renderer/engine/step_bias.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +25,7 @@ std::shared_ptr<const Volume> deepVolume() {
   return volumeOf(gridOf(dims), channel(), channel());
 }
 
-/// Seen along its depth, and through all of it: marched for minutes.
+/// A view along the volume's depth through all of it, which takes minutes to march.
 Scene slowScene(const Volume& volume) {
   Scene scene = frontScene(volume, 16, 16);
   for (ChannelAppearance& channel : scene.channels) channel.density = 1e-4;
@@ -36,7 +37,7 @@ Scene slowScene(const Volume& volume) {
   return scene;
 }
 
-/// Whether the work ends as cancelled, and not minutes later.
+/// Whether the work ends with Error(cancelled), and not minutes later.
 template <class Work>
 void expectToEndWhenStopped(Work work) {
   std::stop_source stop;

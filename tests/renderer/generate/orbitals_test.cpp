@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Composite Simpson rule on an even number of intervals.
+/// Composite Simpson rule with an even number of intervals.
 template <class F>
 double simpson(double a, double b, int intervals, F&& f) {
   const double h = (b - a) / intervals;

@@ -45,7 +45,7 @@ TEST_P(EveryBlendMode, OfOneTwelveAndThirtyTwoChannelsMatchesTheReference) {
 }
 
 TEST_P(EveryBlendMode, OfVoxelsThatAreNotFiniteMatchesTheReference) {
-  // In one channel only: the others go on there.
+  // In one channel only: the others continue there.
   for (const double bad : {double(NAN), double(INFINITY), -double(INFINITY)}) {
     const auto holed = [&](int x, int y, int z) {
       return (x == 3 && y == 2) || (x == 0 && y == 5 && z == 4) ? bad : lumps()(x, y, z);
@@ -73,8 +73,8 @@ TEST_P(EveryBlendMode, OfStepsBoxesAndSpikesMatchesTheReference) {
 }
 
 TEST_P(EveryBlendMode, OfOpticalThicknessFromOneThousandthToOneMillionIsKnown) {
-  // Two channels of the same extinction everywhere. Density: both share; max: the first alone; mix: both,
-  // weighted, in the thickness of one; composite: each alone.
+  // Two channels with the same extinction everywhere. Density: both share the light; max: only the first is
+  // seen; mix: both, weighted, with the optical thickness of one; composite: each by itself.
   const glm::ivec3 dims(2, 2, 5);
   const auto one = [](int, int, int) { return 1; };
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, one), channelOf<float>(dims, one));

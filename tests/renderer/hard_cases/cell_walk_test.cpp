@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays that traversals get wrong: along faces and edges, with zero components, and with no sense at all.
+// Rays that traversals often get wrong: along faces and edges, with zero components, and with invalid
+// numbers.
 #include "renderer/kernel/cell_walk.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +15,7 @@
 namespace scolopax::kernel {
 namespace {
 
-/// To the box [-1/2, dims - 1/2].
+/// Clips the ray to the box [-1/2, dims - 1/2].
 kernel::Interval clipToVolume(const kernel::Ray& ray, glm::ivec3 dims) {
   return kernel::clipToBox(ray, glm::vec3(-0.5f), glm::vec3(dims) - 0.5f);
 }
@@ -22,7 +23,7 @@ kernel::Interval clipToVolume(const kernel::Ray& ray, glm::ivec3 dims) {
 constexpr float kDenormal = std::numeric_limits<float>::denorm_min();
 constexpr float kLargest = std::numeric_limits<float>::max();
 
-/// A grid of macrocells without values: walks read none.
+/// A grid of macrocells without values, because walks read none.
 MajorantView gridFor(glm::ivec3 dims, int size) {
   MajorantView grid{};
   grid.cells = glm::max(glm::ivec3(1), (dims - 2 + size) / size);
@@ -34,7 +35,7 @@ std::size_t cellCount(const MajorantView& grid) {
   return std::size_t(grid.cells.x) * std::size_t(grid.cells.y) * std::size_t(grid.cells.z);
 }
 
-/// The clip in double, for rays that are finite.
+/// The same in double, for finite rays.
 Interval clipInDouble(const Ray& ray, glm::ivec3 dims) {
   double enter = 0, exit = 1e300;
   for (int axis = 0; axis < 3; ++axis) {
@@ -59,7 +60,7 @@ TEST(CellWalk, VisitsTheCellsOfARayWithoutGapsAndEndsWithIt) {
       for (int trial = 0; trial < 5000; ++trial) {
         Ray ray;
         for (int axis = 0; axis < 3; ++axis) {
-          // Often exactly on a face of voxels, cells or the box, and often without a component.
+          // Often exactly on a face of voxels, cells or the box, and often with a zero component.
           const float where = (uniform(random) * 0.5f + 0.5f) * float(dims[axis]) - 0.5f;
           const auto kind = random() % 4;
           ray.origin[axis] = kind == 0   ? std::floor(where)
@@ -81,7 +82,7 @@ TEST(CellWalk, VisitsTheCellsOfARayWithoutGapsAndEndsWithIt) {
           ASSERT_LE(step, longestWalk(grid));
           ASSERT_LT(walk.index(), cellCount(grid));
           ASSERT_LE(walk.enter(), walk.exit());
-          // A point of the piece is not moved by more than rounding.
+          // pointAt() moves a point of the piece by no more than rounding.
           const float t = 0.5f * (walk.enter() + walk.exit());
           const glm::vec3 p = ray.origin + t * ray.direction, q = walk.pointAt(t);
           for (int axis = 0; axis < 3; ++axis)
@@ -161,7 +162,7 @@ TEST(CellWalk, OfRaysWithoutSenseIsBoundedAndSeesNothingWhereTheyAreNotFinite) {
       }
       const Interval inside = clipToVolume(ray, dims);
       ASSERT_TRUE(finite || !(inside.enter < inside.exit)) << trial;
-      // Whatever the interval, also one that no caller would walk.
+      // With any interval, even one that no caller would use.
       for (const Interval interval :
            {inside, Interval{0, 10}, Interval{-kInfinity, kInfinity}, Interval{kNaN, kNaN}}) {
         CellWalk walk(ray, interval, grid);
@@ -180,7 +181,8 @@ TEST(CellWalk, OfRaysWithoutSenseIsBoundedAndSeesNothingWhereTheyAreNotFinite) {
   }
 }
 
-/// Totals of a grid with some cells that are not empty, and the same without what makes a walk leap.
+/// Totals of a grid with some cells that are not empty, and the same totals without the distances by which a
+/// walk leaps.
 struct Emptiness {
   std::vector<TotalCode> leaping, plain;
   Emptiness(const MajorantView& grid, std::mt19937& random, int filled) : plain(cellCount(grid)) {

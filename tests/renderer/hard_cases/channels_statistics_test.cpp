@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers of channels and relations between them that a choice among channels gets wrong.
+// Numbers of channels, and relations between channels, for which drawing a channel may go wrong.
 #include <gtest/gtest.h>
 
 #include <utility>
@@ -39,7 +39,8 @@ TEST(Channels, ThatAreIdenticalShareTheLightEqually) {
   for (const int count : {2, 3, 32}) {
     const auto volume = manyChannels(count, [](int) { return [](int, int, int z) { return z; }; });
     Scene scene = frontScene(*volume, 20, 20);
-    for (int counted = 0; counted<count; counted += count> 3 ? 31 : 1) {  // every channel has its turn
+    for (int counted = 0;
+         counted<count; counted += count> 3 ? 31 : 1) {  // with up to 3 channels, each in turn
       for (int n = 0; n < count; ++n)
         scene.channels[std::size_t(n)] = ramp(0, 7, 0.4 / count, n == counted ? kRed : kBlue);
       const double alpha = -std::expm1(-0.4 * 4);
@@ -50,19 +51,20 @@ TEST(Channels, ThatAreIdenticalShareTheLightEqually) {
 }
 
 TEST(Channels, OfWhichOneIsOpaqueBehindOrInFrontOfManyThinOnes) {
-  // Eleven thin red channels fill the box; a blue one, of thickness 1200 and more, its rear or its front
-  // half.
+  // Eleven thin red channels fill the box; a blue one with an optical thickness of at least 1200 fills its
+  // rear or front half.
   for (const bool front : {false, true})
     for (const int place : {0, 11}) {
       const auto volume = manyChannels(
           12, [&](int n) { return [=](int, int, int z) { return n != place || (z < 4) == front ? 1 : 0; }; });
       Scene scene = frontScene(*volume, 20, 20);
-      scene.macrocell = 1;  // else there are a thousand null collisions before the step
+      scene.macrocell = 1;  // otherwise there are a thousand null collisions before the step
       for (int n = 0; n < 12; ++n) scene.channels[std::size_t(n)] = ramp(0, 1, 0.01, kRed);
       scene.channels[std::size_t(place)] = ramp(0, 1, 300, kBlue);
       scene.channels[std::size_t(place)].opacity = {{0, 0}, {0.5, 0}, {0.5, 1}, {1, 1}};  // from 3.5 on
       const double before = front ? 0 : -std::expm1(-0.11 * 4), share = 0.11 / 300.11;
-      const double red = before + (1 - before) * share;  // also of the opaque half, the thin have their share
+      const double red =
+          before + (1 - before) * share;  // the thin channels have a share of the opaque half, too
       expectTrackersMatch(flat(scene, {red, 0, 1 - red, 1}), volume, scene, 100);
     }
 }

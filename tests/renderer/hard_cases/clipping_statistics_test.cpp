@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clip planes and crop: through voxel centres and faces, along rays, through the eye, and where nothing is
-// left.
+// Clip planes and crop: through voxel centres and faces, along rays, through the eye, and with nothing left.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -19,7 +18,7 @@ using namespace test;
 constexpr Method kMethods[] = {Method::superposed, Method::cumulative, Method::syncDda,
                                Method::nDda,       Method::raymarch,   Method::hybrid};
 
-/// Quadrature of a homogeneous box is exact: every pixel has this opacity.
+/// Checks quadrature, which is exact in a homogeneous box: every pixel has optical thickness `depth`.
 void expectMarched(const std::shared_ptr<const Volume>& volume, Scene scene, double depth) {
   for (const Method method : {Method::raymarch, Method::hybrid})
     for (const double step : {0.3, 5.0}) {
@@ -65,7 +64,8 @@ TEST(Clipping, AtAPlaneAlongTheRaysKeepsThoseInThePlane) {
       scene.clip = {{{3, 0, 0}, {sign, 0, 0}, {}}};
       if (some) scene.clip[0].channels = {0};
       const auto reference = reference::renderReference(*volume, scene, 1).image;
-      // Which way the picture's columns run is the reference's to know; that the plane's own is kept is not.
+      // Which side the columns are on is left to the reference; that the column on the plane is kept is
+      // checked here.
       int kept = 0;
       for (int column = 0; column < 8; ++column) kept += reference.pixels[std::size_t(column)].a > 0.5f;
       EXPECT_EQ(kept, sign > 0 ? 5 : 4);
@@ -118,7 +118,7 @@ TEST(Clipping, OfNothingChangesNoBit) {
   }
 }
 
-// What is cut out of one channel, or by regions, is still in the bounds of the cells.
+// Matter cut away from one channel, or by regions, is still in the bounds of the cells.
 TEST(Clipping, OfDenseMatterCostsNoMoreThanItsAbsence) {
   const glm::ivec3 dims(16, 16, 16);
   const auto one = [](int, int, int) { return 1; };
@@ -128,7 +128,7 @@ TEST(Clipping, OfDenseMatterCostsNoMoreThanItsAbsence) {
       Scene scene = frontScene(*volume, 8, 8);
       scene.blend = blend;
       scene.channels = {solid(1e6, kRed), solid(0.05, kBlue)};
-      // Of the dense channel only a layer of four voxels at the far end is left.
+      // Only a layer of four voxels at the far end remains of the dense channel.
       if (regions)
         scene.crop = Crop{{-0.5, -0.5, 11.5}, {7.5, 15.5, 15.5}, 0x7ffffffu & ~(7u | 7u << 3 | 7u << 6)};
       else
@@ -136,14 +136,14 @@ TEST(Clipping, OfDenseMatterCostsNoMoreThanItsAbsence) {
       for (const Method method : kTrackers) {
         const RenderStats stats = statsOf(volume, scene, method, 4);
         EXPECT_EQ(stats.truncatedRays, 0u) << nameOf(method) << ' ' << nameOf(blend);
-        // A draw or two for every channel and span: none in what is cut away.
+        // One or two draws for every channel and span, and none in the parts cut away.
         EXPECT_LT(stats.randomBlocks, 8 * stats.rays) << nameOf(method) << ' ' << nameOf(blend);
       }
       expectTrackersMatchReference(volume, scene, 200, 1);
     }
 }
 
-// A shadow ray along the face that it begins on sees what is on the kept side.
+// A shadow ray along the clip plane on which it begins intersects the matter on the kept side.
 TEST(Clipping, LeavesNoLightThroughWhatLiesAlongAFace) {
   const glm::ivec3 dims(8, 8, 16);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int) { return 1; }));
@@ -163,7 +163,7 @@ TEST(Clipping, LeavesNoLightThroughWhatLiesAlongAFace) {
       }
       const Image picture = renderAnalog(volume, scene, method, 64);
       double sum = 0;
-      for (int row = 0; row < 8; ++row)  // but for the column that the light reaches
+      for (int row = 0; row < 8; ++row)  // except the column that the light reaches
         for (int column = 1; column < 7; ++column) sum += picture.pixels[std::size_t(8 * row + column)].r;
       EXPECT_EQ(sum, 0) << nameOf(method) << " face " << kind;
     }
@@ -231,7 +231,7 @@ const Cut kCuts[] = {
 
 class ClippedScenes : public testing::TestWithParam<int> {};
 
-/// Pairs of cut and blend mode, with scenes and lights in turn.
+/// Pairs of cut and blend mode; scenes and lights alternate.
 TEST_P(ClippedScenes, AreUnbiased) {
   const Cut& cut = kCuts[GetParam()];
   for (int blend = 0; blend < int(std::size(kBlends)); ++blend) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The trackers with random numbers that a test chooses: both ends of every draw, and the exact law of the
-// free flight.
+// The trackers with random numbers chosen by the test: both ends of every draw, and the exact distribution of
+// the free flight.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 #include "tests/support/volumes.h"
 
 namespace scolopax::kernel {
-/// The same block for every draw.
+/// A sampler that returns the same block for every draw.
 struct ScriptedSampler {
   RandomBlock block;
   RandomBlock next() { return block; }
@@ -22,7 +22,7 @@ struct ScriptedSampler {
   static void skipTo(std::uint32_t) {}
 };
 }  // namespace scolopax::kernel
-// The trackers themselves, drawing from the script instead.
+// Compiles the trackers with this sampler instead.
 #define Sampler ScriptedSampler
 #include "renderer/kernel/trackers/one_process.h"
 #include "renderer/kernel/trackers/process_per_channel.h"
@@ -36,8 +36,8 @@ using namespace test;
 constexpr std::uint32_t kLow = 0, kHigh = 0xffffffffu;
 const Ray kAlongZ{{0, 0, -3}, {0, 0, 1}};
 
-/// The next density below that the total of a macrocell holds exactly: the bound is then the extinction
-/// itself, and the law of a single draw is known to the last bits.
+/// The next lower density that a macrocell's total represents exactly: the bound then equals the extinction,
+/// and the distribution of a single draw is known to the last bits.
 double heldExactly(double density) {
   return double(std::bit_cast<float>(std::bit_cast<std::uint32_t>(float(density)) & 0xffff0000u));
 }
@@ -79,7 +79,8 @@ TYPED_TEST(Draws, AtTheirEndsOnlyHitChannelsThatHaveExtinction) {
           const Outcome found = track<TypeParam>(plan, {x, y, z, 0});
           const double depth = double(opticalDepth(uniformOf(x)));
           EXPECT_EQ(found.cost.truncated, 0u);
-          if (x == kLow || density > 16.7 / 4) {  // within one macrocell of 4 voxels, either tracker's law
+          if (x == kLow ||
+              density > 16.7 / 4) {  // the flight ends within one macrocell of 4 voxels for any tracker
             ASSERT_TRUE(found.hit) << density << " " << x << " " << y << " " << z;
             EXPECT_TRUE(found.hit->channel == 1 || found.hit->channel == 2);
             EXPECT_GE(found.hit->place.t(), 2.5f);
@@ -108,8 +109,8 @@ TYPED_TEST(Draws, ThatNeverAcceptNorAdvanceEndAtTheBound) {
 TYPED_TEST(Draws, EndTheFlightWhereTheOpticalDepthSaysFromOneMillionthToOneMillion) {
   const glm::ivec3 dims(1, 1, 40);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int) { return 1; }));
-  // One process carries its draw across all cells; a process per channel draws in every cell, so it gets only
-  // one.
+  // Trackers with one process carry the draw across all cells. Those with a process per channel draw in every
+  // cell, so they get a single cell.
   for (const int macrocell : {1, 7, 64}) {
     if ((std::is_same_v<TypeParam, SyncDda> || std::is_same_v<TypeParam, NDda>)&&macrocell < 64) continue;
     for (const double wanted : {1e-6, 1e-5, 1e-3, 0.1, 1.0, 5.0, 15.0, 100.0, 1e3, 1e6}) {
@@ -118,7 +119,7 @@ TYPED_TEST(Draws, EndTheFlightWhereTheOpticalDepthSaysFromOneMillionthToOneMilli
       scene.macrocell = macrocell;
       scene.channels[0] = solid(density);
       const RenderPlan plan(volume, scene);
-      // First k whose flight leaves the box: its place among all 2^32 is the probability of a collision.
+      // First k whose flight leaves the box: k / 2^32 is the probability of a collision.
       std::uint32_t low = 0, high = kHigh;
       while (low < high) {
         const std::uint32_t middle = low + (high - low) / 2;
@@ -140,7 +141,7 @@ TYPED_TEST(Draws, EndTheFlightWhereTheOpticalDepthSaysFromOneMillionthToOneMilli
 }
 
 TEST(Counters, StayDifferentWhereCountersWrapAround) {
-  // Seeds, pixels and samples next to each other and next to overflow: no two draw the same block.
+  // Neighbouring seeds, pixels and samples, and those next to overflow: no two draw the same block.
   const std::uint32_t ends[] = {0, 1, 0x7fffffffu, 0x80000000u, 0xfffffffeu, 0xffffffffu};
   std::vector<std::array<std::uint32_t, 4>> seen;
   for (const std::uint32_t pixel : ends)

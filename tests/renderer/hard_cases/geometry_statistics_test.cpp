@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shapes of volumes, worlds and cameras that cost precision or hit special cases of a traversal.
+// Shapes of volumes, world transforms and cameras that lose precision or hit special cases of the traversal.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -66,7 +66,7 @@ TEST(Shapes, OfPrimeSizesMatchTheReferenceForMacrocellsThatDoNotDivideThem) {
 }
 
 TEST(Shapes, OfAnisotropicSpacingMatchTheReference) {
-  // 1:1:100, and each other axis as the long one; density is per world unit along any of them.
+  // 1:1:100, with different axes as the long one; density is per world unit along any axis.
   for (const glm::dvec3 spacing : {glm::dvec3(1, 1, 100), glm::dvec3(100, 1, 1), glm::dvec3(1, 0.01, 1)}) {
     const Lumpy lumpy(gridOf({8, 8, 8}, spacing), 0.5 / std::min({spacing.x, spacing.y, 1.0}) / 4);
     const glm::dvec3 centre = 3.5 * spacing, size = 8.0 * spacing;
@@ -101,7 +101,7 @@ TEST(Worlds, OffsetByAMillionAndScaledByABillionLookTheSame) {
 }
 
 TEST(Worlds, OffsetBeyondTheResolutionOfDoubleNumbersEndQuickly) {
-  // Voxels of 1e-9 at 1e6: a tenth of a voxel is the last bit. Nothing can be right, but nothing hangs.
+  // Voxels of 1e-9 at 1e6: a tenth of a voxel is the last bit. Results cannot be right, but nothing may hang.
   const Lumpy lumpy(gridOf({9, 8, 7}, glm::dvec3(1e-9), glm::dvec3(1e6)), 0.5e9);
   Scene scene = frontScene(*lumpy.volume, 32, 32);
   scene.channels = lumpy.channels();
@@ -159,8 +159,8 @@ TEST(Cameras, OfParallelRaysFromAllSidesMatchTheReference) {
 }
 
 TEST(Rays, ThroughVoxelCentresAndAlongMacrocellFacesMatchTheReference) {
-  // Pixel (i, j) looks along the voxels of column 7 - i and row 7 - j: every 4th lies on a face of
-  // macrocells, and where both do on an edge.
+  // The ray of pixel (i, j) runs along the voxels of column 7 - i and row 7 - j. Every 4th column or row lies
+  // on a face between macrocells; where both do, the ray runs along an edge.
   const Lumpy lumpy(gridOf({8, 8, 8}));
   Scene scene = frontScene(*lumpy.volume, 8, 8);
   scene.channels = lumpy.channels();
@@ -171,8 +171,8 @@ TEST(Rays, ThroughVoxelCentresAndAlongMacrocellFacesMatchTheReference) {
 }
 
 TEST(Rays, ParallelToAFaceAtDistanceZeroAreInside) {
-  // 4 x 4 pixels at -0.5, 1.5, 3.5 and 5.5: the outer rays run along faces of the box, the corners' along its
-  // edges.
+  // 4 x 4 pixels at -0.5, 1.5, 3.5 and 5.5: the outer rays run along faces of the box, those in the corners
+  // along its edges.
   const glm::ivec3 dims(6, 6, 6);
   const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, [](int, int, int) { return 1; }));
   Scene scene = frontScene(*volume, 4, 4);
@@ -187,7 +187,7 @@ TEST(Rays, ParallelToAFaceAtDistanceZeroAreInside) {
 
 TEST(Rays, GrazingAFaceMatchTheReference) {
   const Lumpy lumpy(gridOf({9, 8, 7}));
-  for (const double above : {0.0, 1e-6, 1e-3, 0.1})  // over the face y = 7.5, hardly falling
+  for (const double above : {0.0, 1e-6, 1e-3, 0.1})  // above the face y = 7.5, at a grazing angle
     for (const double fall : {1e-3, 0.05}) {
       lumpy.expectPerspective({4, 7.5 + above, -6}, {4, 7.5 + above - fall, -5}, 6);
       lumpy.expectPerspective({4, 7.5 - above, -6}, {4, 7.5 - above + fall, -5}, 6);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Opacity by the gradient: every tracker and marcher against closed forms and the reference, where the
-// gradient is hard on numbers, where it is one-sided or has none, and in all blend modes and lights.
+// gradient is numerically hard, one-sided or undefined, and in all blend modes and lights.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,14 +20,14 @@ using namespace test;
 
 const std::vector<OpacityKnot> kRising{{0, 0}, {1, 1}};
 
-/// Every channel over this part of its gradients.
+/// Sets opacity by the gradient in every channel, over this part of the channel's gradients.
 void setAll(Scene& scene, const Volume& volume, double lowShare, double highShare,
             const std::vector<OpacityKnot>& factor = kRising) {
   for (std::size_t n = 0; n < scene.channels.size(); ++n)
     scene.channels[n].gradientOpacity = factorBetween(volume, n, lowShare, highShare, factor);
 }
 
-/// Every tracker against the reference, through pixel centres, whatever a sample can be.
+/// Compares every tracker with the reference, with rays through pixel centres; samples may have any value.
 void expectUnbiased(const std::shared_ptr<const Volume>& volume, Scene scene) {
   scene.filter = PixelFilter::point;
   const auto expected = reference::renderReference(*volume, scene, 1);
@@ -35,7 +35,7 @@ void expectUnbiased(const std::shared_ptr<const Volume>& volume, Scene scene) {
     EXPECT_TRUE(haveMean(replicate(volume, scene, method), scene, expected)) << nameOf(method);
 }
 
-/// Quadrature of what is linear between its samples is exact.
+/// Checks quadrature, which is exact where the scene is linear between its samples.
 void expectMarched(const std::shared_ptr<const Volume>& volume, Scene scene, double depth) {
   for (const Method method : {Method::raymarch, Method::hybrid}) {
     scene.method = method;
@@ -67,7 +67,7 @@ TEST(GradientThickness, OfARampIsThatOfItsOneGradient) {
 }
 
 TEST(GradientThickness, OfAParabolaIsThePlaceOfTheKnots) {
-  // |gradient| of z^2 is 2z, but in the outermost voxels.
+  // |gradient| of z^2 is 2z, except in the outermost voxels.
   const glm::ivec3 dims(5, 5, 12);
   const auto volume =
       volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int z) { return z * z; }));
@@ -148,7 +148,8 @@ TEST(GradientOpacity, OfEveryTypeAndSlopeMatchesTheReference) {
 }
 
 TEST(GradientOpacity, OfSmallDifferencesOfLargeValuesMatchesTheReference) {
-  // Floats near a million are sixteenths; rounding of interpolated values is that of a few hundredths.
+  // Floats near a million are multiples of 1/16, so interpolated values have rounding errors of a few
+  // hundredths.
   const glm::ivec3 dims(10, 9, 8);
   const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, [](int x, int y, int z) {
                                  return 1e6 + std::round(8 * lumps()(x, y, z));
@@ -172,7 +173,7 @@ std::shared_ptr<const Volume> hardBalls() {
                   channelOf<std::uint8_t>(dims, ball(11.3)));
 }
 
-// Inside, the factor makes almost nothing of a density of a million; a shell of two voxels is opaque.
+// Inside, the factor reduces a density of a million to almost nothing; a shell of two voxels is opaque.
 TEST(GradientOpacity, OfDenseMatterShowsItsEdgesOnly) {
   const auto volume = hardBalls();
   for (const BlendMode blend : kBlends)
@@ -190,7 +191,7 @@ TEST(GradientOpacity, OfDenseMatterShowsItsEdgesOnly) {
         EXPECT_EQ(stats.truncatedRays, 0u) << nameOf(method);
         return double(stats.fetches) / double(stats.rays);
       };
-      // As in ThickCells; a test or a stretch fetches seven times.
+      // As in ThickCells, but a test or a stretch has seven times the fetches.
       for (const Method method : kTrackers) {
         const double thin = fetchesPerRay(method, 1e4);
         EXPECT_LT(fetchesPerRay(method, 1e6), 1.5 * thin + 70) << nameOf(method);
@@ -213,7 +214,7 @@ TEST(GradientOpacity, OfThirtyTwoChannelsMatchesTheReference) {
   expectReference(volume, scene, 200);
   scene.blend = BlendMode::composite;
   expectUnbiased(volume, scene);
-  // Where the reference looks for handovers among 496 pairs, of few by the gradient.
+  // The reference looks for handovers among 496 pairs of channels, few of which depend on the gradient.
   scene.blend = BlendMode::max;
   scene.width = scene.height = 5;
   for (std::size_t n = 0; n < 32; ++n)
@@ -222,7 +223,7 @@ TEST(GradientOpacity, OfThirtyTwoChannelsMatchesTheReference) {
   expectUnbiased(volume, scene);
 }
 
-/// Ways to use it.
+/// Ways to use opacity by the gradient.
 struct Look {
   const char* name;
   std::function<void(Scene&, const Volume&)> apply;
@@ -254,7 +255,7 @@ const Look kLooks[] = {
 
 class GradientLooks : public testing::TestWithParam<int> {};
 
-/// Pairs of look and blend mode, with lights and scenes in turn.
+/// Pairs of look and blend mode; lights and scenes alternate.
 TEST_P(GradientLooks, AreUnbiased) {
   const Look& look = kLooks[GetParam()];
   for (int blend = 0; blend < int(std::size(kBlends)); ++blend) {
@@ -262,7 +263,8 @@ TEST_P(GradientLooks, AreUnbiased) {
     const TestScene which = (blend / 2 + GetParam()) % 2 ? TestScene::noise : TestScene::lumps;
     auto made = *testScene(which);
     made.scene = withSetting(made.scene, blend, light);
-    if (made.scene.shadows) made.scene.width = made.scene.height = 6;  // what the reference does in seconds
+    if (made.scene.shadows)
+      made.scene.width = made.scene.height = 6;  // for which the reference takes seconds
     look.apply(made.scene, *made.volume);
     SCOPED_TRACE(testing::Message() << kTestSceneNames[int(which)] << ' ' << nameOf(kBlends[blend]) << ' '
                                     << kLightConfigurations[light].name);
@@ -286,7 +288,7 @@ TEST_P(GradientLooks, AreWhatQuadratureApproaches) {
       kLooks[GetParam()].apply(made.scene, *made.volume);
       const Image expected = reference::renderReference(*made.volume, made.scene, 1).image;
       for (const Method method : {Method::raymarch, Method::hybrid}) {
-        if (method == Method::hybrid && !light.shadows) continue;  // the same
+        if (method == Method::hybrid && !light.shadows) continue;  // the same as raymarch
         const auto errorAt = [&](double step) {
           made.scene.step = step;
           made.scene.method = method;

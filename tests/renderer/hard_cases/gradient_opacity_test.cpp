@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Opacity by the gradient where the factor is known everywhere: one, which changes no bit of any method's
-// picture, or zero, which leaves nothing of it.
+// picture, or zero, which leaves an empty picture.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -27,7 +27,8 @@ const GradientOpacity kOnes[] = {
 };
 constexpr std::size_t kConstantOnes = 3;
 
-/// The same bits; of quadrature, where a curve that is not constant is integrated, but for rounding.
+/// Expects the same bits; for quadrature, which integrates a curve that is not constant, the same up to
+/// rounding.
 void expectSame(const Image& found, const Image& expected, Method method, bool constant) {
   if (constant || !hasStep(method)) {
     EXPECT_EQ(found.pixels, expected.pixels) << nameOf(method);
@@ -42,7 +43,7 @@ const GradientOpacity kZeros[] = {
     {5, 60, {{0, 0}, {0.5, 0}, {1, 0}}},
     {1e5, 1e6, {{0, 0}, {1, 1}}},  // all gradients are below
     {1e6, 1e6, {{0, 0}, {1, 1}}},
-    {0, 1, {{0, 1}, {0, 0}, {1, 0}}},  // the later of two equal knots holds
+    {0, 1, {{0, 1}, {0, 0}, {1, 0}}},  // of two equal knots the later counts
 };
 
 TEST(GradientOpacity, OfOneEverywhereChangesNoBit) {
@@ -53,7 +54,7 @@ TEST(GradientOpacity, OfOneEverywhereChangesNoBit) {
       for (const Method method : kMethods) {
         const Image expected = renderAnalog(made.volume, plain, method, 3);
         for (std::size_t i = 0; i < std::size(kOnes); ++i) {
-          // Rounding may decide whether a shadow ray meets something.
+          // Rounding may decide whether a shadow ray intersects anything.
           if (i >= kConstantOnes && method == Method::hybrid && plain.shadows) continue;
           Scene scene = plain;
           setAll(scene, kOnes[i]);
@@ -77,7 +78,7 @@ TEST(GradientOpacity, OfZeroEverywhereLeavesNothing) {
     }
 }
 
-/// A ramp along z: its gradient is the same everywhere, also in the outer half voxels.
+/// A ramp along z: its gradient is the same everywhere, including the outer half voxels.
 template <class T>
 std::shared_ptr<const Volume> rampOf(const Grid& grid, double slope = 1, double intercept = 0) {
   return volumeOf(grid, channelOf<T>(
@@ -105,12 +106,12 @@ TEST(GradientOpacity, OfARampIsOnOneSideOfAStep) {
   expectStep(rampOf<std::int16_t>(gridOf(dims, {1, 2, 4}), -3, 100), 7.5);
   expectStep(rampOf<std::uint16_t>(gridOf({1, 1, 2}, {3, 1, 2}), 0.5, -7), 2.5);
   Grid sheared = gridOf(dims);
-  sheared.worldFromVoxel[0] = {1, 0.25, 0, 0};  // the gradient of voxels' z is (0, 0, 1) nevertheless
+  sheared.worldFromVoxel[0] = {1, 0.25, 0, 0};  // the gradient of the voxel coordinate z is still (0, 0, 1)
   expectStep(rampOf<float>(sheared), 10);
 }
 
 TEST(GradientOpacity, IsZeroWhereNoDifferenceIsFinite) {
-  // Up to the second layer the scalar is finite; one voxel further it is not.
+  // The scalar is finite up to the second layer; one voxel further it is not.
   const glm::ivec3 dims(6, 6, 4);
   const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, [](int, int, int z) {
                                  return z == 2 ? std::numeric_limits<double>::quiet_NaN() : 1.0;

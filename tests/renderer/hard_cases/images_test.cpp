@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whole pictures whose pixels are known exactly: sizes, faces, neighbours, hidden and broken channels.
+// Whole pictures whose pixels are known exactly: sizes, faces, neighbours, hidden channels and channels
+// without finite voxels.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -40,12 +41,13 @@ TEST(Film, DoesNotDriftInTenMillionSamples) {
   }
   ASSERT_EQ(film.samples(), 10'000'000u);
   EXPECT_EQ(film.image().pixels[0], glm::vec4(0.1f, 0.7f, 1e-6f, 1.0f));
-  // Sums of n terms are off by at most n 2^-53 of themselves; their difference is 0 but for that.
+  // Sums of n terms have a relative error of at most n 2^-53; their difference is 0 except for that.
   EXPECT_LT(film.estimatedError(), std::sqrt(3 * 0x1p-53 * 1.5 / 4));
 }
 
 TEST(Film, ClaimsTheErrorOfItsWholeReplicatesUntilTheNextIsWhole) {
-  // What has begun is not yet spread evenly: it neither adds to what is known nor counts as samples.
+  // An incomplete replicate is not yet spread evenly: it neither contributes to the estimate nor counts as
+  // samples.
   Film film;
   film.reset(1, 1);
   double whole = 0;
@@ -62,9 +64,9 @@ TEST(Film, ClaimsTheErrorOfItsWholeReplicatesUntilTheNextIsWhole) {
 }
 
 TEST(Film, TakesTheErrorFromTheSpreadOfTheReplicates) {
-  // Samples that differ wildly within every replicate and not at all between them: no error. Means of the
-  // replicates that alternate between 0 and 1: the standard deviation of 16 such is sqrt(4 / 15), of their
-  // mean a quarter of it; one of four components has it, be it alpha.
+  // Samples that differ strongly within every replicate but not between replicates: no error. Replicates
+  // whose means alternate between 0 and 1: the standard deviation of 16 of them is sqrt(4 / 15), that of
+  // their mean a quarter of it; one of the four components has it, which may be alpha.
   for (const int component : {0, 3})
     for (const bool alternate : {false, true}) {
       Film film;
@@ -106,7 +108,7 @@ TEST(Picture, OfOnePixelIsThatOfTheRayThroughItsCentre) {
 
 TEST(Picture, Of8KHasEveryPixelAndItsCornersInTheirPlaces) {
   const glm::ivec3 dims(16, 9, 1);
-  // 0 inside, the corners 1 to 4; within half a voxel of both faces a corner has its own value.
+  // 0 inside, 1 to 4 in the corners; within half a voxel of both faces a corner has its own value.
   const auto corner = [](int x, int y, int) {
     return (x == 0 || x == 15) && (y == 0 || y == 8) ? 1 + (x == 15) + 2 * (y == 8) : 0;
   };
@@ -120,7 +122,7 @@ TEST(Picture, Of8KHasEveryPixelAndItsCornersInTheirPlaces) {
   std::size_t opaque = 0;
   for (const glm::vec4& p : image.pixels) opaque += p.a == 1;
   EXPECT_EQ(opaque, image.pixels.size());
-  // Seen along +z with y up, x runs to the left.
+  // Seen along +z with y up, x increases to the left.
   const std::size_t right = 7679, bottom = 4319u * 7680u;
   EXPECT_EQ(glm::vec3(image.pixels[right]), glm::vec3(kBlue));  // x = 0, y = 8
   EXPECT_EQ(glm::vec3(image.pixels[0]), glm::vec3(kWhite));
@@ -132,7 +134,8 @@ TEST(Picture, OfABrightVoxelAtTheBorderIsDarkOnTheOppositeSide) {
   const int n = 8;
   for (const glm::ivec3 bright : {glm::ivec3(0, 0, 0), glm::ivec3(7, 0, 7), glm::ivec3(0, 7, 3),
                                   glm::ivec3(7, 7, 0), glm::ivec3(7, 4, 4), glm::ivec3(3, 0, 7)})
-    for (int axis = 0; axis < 3; ++axis) {  // seen along each axis, so that each can wrap
+    for (int axis = 0; axis < 3;
+         ++axis) {  // views along each axis, so that wrapping around any axis is detected
       const auto value = [&](int x, int y, int z) { return glm::ivec3(x, y, z) == bright ? 255 : 0; };
       const auto volume = volumeOf(gridOf(glm::ivec3(n)), channelOf<std::uint8_t>(glm::ivec3(n), value));
       Scene scene = frontScene(*volume, 16, 16);
@@ -148,7 +151,7 @@ TEST(Picture, OfABrightVoxelAtTheBorderIsDarkOnTheOppositeSide) {
       for (const Method method : kTrackers) {
         const Image image = renderAnalog(volume, scene, method, 1);
         for (int pixel = 0; pixel < 16 * 16; ++pixel) {
-          // Distance of the pixel's nearest point from the voxel's centre, across the view.
+          // Distance of the pixel's nearest point from the voxel's centre, perpendicular to the view.
           double nearest = 0;
           const glm::dvec3 centre =
               (double(pixel % 16) - 7.5) * 0.5 * right + (7.5 - double(pixel / 16)) * 0.5 * up + 3.5;
@@ -156,7 +159,8 @@ TEST(Picture, OfABrightVoxelAtTheBorderIsDarkOnTheOppositeSide) {
             if (a != axis) nearest = std::max(nearest, std::abs(centre[a] - bright[a]) - 0.25);
           const float alpha = image.pixels[std::size_t(pixel)].a;
           ASSERT_TRUE(nearest < 1 || alpha == 0) << "axis " << axis << " pixel " << pixel;
-          // At most half a voxel off: at least 1000 * 1/4 * 1/2 thick, on a face as in the middle.
+          // At most half a voxel away: an optical thickness of at least 1000 * 1/4 * 1/2, at faces and
+          // inside.
           ASSERT_TRUE(nearest > 0 || alpha == 1) << "axis " << axis << " pixel " << pixel;
         }
       }
@@ -169,7 +173,7 @@ TEST(Picture, HasOnlyColoursOfThePalette) {
                                channelOf<float>(dims, lumps(1)), channelOf<float>(dims, lumps(2)));
   Scene scene = viewFrom(*volume, {20, 15, -9}, {4, 4, 4}, 35, 48);
   scene.channels = {ramp(0, 1, 0.5, {0.2, 0.4, 0.6}), ramp(0, 1, 0.5, {0.9, 0.1, 0.3}), ramp(0, 1, 0.3)};
-  scene.channels[2].color = {{0, {0, 0.5, 0}}, {1, {1, 0.5, 0}}};  // red runs, green and blue do not
+  scene.channels[2].color = {{0, {0, 0.5, 0}}, {1, {1, 0.5, 0}}};  // red varies, green and blue do not
   for (const Method method : kTrackers) {
     int seen[4] = {};
     for (const glm::vec4& p : renderAnalog(volume, scene, method, 1).pixels) {
@@ -237,7 +241,7 @@ TEST(Picture, OfThirtyTwoChannelsWithAllButOneHiddenIsThatOneAlone) {
 }
 
 TEST(Picture, ThickerThanCanBeTrackedEndsAndSaysSo) {
-  // A spike of extinction 1e30 that no ray meets: the bound is 1e30, and every collision is null.
+  // A spike of extinction 1e30 that no ray hits: the bound is 1e30, and every collision is null.
   const glm::ivec3 dims(2, 2, 4);
   const auto value = [](int, int, int z) { return z < 2 ? 0 : 1; };
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, value));
@@ -248,10 +252,10 @@ TEST(Picture, ThickerThanCanBeTrackedEndsAndSaysSo) {
     const RenderStats stats = statsOf(volume, scene, method, 2);
     EXPECT_EQ(stats.rays, 8u);
     EXPECT_EQ(stats.truncatedRays, 8u);
-    // The bound, and what a ray fetched before it looked closer.
+    // The limit, and the fetches before the ray used bounds of stretches.
     EXPECT_LE(stats.fetches, 8u * (kernel::kMaxTentativeCollisions + 2 * kernel::kPatience));
   }
-  scene.channels[0].opacity = {{0, 1}};  // as thick, without a null collision
+  scene.channels[0].opacity = {{0, 1}};  // as thick, but without null collisions
   for (const Method method : kTrackers) {
     EXPECT_EQ(statsOf(volume, scene, method, 2).truncatedRays, 0u);
     EXPECT_EQ(largestAlpha(renderAnalog(volume, scene, method, 2)), 1);

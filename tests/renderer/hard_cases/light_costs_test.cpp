@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What light costs, in counts: nothing when it is off or cannot be seen, and what is left is just what it
+// The cost of light, in counts: nothing when it is off or has no visible effect; otherwise only what it
 // needs. Every method, every blend mode.
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ class LightCosts : public testing::TestWithParam<BlendMode> {
   RenderStats stats(const Scene& scene, Method method) const {
     return statsOf(made_.volume, scene, method, kSamples);
   }
-  /// Of all samples, where a ray ends at one collision.
+  /// Number of collisions in all samples, for methods in which a ray ends at one collision.
   double collisions(Scene scene, Method method) const {
     scene.method = method;
     const auto renderer = makeCpuRenderer(made_.volume, 0);
@@ -64,7 +64,7 @@ TEST_P(LightCosts, OfShadingAreSixFetchesForEveryChannelShownAndNoRay) {
     shaded.shading = true;
     const RenderStats off = stats(scene_, method), on = stats(shaded, method);
     EXPECT_EQ(on.cellSteps, off.cellSteps) << nameOf(method);
-    // Quadrature draws the places that it lights.
+    // Quadrature draws the places at which it computes lighting.
     if (!hasStep(method)) {
       EXPECT_EQ(on.randomBlocks, off.randomBlocks) << nameOf(method);
     }
@@ -83,7 +83,7 @@ TEST_P(LightCosts, OfShadowsAreRaysAndNoGradient) {
     const RenderStats off = stats(scene_, method), on = stats(shadowed, method);
     EXPECT_GT(on.cellSteps, off.cellSteps) << nameOf(method);
     EXPECT_GT(on.randomBlocks, off.randomBlocks) << nameOf(method);
-    // Shading beside them adds gradients and nothing else.
+    // Shading in addition only adds gradients.
     Scene both = shadowed;
     both.shading = true;
     const RenderStats lit = stats(both, method);
@@ -114,10 +114,10 @@ TEST_P(LightCosts, OfShadowsOnMatterThatIsFullyAmbientAreNone) {
     Scene shadowed = scene_;
     shadowed.shadows = true;
     expectSame(stats(shadowed, method), stats(scene_, method), method);
-    // One channel that light matters to is enough.
+    // One channel on which light has an effect is enough.
     shadowed.channels[1].material.ambient = 0.5;
     EXPECT_GT(stats(shadowed, method).cellSteps, stats(scene_, method).cellSteps);
-    // Unless nobody sees it.
+    // Unless it is hidden.
     shadowed.channels[1].visible = false;
     Scene hidden = scene_;
     hidden.channels[1].visible = false;

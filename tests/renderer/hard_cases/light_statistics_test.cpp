@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hard cases with light on: every tracker, shaded and in shadow, against the reference.
+// Hard cases with lighting: every tracker, with shading and shadows, against the reference.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -18,7 +18,8 @@ const glm::ivec3 kDims(7, 6, 5);
 constexpr double kLargest = std::numeric_limits<float>::max();
 constexpr double kDenormal = std::numeric_limits<float>::denorm_min();
 
-/// Both kinds of light, unless the scene has them, materials that differ, and all of it on.
+/// Switches on shading and shadows, with different materials and, unless the scene has lights, both kinds of
+/// light.
 Scene lit(const Volume& volume, Scene scene) {
   const std::vector<Light> lights = scene.lights;
   furnish(volume.grid(), scene);
@@ -126,7 +127,7 @@ TEST(Light, OnTheFullRangeOfIntegersMatchesTheReference) {
 }
 
 TEST(Light, OnAStepMatchesTheReference) {
-  // lo == hi: what has a gradient at all is shaded fully.
+  // lo == hi: every point with a gradient is shaded fully.
   const auto volume = volumeOf(gridOf(kDims), channelOf<float>(kDims, lumps(1)));
   Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kSide);
   scene.channels = {ramp(0.5, 0.5, 0.5, kGreen)};
@@ -139,7 +140,7 @@ TEST(Light, OnSpacingsOfOneToAHundredMatchesTheReference) {
     lumpy.scene.camera.target = 3.5 * spacing;
     lumpy.scene.camera.eye = lumpy.scene.camera.target + 500.0 * glm::dvec3(1.2, 0.9, -1.4);
     lumpy.scene.camera.up = {0.1, 1, 0.2};
-    lumpy.scene.camera.orthoHeight = 6;  // the middle of what is long
+    lumpy.scene.camera.orthoHeight = 6;  // the middle of the long volume
     for (auto& channel : lumpy.scene.channels) channel.material = {0.1, 0.5, 0.8, 12};
     SCOPED_TRACE(testing::Message() << spacing.x << ' ' << spacing.y << ' ' << spacing.z);
     lumpy.expectMatches();
@@ -157,7 +158,7 @@ TEST(Light, InWorldsOffsetByAMillionAndScaledByABillionMatchesTheReference) {
 }
 
 TEST(Light, FromVeryFarMatchesTheReference) {
-  // A point light farther than the square root of the largest float, in voxels.
+  // Point lights up to farther away, in voxels, than the square root of the largest float.
   for (const double far : {1e6, 1e15, 1e20, 1e30}) {
     LitLumps lumpy(gridOf({9, 8, 7}));
     lumpy.scene.lights = {{LightType::point, far * glm::dvec3(0.5, 0.7, -0.3), glm::dvec3(1), 1}};
@@ -187,7 +188,7 @@ TEST(Light, AlongAxesAndFacesOfMacrocellsMatchesTheReference) {
     SCOPED_TRACE(testing::Message() << to.x << ' ' << to.y << ' ' << to.z);
     lumpy.expectMatches();
   }
-  // Rays and light on the faces between macrocells.
+  // Rays and light along the faces between macrocells.
   Scene front = frontScene(*lumpy.volume, 8, 8);
   front.channels = lumpy.scene.channels;
   front.lights = {{LightType::directional, {0, 1, 0}, glm::dvec3(1), 1}};
@@ -200,11 +201,12 @@ TEST(Light, OfNoIntensityChangesNothing) {
   lumpy.scene.lights.push_back({LightType::point, {4, 4, 4}, glm::dvec3(0), 1});
   lumpy.expectMatches();
   lumpy.scene.lights.erase(lumpy.scene.lights.begin(), lumpy.scene.lights.begin() + 2);
-  lumpy.expectMatches();  // nothing but these: not a headlight, and no shadow
+  lumpy.expectMatches();  // only these lights: no headlight, and no shadow
 }
 
 TEST(Shadows, OfABoxAreKnownFromOneThousandthToOneMillion) {
-  // Lit from the front, a homogeneous box of thickness d shows (1 - exp(-2 d)) / 2, from behind d exp(-d).
+  // A homogeneous box of thickness d shows (1 - exp(-2 d)) / 2 when lit from the front, d exp(-d) from
+  // behind.
   const glm::ivec3 dims(4, 4, 8);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int) { return 1; }));
   for (const double depth : {1e-3, 0.1, 1.0, 10.0, 1e3, 1e6})

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light whose value is known exactly: in a linear field of constant opacity every collision shows the same,
-// so that colour over alpha is the formula, in every method and at every sample.
+// Lighting whose value is known exactly: in a linear field of constant opacity every collision has the same
+// radiance, so that colour over alpha equals the formula, for every method and at every sample.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,7 +18,7 @@ constexpr Method kMethods[] = {Method::superposed, Method::cumulative, Method::s
                                Method::nDda,       Method::raymarch,   Method::hybrid};
 const glm::dvec3 kColor(0.8, 0.4, 0.2);
 
-/// Value a . voxel over the range [0, range], seen along +z by parallel rays.
+/// A field of value dot(a, voxel) over the range [0, range], seen along +z with parallel rays.
 struct LinearField {
   glm::dvec3 a{0, 0, 1};
   double range = 1, offset = 0;
@@ -93,7 +93,7 @@ TEST(ExactLight, OnGradientsWhoseSquaresOverflowOrUnderflowIsThatOfOthers) {
     field.a = {0, 0, scale};
     field.range = 4 * scale;
     const double g = 0.25;
-    // Denormal values have few digits: 1e-40 is known to 1e-5.
+    // Denormal values have few digits: 1e-40 is accurate to 1e-5.
     field.expectRadiance(field.shaded(1 - (1 - g) * (1 - g), 1, 1), scale < 1e-38 ? 1e-4 : 1e-5);
   }
 }
@@ -111,8 +111,8 @@ TEST(ExactLight, OnIntegersOfFullRangeIsThatOfTheirSlope) {
 }
 
 TEST(ExactLight, OnSpacingsOfOneToAHundredHasTheNormalOfTheWorld) {
-  // f = x/1 + z/100 in voxels of 1 and 100: in the world a gradient of 1 along x and of 1 along z as well, if
-  // a = (1, 0, 100) per voxel.
+  // Voxels of 1 along x and 100 along z: with a = (1, 0, 100) per voxel, the gradient in world space is 1
+  // along x and 1 along z.
   LinearField field;
   field.grid = gridOf({5, 6, 7}, {1, 1, 100});
   field.density = 0.005;
@@ -126,7 +126,7 @@ TEST(ExactLight, OnSpacingsOfOneToAHundredHasTheNormalOfTheWorld) {
 }
 
 TEST(ExactLight, FromExactlyBehindHasNoHighlight) {
-  // Light and view cancel: where the half vector should point is a matter of rounding. Turned grids too.
+  // Light and view direction cancel: rounding decides where the half vector points. Also with rotated grids.
   LinearField field;
   field.material.shininess = 1;
   field.a = {0.7, 0.1, 0.3};
@@ -170,7 +170,7 @@ TEST(ExactLight, OfNoIntensityLeavesTheAmbientShare) {
   for (const bool shadows : {false, true}) {
     field.shadows = shadows;
     field.expectRadiance(field.shaded(1, 0, 0));
-    field.range = 4;  // no light that could be in shadow: what is not shaded keeps its colour
+    field.range = 4;  // no light that could be shadowed: what is not shaded keeps its colour
     const double s = 1 - 0.75 * 0.75;
     field.expectRadiance(field.shaded(s, 0, 0));
     field.range = 1;
@@ -179,7 +179,7 @@ TEST(ExactLight, OfNoIntensityLeavesTheAmbientShare) {
 
 TEST(ExactLight, ThatNothingIsInTheWayOfIsNotDimmedBySwitchingShadowsOn) {
   LinearField field;
-  field.density = 1e-4;  // a shadow ray in a thousand would be stopped
+  field.density = 1e-4;  // one shadow ray in a thousand would be blocked
   const auto volume =
       volumeOf(field.grid, channelOf<float>(field.grid.dims, [](int, int, int z) { return z; }));
   Scene scene = frontScene(*volume, 32, 32);
@@ -195,11 +195,11 @@ TEST(ExactLight, ThatNothingIsInTheWayOfIsNotDimmedBySwitchingShadowsOn) {
         scene.shadows = shadows;
         glm::dvec4 sum(0);
         for (const glm::vec4& p : renderAnalog(volume, scene, method, 200).pixels) sum += glm::dvec4(p);
-        EXPECT_GT(sum.a, 0.1);  // of trackers, 140 collisions
+        EXPECT_GT(sum.a, 0.1);  // with trackers, 140 collisions
         return glm::dvec3(sum) / sum.a;
       };
       const glm::dvec3 without = radiance(false), with = radiance(true);
-      // At most one of two lights at two of the collisions, and the ray's own jitter.
+      // At most one of the two lights is blocked, at two of the collisions; plus the ray's own jitter.
       for (int c = 0; c < 3; ++c) EXPECT_NEAR(with[c] / without[c], 1, 0.02) << nameOf(method) << shading;
     }
 }
@@ -269,7 +269,7 @@ TEST(ExactBlend, OfIdenticalChannelsInMixIsTheirWeightedSum) {
 }
 
 TEST(Light, OnAChannelAsThinAsFloatsCanSayChangesNothing) {
-  // Its share of a stratum, or one over that, is beyond floats.
+  // Its share of a stratum, or the reciprocal, is out of the range of floats.
   const glm::ivec3 dims(6);
   for (const float thin : {1.0f, 1e3f, 1e6f, 1e9f}) {
     const auto volume = volumeOf(gridOf(dims, glm::dvec3(0.25)), channelOf<float>(dims, lumps()),

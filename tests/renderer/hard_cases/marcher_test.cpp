@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hard cases of the ray marcher. In a homogeneous box its quadrature is exact at any step, whatever the
-// jitter; where the scalar is linear, whatever the curve.
+// Hard cases of the ray marcher. Its quadrature is exact at any step and jitter in a homogeneous box and, for
+// any curve, where the scalar is linear.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -29,7 +29,7 @@ TEST(RayMarch, OfABoxHidesOneMinusExpOfItsThicknessFromOneMillionthToOneMillion)
       const bool both = blend == BlendMode::density || blend == BlendMode::composite;
       const double alpha = -std::expm1(-(both ? 2 : 1) * thickness);
       const double red = blend == BlendMode::density ? alpha / 2 : -std::expm1(-thickness);
-      // Where transmittance falls below 1e-4 what lies behind is not looked at.
+      // The marcher stops where transmittance falls below 1e-4.
       const double tolerance = (both ? 2 : 1) * thickness > 9 ? 1e-4 : 1e-5;
       for (const glm::vec4& pixel : march(volume, scene, 4).pixels) {
         ASSERT_NEAR(double(pixel.a) / alpha, 1, tolerance) << nameOf(blend) << ' ' << thickness;
@@ -55,7 +55,7 @@ TEST(RayMarch, OfASpikeNarrowerThanAStepHidesWhatIsInIt) {
           scene.channels[0] = ramp(0, n - 1, depth / (0.5 * width * (n - 1)), kRed);
           scene.channels[0].opacity = {{0.4 - width / 2, 0}, {0.4, 1}, {0.4 + width / 2, 0}};
           scene.channels[1] = solid(0, kBlue);
-          // Positions on the curve are floats: a width of 1e-5 is one to 0.5 %.
+          // Positions on the curve are floats: a width of 1e-5 is accurate to 0.5 %.
           const double tolerance = width < 1e-3 ? 6e-3 : 1e-4;
           for (const glm::vec4& pixel : march(volume, scene, 4).pixels)
             ASSERT_NEAR(double(pixel.a) / -std::expm1(-depth), 1, tolerance)
@@ -64,7 +64,7 @@ TEST(RayMarch, OfASpikeNarrowerThanAStepHidesWhatIsInIt) {
 }
 
 TEST(RayMarch, OfMoreStepsThanAFloatCanCountEnds) {
-  // 1:1:100 and the finest step: 2e7 steps along the box, of which only the far end is not empty.
+  // 1:1:100 and the finest step: 2e7 steps along the box, which is empty except at its far end.
   const glm::ivec3 dims(2, 2, 2000);
   const auto volume = volumeOf(gridOf(dims, {1, 1, 100}),
                                channelOf<std::uint8_t>(dims, [](int, int, int z) { return z > 1990; }));
@@ -103,7 +103,7 @@ TEST(RayMarch, OfVoxelsThatAreNotFiniteIsFinite) {
 }
 
 TEST(RayMarch, EndsWhereStepsAreTooManyToCount) {
-  // The step is one of the smallest spacing; along z there are 10^10 of them, and emptiness on the way.
+  // The step is the smallest spacing; along z there are 10^10 steps, through empty space.
   const glm::ivec3 dims(8, 8, 32);
   const auto volume =
       volumeOf(gridOf(dims, {1, 1, 1e8}),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What thick macrocells cost a tracker, in counts: the front that a ray ends at, and not what is empty beside
-// it.
+// The cost of thick macrocells for a tracker, in counts: it depends on the front at which a ray ends, not on
+// the empty space next to it.
 #include <gtest/gtest.h>
 
 #include "tests/renderer/hard_cases/hard_scenes.h"
@@ -12,7 +12,7 @@ using namespace test;
 
 constexpr BlendMode kBlends[] = {BlendMode::density, BlendMode::max, BlendMode::mix, BlendMode::composite};
 
-/// Two balls of 8-bit values that fall to 0 outside, in different places.
+/// Two balls of 8-bit values that fall to 0 outside, at different places.
 std::shared_ptr<const Volume> balls() {
   const glm::ivec3 dims(20);
   const auto ball = [](double centre) {
@@ -44,8 +44,8 @@ INSTANTIATE_TEST_SUITE_P(BlendModes, ThickCells, testing::ValuesIn(kBlends),
                          [](const auto& tested) { return std::string(nameOf(tested.param)); });
 
 TEST_P(ThickCells, CostNoMoreWithAHundredTimesTheDensity) {
-  // Null collisions before a front are as many as the bound is thick there; stretches of a ray that end in
-  // one grow with the logarithm.
+  // With one bound per macrocell, the null collisions before a front are proportional to the bound; with
+  // stretches of a ray, the cost grows with its logarithm.
   for (const bool shadows : {false, true})
     for (const Method method : kTrackers) {
       scene_.shadows = shadows;

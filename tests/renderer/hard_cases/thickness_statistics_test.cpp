@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Optical thickness over twelve decades, and curves whose features quadratures and bounds miss. The volume is
-// a ramp along the rays, so that every thickness has a closed form: the area under the curve.
+// Optical thickness over twelve decades, and curves with features that quadratures and bounds may miss. The
+// volume is a ramp along the rays, so that every thickness has a closed form: the area under the curve.
 #include <gtest/gtest.h>
 
 #include "tests/renderer/hard_cases/hard_scenes.h"
@@ -19,8 +19,8 @@ std::shared_ptr<const Volume> rampAlongZ(int n) {
 }
 
 TEST(Thickness, OfOneHundredThousandthIsNotAFactorOfTwoOff) {
-  // 34 million rays see 340 collisions: 6 sigma are 33 %. From 1e-6 on the exact law is tested without noise
-  // in draws_test.
+  // 34 million rays have 340 collisions: 6 sigma are 33 %. draws_test tests the exact law from 1e-6 on
+  // without noise.
   const glm::ivec3 dims(4, 4, 16);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int) { return 1; }));
   const double thickness = 1e-5, alpha = -std::expm1(-thickness);
@@ -53,7 +53,7 @@ TEST(Thickness, OfAFallingRampHidesItsAreaAndShowsItsFront) {
     scene.channels[0].opacity = {{0, 1}, {1, 0}};
     expectThickness(volume, scene, thickness, kRed, 300);
   }
-  // Where along the ray: red up to the 4th voxel, blue behind.
+  // Tests the place along the ray: red up to the 4th voxel, blue behind.
   Scene scene = frontScene(*volume, 24, 24);
   scene.channels[0] = ramp(0, n - 1, 0.2);
   scene.channels[0].opacity = {{0, 1}, {1, 0}};
@@ -76,7 +76,8 @@ TEST(Thickness, OfASpikeOneHundredThousandthOfTheRangeWideIsItsArea) {
 }
 
 TEST(Thickness, OfSpikesAtBothEndsOfTheRangeIsThatOfTheHalfVoxelsOutside) {
-  // The values 0 and n - 1 themselves fill the outer half voxels; the spikes on the ramp are next to nothing.
+  // The outer half voxels have exactly the values 0 and n - 1; the parts of the spikes on the ramp are
+  // negligible.
   const int n = 9;
   const auto volume = rampAlongZ(n);
   Scene scene = frontScene(*volume, 24, 24);
@@ -86,7 +87,8 @@ TEST(Thickness, OfSpikesAtBothEndsOfTheRangeIsThatOfTheHalfVoxelsOutside) {
 }
 
 TEST(Thickness, OfBoxesAndStepsIsTheirWidthAtAnyMacrocellSize) {
-  // The sharp boxes lie between voxels, inside a macrocell or across two: a bound taken at voxels is 0 there.
+  // The sharp boxes lie between voxels, inside one macrocell or across two: bounds from voxel values alone
+  // are 0 there.
   const int n = 17;
   const auto volume = rampAlongZ(n);
   const std::vector<std::pair<std::vector<OpacityKnot>, double>> curves = {
@@ -107,7 +109,7 @@ TEST(Thickness, OfBoxesAndStepsIsTheirWidthAtAnyMacrocellSize) {
 }
 
 TEST(Thickness, OfCellsThatTrackersLookAtCloselyIsThatOfTheReference) {
-  // Noise between 8-bit voxels, most of it empty: dense matter and nothing in every macrocell.
+  // Noise in 8-bit voxels, mostly empty: every macrocell contains both dense matter and empty space.
   const glm::ivec3 dims(9, 8, 7);
   std::uint32_t state = 3;
   const auto noise = [&](int, int, int) { return (state = state * 1664525u + 1013904223u) >> 24; };
@@ -141,7 +143,8 @@ TEST(Thickness, DoesNotDriftInAMillionSamples) {
     const Image image = renderAnalog(volume, scene, method, 1'000'000, 1);
     EXPECT_TRUE(isUnbiased(image, 1'000'000, flat(scene, {alpha, 0, 0, alpha})));
     const double samples = 1e6 * statisticsFactor();
-    const double hits = double(image.pixels[0].a) * samples;  // whole: none lost, none added twice
+    const double hits =
+        double(image.pixels[0].a) * samples;  // a whole number: no sample is lost or added twice
     EXPECT_NEAR(hits, std::round(hits), samples * 0x1p-25);
     EXPECT_EQ(image.pixels[0].r, image.pixels[0].a);
   }

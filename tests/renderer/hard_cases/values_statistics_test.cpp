@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Voxel values and ranges that lose precision or meaning, through the trackers and the reference.
+// Voxel values and ranges that lose precision or meaning, in the trackers and the reference.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -16,7 +16,7 @@ const glm::ivec3 kDims(7, 6, 5);
 constexpr double kLargest = std::numeric_limits<float>::max();
 constexpr double kDenormal = std::numeric_limits<float>::denorm_min();
 
-/// One channel of values f(i,j,k) from the side, over [lo, hi], against the reference.
+/// Compares one channel of values f(i,j,k), seen from the side over [lo, hi], with the reference.
 template <class T, class F>
 void expectRangeMatches(F&& value, double lo, double hi, double slope = 1, double intercept = 0) {
   const auto volume = volumeOf(gridOf(kDims), channelOf<T>(kDims, value, slope, intercept));
@@ -26,7 +26,7 @@ void expectRangeMatches(F&& value, double lo, double hi, double slope = 1, doubl
   expectReference(volume, scene, kSamples);
 }
 
-/// Between lo and hi, lumpy.
+/// A lumpy field between lo and hi.
 auto between(double lo, double hi) {
   return [=](int x, int y, int z) { return lo + (hi - lo) * lumps(1)(x, y, z); };
 }
@@ -112,7 +112,7 @@ TEST(VoxelValues, OfTheFullRangeOfIntegersMatchTheReference) {
 }
 
 TEST(VoxelValues, BelowAndAboveAnEmptyRangeAreSeparatedAtIt) {
-  // Thickness: what lies at or above the value on a ramp, for either sign of the slope.
+  // The optical thickness is that of the part of a ramp at or above the value, for either sign of the slope.
   const int n = 9;
   const glm::ivec3 dims(2, 2, n);
   const auto up = [](int, int, int z) { return z; };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stored value -> position on the curves, for values and ranges that lose precision or meaning. All exact,
-// or within the rounding of one float.
+// Conversion of stored values to positions on the curves, for values and ranges that lose precision or
+// meaning. All exact, or within the rounding of one float.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,7 +25,7 @@ constexpr double kLargest = std::numeric_limits<float>::max();
 constexpr double kDenormal = std::numeric_limits<float>::denorm_min();
 constexpr double kUlp = 0x1p-23;
 
-/// A row of voxels, and the kernels' position of each over a range.
+/// A row of voxels, and the kernels' position of each in a range.
 class Row {
  public:
   template <class T>
@@ -79,11 +79,11 @@ TEST(Values, FarFromZeroKeepTheResolutionOfTheirVoxels) {
   for (int k = 0; k <= 16; ++k) values.push_back(1e6 + k * 0.0625);  // neighbouring floats
   const Row row = Row::of<float>(values);
   for (int k = 0; k <= 16; ++k) EXPECT_EQ(row.position(k, 1e6, 1e6 + 1), k / 16.0);
-  for (double x = 0; x < 16; x += 0.3)  // between two voxels there is more than they can hold
+  for (double x = 0; x < 16; x += 0.3)  // values between two voxels are finer than floats
     EXPECT_NEAR(row.position(x, 1e6, 1e6 + 1), x / 16, 2 * kUlp);
   const std::vector<double> negative = {-1e6, -1e6 + 0.125};
   EXPECT_NEAR(Row::of<float>(negative).position(0.3, -1e6, -1e6 + 0.125), 0.3, kUlp);
-  // Ends of a range that are no floats themselves.
+  // Ends of a range that are not floats.
   EXPECT_NEAR(row.position(4, 1e6 + 0.03, 1e6 + 0.53), (0.25 - 0.03) / 0.5, 4 * kUlp);
   const Row kelvin = Row::of<float>({280, 295, 310});
   EXPECT_EQ(kelvin.position(0, 280, 310), 0);

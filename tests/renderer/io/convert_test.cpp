@@ -11,7 +11,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Values of type T through toKeptType, with what was said.
+/// Values of type T converted by toKeptType, with its messages.
 template <class T>
 std::pair<VoxelBuffer, std::string> converted(StoredType type, const std::vector<T>& values) {
   VoxelBuffer stored = makeStoredBuffer(type, values.size());

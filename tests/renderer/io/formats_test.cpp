@@ -86,7 +86,7 @@ TEST(LoadDatasets, AFileGivenWithItsHeaderIsLoadedOnceWhicheverComesFirst) {
       EXPECT_EQ(datasets[0].files.size(), 2u);
     }
   }
-  // Twice the same file is meant: one may look at a channel in two ways.
+  // The same file twice is intended: a channel can be shown in two ways.
   EXPECT_EQ(loadDatasets(std::vector{raw, raw}, kTestLimit, {})[0].volume->channels().size(), 2u);
 }
 

@@ -10,7 +10,8 @@
 
 #include "tests/renderer/io/io_test_support.h"
 
-// OpenImageIO 2.4 jumps out of its PNG reader over the text of an error, a few bytes for each broken file.
+// OpenImageIO 2.4 leaks the text of an error, a few bytes per broken file, when it jumps out of its PNG
+// reader.
 extern "C" const char* __lsan_default_suppressions() { return "leak:ImageInput::geterror\n"; }
 
 namespace scolopax::io {
@@ -18,7 +19,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Colours that 8 bits and halves do not hold, some beyond 1, some transparent.
+/// Colours that 8 bits and halves do not represent exactly, some above 1, some transparent.
 Image testImage() {
   Image image{5, 3, {}};
   for (int i = 0; i < 15; ++i) {
@@ -64,7 +65,7 @@ TEST(ImageFile, EightBitFormatsHoldTheCompositedSrgbPicture) {
 
 TEST(ImageFile, JpegKeepsColourAtFullResolution) {
   const TempDir folder;
-  // Red and green columns in turn: with halved colour planes they would mix to a brownish mean.
+  // Alternating red and green columns: with subsampled colour they would mix to a brownish mean.
   Image image{32, 32, {}};
   for (int i = 0; i < 32 * 32; ++i) image.pixels.emplace_back(i % 2 == 0, i % 2 == 1, 0, 1);
   writeImage(folder / "a.jpg", image, glm::vec3(0));
@@ -83,7 +84,8 @@ TEST(ImageFile, EqualPicturesAreEqualBytesWheneverTheyAreWritten) {
     writeImage(folder / name, testImage(), glm::vec3(0));
     before.push_back(contentOf(folder / name));
   }
-  std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // dates in files are to the second
+  std::this_thread::sleep_for(
+      std::chrono::milliseconds(1100));  // dates in files have a resolution of a second
   for (std::size_t i = 0; i < names.size(); ++i) {
     writeImage(folder / names[i], testImage(), glm::vec3(0));
     EXPECT_TRUE(contentOf(folder / names[i]) == before[i]) << names[i];
@@ -114,7 +116,7 @@ TEST(ImageFile, ThatDoesNotFitOnTheDiskIsAnError) {
 TEST(ImageFile, ThatCannotBeWrittenLeavesTheOneBeforeAndNothingElse) {
   const TempDir folder;
   const auto file = writeBytes(folder / "a.png", "before");
-  // A limit below the picture's size is a disk that runs full in the middle of it.
+  // A limit below the picture's size acts like a disk that runs full while writing.
   Image noise{64, 64, {}};
   std::uint32_t state = 1;
   for (int i = 0; i < 64 * 64; ++i)

@@ -72,7 +72,7 @@ TEST(NiftiFiles, HaveTheValuesThatTheCollectionStates) {
   const ScalarType u8 = ScalarType::u8, i16 = ScalarType::i16;
   const glm::dvec3 one(1);
   const glm::ivec3 brain(240, 240, 155), stroke(124, 160, 140), ct(122, 101, 112);
-  const double unknown = std::numeric_limits<double>::quiet_NaN();  // the list gives no range or no spacing
+  const double unknown = std::numeric_limits<double>::quiet_NaN();  // the list states no range or spacing
   const Row rows[] = {
       {"multichannel/tcga_du_7294/TCGA-DU-7294_t1_bet.nii.gz", brain, i16, -69, 837, one},
       {"multichannel/tcga_du_7294/TCGA-DU-7294_t1c_bet.nii.gz", brain, i16, -105, 2030, one},
@@ -137,7 +137,7 @@ TEST(NiftiFiles, HaveTheValuesThatTheCollectionStates) {
   }
 }
 
-/// Voxels and affine as the format's reference reader has them.
+/// Voxels and affine transform agree with the format's reference reader.
 TEST(NiftiFiles, AgreeWithTheReferenceReader) {
   SKIP_WITHOUT(dataFile("formats/nifti"));
   for (const char* name :
@@ -195,7 +195,7 @@ TEST(NiftiFiles, BothByteOrdersOfBothVersionsLoad) {
   EXPECT_EQ(valuesOf(loadBytes(folder, little).channels[0]), asDoubles(voxels));
   EXPECT_EQ(valuesOf(loadBytes(folder, gzipped(little), "a.nii.gz").channels[0]), asDoubles(voxels));
 
-  // The same header with every number turned round: fields by their sizes.
+  // The same header with every number byte-swapped: fields by their sizes.
   Header1 big;
   const auto reverse = [&](std::size_t at, std::size_t size, std::size_t count) {
     for (std::size_t i = 0; i < count; ++i)
@@ -380,7 +380,7 @@ TEST(NiftiFiles, EveryTruncationIsRefused) {
 
 TEST(NiftiFiles, APackedFileThatExpandsBeyondItsHeaderCostsNothing) {
   const TempDir folder;
-  // 64 MiB of zeros behind 48 bytes of voxels: never unpacked, so a small limit is enough.
+  // 64 MiB of zeros after 48 bytes of voxels are never decompressed, so a small limit is enough.
   const std::string bomb = gzipped(Header1().bytes + bytesOf(ramp(24)) + std::string(64 << 20, '\0'));
   ASSERT_LT(bomb.size(), std::size_t(1) << 17);
   EXPECT_EQ(loadError(writeBytes(folder / "a.nii.gz", bomb), 48), "");

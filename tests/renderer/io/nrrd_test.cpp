@@ -101,7 +101,7 @@ TEST(NrrdFiles, WhatIsWrittenComesBackExactly) {
       ASSERT_EQ(file.channels[c].voxels.type(), scalarTypeOf<T>);
       EXPECT_TRUE(std::ranges::equal(file.channels[c].voxels.as<T>(), channels[c].voxels.as<T>()));
     }
-    Nrrd* image = nrrdNew();  // and it is NRRD to others
+    Nrrd* image = nrrdNew();  // and the reference reader accepts it as NRRD
     EXPECT_EQ(nrrdLoad(image, (folder / "a.nrrd").c_str(), nullptr), 0);
     EXPECT_EQ(image->dim, 4u);
     EXPECT_EQ(image->axis[3].size, 3u);

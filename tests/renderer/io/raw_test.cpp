@@ -24,7 +24,7 @@ std::vector<std::string> dataStems() {
   return stems;
 }
 
-/// Which type in memory holds a file's type when every value is between 0 and 19.
+/// The type in memory for a file's type when every value is between 0 and 19.
 ScalarType keptTypeOf(const std::string& stem) {
   const auto has = [&](const char* text) { return stem.find(text) != std::string::npos; };
   if (has(".FLOAT") || has("INT64")) return ScalarType::f32;
@@ -87,7 +87,7 @@ TEST(RawFiles, ScalarVolumesOfTheCollectionLoad) {
   EXPECT_EQ(neghip.grid.dims, glm::ivec3(64));
   EXPECT_EQ(neghip.channels[0].voxels.type(), ScalarType::u8);
   EXPECT_EQ(rangeOf(neghip.channels[0]), std::pair(0.0, 255.0));
-  // The sidecar's hydrogenatom.raw is there only as hydrogenatom.raw.gz.
+  // The sidecar names hydrogenatom.raw, but only hydrogenatom.raw.gz exists.
   const LoadedFile hydrogen = loadFile(dataFile("scalar/hydrogenatom.dat"), kTestLimit, {});
   EXPECT_EQ(hydrogen.grid.dims, glm::ivec3(128));
   EXPECT_EQ(rangeOf(hydrogen.channels[0]), std::pair(0.0, 250.0));

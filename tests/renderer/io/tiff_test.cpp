@@ -11,13 +11,13 @@ namespace {
 
 using testing::HasSubstr;
 
-/// An uncompressed TIFF byte by byte: pages of `width` x `height` uint16, or what `tags` say.
+/// An uncompressed TIFF byte by byte: pages of `width` x `height` uint16, unless `tags` say otherwise.
 struct TiffBytes {
   bool bigEndian = false, bigTiff = false;
   std::uint32_t width = 3, height = 2;
   std::string description;
-  std::map<int, std::uint64_t> tags;  ///< in place of, or beside, the usual ones; all as LONG
-  std::uint32_t xResolution = 0;      ///< pixels per 1000 units; 0 leaves the tags out
+  std::map<int, std::uint64_t> tags;  ///< replace or extend the usual ones; all as LONG
+  std::uint32_t xResolution = 0;      ///< pixels per 1000 units; 0 omits the tags
   std::string out;
 
   void number(std::uint64_t value, int bytes) {
@@ -71,7 +71,7 @@ struct TiffBytes {
   }
 };
 
-/// Pages of 6 pixels each whose numbers go on counting.
+/// Pages of 6 pixels each, numbered consecutively across pages.
 std::vector<std::string> countingPages(int count, bool reversed = false) {
   std::vector<std::string> pages;
   for (int p = 0; p < count; ++p) {
@@ -292,7 +292,7 @@ TEST(TiffFiles, EveryTruncationIsRefused) {
   }
 }
 
-/// Strips or tiles of 64x60 deflated pixels, several of them.
+/// A picture of 64x60 deflated pixels in several strips or tiles.
 std::string deflatedPicture(const TempDir& folder, int tileSize) {
   OIIO::ImageSpec spec(64, 60, 1, OIIO::TypeUInt8);
   spec.attribute("compression", "zip");
@@ -315,7 +315,7 @@ TEST(TiffFiles, DeflatedStripsAndTilesLoadAndDamagedOnesAreRefused) {
     const auto values = valuesOf(loadBytes(folder, whole).channels[0]);
     ASSERT_EQ(values.size(), 64u * 60u);
     for (std::size_t i = 0; i < values.size(); ++i) ASSERT_EQ(values[i], double(i * i / 7 % 256)) << i;
-    // The packed pixels are the larger part of the file and its end.
+    // The compressed pixels are the larger part of the file, at its end.
     ASSERT_GT(whole.size(), 1000u);
     for (const std::size_t at : {whole.size() / 2, whole.size() - 300, whole.size() - 50}) {
       std::string damaged = whole;

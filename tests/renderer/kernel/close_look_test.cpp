@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The bounds that trackers take from the voxels around a stretch of a ray hold, to the last bit, wherever a
-// tentative collision can be tested.
+// The bounds that trackers compute from the voxels around a stretch of a ray hold, to the last bit, wherever
+// a tentative collision can be tested.
 #include "renderer/kernel/trackers/close_look.h"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ std::vector<OpacityKnot> randomCurve(std::mt19937& random) {
   }
 }
 
-/// With `factors`, opacity depends on the gradient too.
+/// With `factors`, opacity also depends on the gradient.
 template <class T>
 void expectBounds(double largest, unsigned seed, bool factors = false) {
   std::mt19937 random(seed);
@@ -74,7 +74,7 @@ void expectBounds(double largest, unsigned seed, bool factors = false) {
       const float bound =
           boundAhead(plan.view(), 0, ray, cell, cell.inside(dims, ray.origin), 1e-6f, &way, &cost);
       short_ += way < before;
-      // Where a voxel is not finite, a face of the cell has the value that the cell beyond it gives it.
+      // If a voxel is not finite, points on a face of the cell may take their value from the cell beyond it.
       for (int k = holes ? 1 : 0; k <= (holes ? 63 : 64); ++k) {
         const float t = way * float(k) / 64.0f;
         const glm::vec3 point = cell.inside(dims, ray.origin + t * ray.direction);
@@ -82,7 +82,7 @@ void expectBounds(double largest, unsigned seed, bool factors = false) {
       }
     }
   }
-  EXPECT_GT(short_, factors ? 100 : 300);  // stretches that end before the cell does are among them
+  EXPECT_GT(short_, factors ? 100 : 300);  // includes stretches that end before the cell does
 }
 
 TEST(CloseLook, BoundsTheExtinctionOfIntegers) {

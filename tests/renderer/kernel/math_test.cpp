@@ -29,7 +29,7 @@ TEST(Math, OpticalDepthIsWithinTwoUlpOfMinusLogOneMinusU) {
     const float u = std::min(float(std::exp2(exponent(random))), 0x1.fffffep-1f);
     worst = std::max(worst, ulps(opticalDepth(u), -std::log1p(-double(u))));
   }
-  for (std::uint32_t k = 0; k < (1u << 20); ++k) {  // the lattice next to 1
+  for (std::uint32_t k = 0; k < (1u << 20); ++k) {  // the numbers next to 1
     const float u = 1.0f - float(k + 1) * 0x1p-24f;
     worst = std::max(worst, ulps(opticalDepth(u), -std::log1p(-double(u))));
   }
@@ -44,8 +44,8 @@ TEST(Math, OpticalDepthIsFiniteAndPositiveAtBothEnds) {
 }
 
 TEST(Math, OpticalDepthFollowsTheExponentialLawAtThinMedia) {
-  // P(depth < d) = 1 - exp(-d): counted over the lattice of u itself, so without noise. At d = 1e-6 a lattice
-  // of 2^-24 would be wrong by 1.3 %, this one by less than 2^-32 / d.
+  // P(depth < d) = 1 - exp(-d): counted over all values of u, so without noise. At d = 1e-6, values in steps
+  // of 2^-24 would be wrong by 1.3 %, these by less than 2^-32 / d.
   for (const double d : {1e-7, 1e-6, 1e-5, 1e-3}) {
     std::uint32_t low = 0, high = 0xffffffffu;  // first k with opticalDepth >= d
     while (low < high) {
@@ -68,7 +68,7 @@ TEST(Math, PowerMatchesTheLibraryAndKeepsItsEnds) {
     for (int i = 1; i < 10000; ++i) {
       const float x = float(i) / 10000.0f;
       const double exact = std::pow(double(x), double(g));
-      // The exponent's rounding error, at most 2^-24 * g * |log2 x| * 2, comes out as a relative error.
+      // The exponent's rounding error, at most 2^-24 * g * |log2 x| * 2, becomes a relative error.
       const double tolerance = 4e-7 + 2 * 0x1p-24 * double(g) * std::abs(std::log2(double(x)));
       if (exact > 1e-37) {
         EXPECT_NEAR(double(power(x, g)) / exact, 1, tolerance) << x << "^" << g;
@@ -86,8 +86,8 @@ TEST(Math, ClampSendsNanToTheLowerEnd) {
 }
 
 TEST(Rng, CountersThatDifferAnywhereGiveDifferentBlocks) {
-  // pcg4d is a bijection: its inverse exists. Checked here where collisions of weaker schemes were seen:
-  // small neighbouring counters in every word.
+  // pcg4d is a bijection. This checks inputs for which weaker schemes had collisions: small neighbouring
+  // counters in every word.
   std::vector<std::array<std::uint32_t, 4>> seen;
   for (std::uint32_t pixel = 0; pixel < 24; ++pixel)
     for (std::uint32_t sample = 0; sample < 24; ++sample)
@@ -102,8 +102,8 @@ TEST(Rng, CountersThatDifferAnywhereGiveDifferentBlocks) {
 }
 
 TEST(Rng, WordsAreUniformAndUncorrelatedOverPixelsSamplesAndBlocks) {
-  // 16 cells per word pair; chi-square with 255 degrees of freedom exceeds 347 with probability 1e-4, and
-  // there are 12 tables: a fixed seed that passes says the words are no worse than that.
+  // 16 x 16 cells per pair of words. Chi-square with 255 degrees of freedom exceeds 347 with probability
+  // 1e-4; there are 12 tables, and the seed is fixed.
   const int n = 1 << 20;
   for (int axis = 0; axis < 2; ++axis)
     for (int pair = 0; pair < 6; ++pair) {

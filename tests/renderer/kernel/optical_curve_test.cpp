@@ -12,7 +12,7 @@ namespace scolopax {
 namespace {
 
 /// Opacity and colour by their definition, in double: positions are clamped to [0,1]; of two knots at one
-/// position the later holds.
+/// position the later counts.
 struct Curves {
   std::vector<OpacityKnot> opacity;
   std::vector<ColorKnot> color;
@@ -55,7 +55,7 @@ Means meansOf(const Curves& curves, double p, double q) {
   for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
     const double a = cuts[i], b = cuts[i + 1], width = (b - a) / (q - p);
     if (!(width > 0)) continue;
-    // Ends lie a little inside, where a jump is not: of a line they tell the same.
+    // The ends are slightly inside, away from jumps; for a line this makes no difference.
     for (const double t : {1e-7, 0.5, 1 - 1e-7}) {
       const double at = a + t * (b - a), weight = width * (t == 0.5 ? 4 : 1) / 6;
       const double opacity = curves.opacityAt(at);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Expected values are worked out by hand from the paper's formulas, in one dimension or without space; none
-// are published for pictures this small.
+// Expected values are computed by hand from the paper's formulas, in one dimension or without spatial
+// filters; none are published for pictures this small.
 #include "renderer/metrics/flip.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,8 @@ Image constant(int width, int height, glm::vec3 color) {
           std::vector<glm::vec4>(std::size_t(width) * std::size_t(height), glm::vec4(color, 1.0f))};
 }
 
-/// The paper's error of two colours, without space, written out again: filters leave constant pictures alone.
+/// The paper's error of two colours, written again without spatial filters, which leave constant pictures
+/// unchanged.
 struct Lab {
   double l, a, b;
 };
@@ -105,7 +106,7 @@ TEST(Flip, IsTheSameAlongBothAxes) {
   EXPECT_NEAR(flipDifference(a, b).mean, flipDifference(at, bt).mean, 1e-12);
 }
 
-/// The left half black and the right half white, against black: a problem in one dimension, and gray.
+/// The left half black and the right half white, against black: a problem in one dimension, without colour.
 TEST(Flip, OfAnEdgeHasTheValueWorkedOutByHand) {
   const double ppd = 67, sd = 0.5 * 0.082 * ppd;
   Image edge = constant(60, 3, glm::vec3(0));
@@ -113,7 +114,7 @@ TEST(Flip, OfAnEdgeHasTheValueWorkedOutByHand) {
     if (i % 60 >= 30) edge.pixels[i] = glm::vec4(1);
   const Flip flip = flipDifference(edge, constant(60, 3, glm::vec3(0)));
   for (int pixel = 26; pixel < 34; ++pixel) {
-    // Shares of the filters that lie on white, i >= 30 - pixel.
+    // Parts of the filters that lie on white, i >= 30 - pixel.
     double gauss = 0, white = 0, edgeSum = 0, edgeAll = 0, pointSum = 0, positive = 0, negative = 0;
     for (int i = -10; i <= 10; ++i) {
       const double w = std::exp(-std::pow(3.14159265358979 * i / ppd, 2) / 0.0047);
@@ -142,7 +143,7 @@ TEST(Flip, OfAnEdgeHasTheValueWorkedOutByHand) {
   EXPECT_NEAR(flip.errors[60 + 50], 0.96738, 1e-5);
 }
 
-/// One pixel of a random picture, by sums over whole two-dimensional filters in the paper's form.
+/// One pixel of a random picture, by sums over complete two-dimensional filters in the paper's form.
 struct DirectPixel {
   const Image& image;
   int x, y;
@@ -198,7 +199,7 @@ TEST(Flip, OfRandomColoursMatchesSumsOverWholeFilters) {
   Image a = constant(26, 23, {}), b = a;
   for (std::size_t i = 0; i < a.pixels.size(); ++i) {
     a.pixels[i] = {unit(random), unit(random), unit(random), 1};
-    // Blocks of colour on top of the noise: something is left of them behind the filters.
+    // Blocks of colour on top of the noise, which the filters do not remove completely.
     b.pixels[i] =
         a.pixels[i] * (i % 26 < 12 ? glm::vec4(1.3f, 0.8f, 0.4f, 1) : glm::vec4(0.6f, 0.9f, 1.4f, 1));
   }
@@ -230,12 +231,13 @@ TEST(Flip, OfASinglePixelIsFeltNearIt) {
       if (std::max(std::abs(x - 20), std::abs(y - 20)) > 10) {
         EXPECT_EQ(flip.errors[std::size_t(x + 41 * y)], 0);
       }
-  // From further away it is less.
+  // From a larger distance the difference is smaller.
   EXPECT_LT(flipDifference(gray, dotted, 200).errors[20 + 41 * 20], most);
 }
 
 TEST(Flip, SeesFeaturesThatColourAloneDoesNot) {
-  // The same mean colour: a checkerboard of single pixels, which the eye resolves at 20 pixels per degree.
+  // A checkerboard of single pixels with the same mean colour, which the eye resolves at 20 pixels per
+  // degree.
   Image board = constant(40, 40, glm::vec3(0.3f));
   for (std::size_t i = 0; i < board.pixels.size(); ++i)
     if ((i % 40 + i / 40) % 2) board.pixels[i] = {0.5f, 0.5f, 0.5f, 1};

@@ -56,7 +56,7 @@ TEST(ImageDifference, RelativeErrorHasTheValueComputedByHand) {
 }
 
 TEST(ImageDifference, CountsAlphaAsMuchAsAColor) {
-  // Black matter over a bright background: all that shows of it is alpha.
+  // Black matter over a bright background: it differs only in alpha.
   const ImageDifference d = compareImages(makeImage(2, 2, {0, 0, 0, 0}), makeImage(2, 2, {0, 0, 0, 1}));
   EXPECT_EQ(d.rmse, 0.5);
   EXPECT_EQ(d.maximum, 1);

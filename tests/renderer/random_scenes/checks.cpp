@@ -18,7 +18,7 @@ namespace {
 
 bool isLit(const Scene& scene) { return scene.shading || scene.shadows; }
 
-/// The expected picture, its mean as the last entry, and how far it may be off.
+/// The expected picture, with its mean as the last entry, and bounds on its own error.
 struct Truth {
   std::vector<glm::dvec4> mean, slack;
 };
@@ -31,7 +31,7 @@ Truth referenceOf(const Volume& volume, const Scene& scene, int samplesPerAxis) 
   for (std::size_t i = 0; i < found.image.pixels.size(); ++i) {
     const glm::dvec4 value(found.image.pixels[i]), noise(found.standardError[i]);
     truth.mean.push_back(value);
-    // Strata that are mixed may look even, as long as there are few of them.
+    // With few strata, the standard error may miss the variation inside a stratum.
     const double few = scene.filter == PixelFilter::point ? 0 : 2.0 / (samplesPerAxis * samplesPerAxis);
     truth.slack.push_back(8.0 * noise + few + found.maximumRayError);
     sum += value;
@@ -42,8 +42,9 @@ Truth referenceOf(const Volume& volume, const Scene& scene, int samplesPerAxis) 
   return truth;
 }
 
-/// What the rounding of floats can do to a picture: what the reference's becomes when the eye moves by three
-/// ten-millionths of the box, values by as much of the largest, and gradients by that over a voxel.
+/// Adds the effect that rounding of floats can have on a picture: the change of the reference's picture when
+/// the eye moves by 3e-7 of the box's diagonal, values by 3e-7 of the largest, and gradients by that per
+/// voxel.
 void addRounding(const RandomScene& drawn, const Scene& scene, Truth* truth) {
   constexpr double kRounding = 3e-7;
   const auto compare = [&](const Scene& changed) {
@@ -74,7 +75,7 @@ void addRounding(const RandomScene& drawn, const Scene& scene, Truth* truth) {
   }
 }
 
-/// Where an estimate lies farthest beyond what it may be off by.
+/// Where an estimate exceeds its allowed error by most.
 struct Worst {
   std::size_t pixel = 0;
   int component = 0;
@@ -112,13 +113,14 @@ class Checks {
   explicit Checks(const RandomScene& drawn)
       : drawn_(drawn), scene_(drawn.scene), largest_(largestSample(drawn.scene)) {
     scene_.targetError = drawn.wire["stop"]["error"];
-    // A pixel's area takes the reference hundreds of rays: without light, of which the filter knows nothing.
+    // Over a pixel's area the reference needs hundreds of rays: only without light, on which the filter does
+    // not depend.
     if (isLit(scene_)) scene_.filter = PixelFilter::point;
   }
 
   std::vector<Finding> all() {
     checkReference();
-    if (!findings_.empty()) return findings_;  // what the others would be held against
+    if (!findings_.empty()) return findings_;  // the methods would be compared with it
     quick_ = referenceOf(*drawn_.volume, scene_, kQuickStrata);
     for (std::size_t i = 0; i < std::size(kMethods); ++i) {
       Scene scene = scene_;
@@ -144,7 +146,7 @@ class Checks {
     const int pixels = scene.width * scene.height;
     Draw draw(drawn_.number, "pixels to march");
     const auto found = reference::renderReference(*drawn_.volume, scene, 1);
-    // The reference's claim of one ray, or what its tolerance is.
+    // The reference's error bound for one ray, or its tolerance.
     const double stated =
         isLit(scene) ? reference::Integrator::kToleranceLit : reference::Integrator::kTolerance;
     const double claimed = std::max(found.maximumRayError, stated * largest_) + 1e-7 * largest_;
@@ -163,7 +165,7 @@ class Checks {
     }
   }
 
-  /// Of a pixel's sides, where the filter is the box: two rays in each stratum.
+  /// Strata along a pixel's side with the box filter; each stratum has two rays.
   static constexpr int kQuickStrata = 6, kLongStrata = 32;
   const Truth& longTruth() {
     if (!long_) {
@@ -180,7 +182,8 @@ class Checks {
     return {std::max(8, samples) / each, each};
   }
 
-  /// A few standard errors, and a few samples: of what a sample shows at the least when it hits anything.
+  /// A few standard errors, plus the effect of a few samples. Variances are not taken smaller than if each
+  /// sample that hits anything showed the same.
   double quickNoise(const Estimates& found, const Truth& truth, std::size_t i, int c) const {
     const double mean = std::max(0.0, truth.mean[i][c]), alpha = std::max(truth.mean[i].a, 1e-12);
     const double ofHits = c < 3 ? mean * mean * (1 / alpha - 1) : alpha * (1 - alpha);
@@ -208,7 +211,7 @@ class Checks {
     if (worst.beyond()) report(std::string(nameOf(scene.method)), textOf(worst, more));
   }
 
-  /// What quadrature leaves out on purpose, and what rounding does to the product of its transmittances.
+  /// The parts that quadrature leaves out on purpose, and the rounding of its product of transmittances.
   double quadratureFloor(const Scene& scene, const Truth& truth, std::size_t i) const {
     constexpr double kOpaque = 1e-4;
     const double segments = drawn_.source.grid.diagonal() / (scene.step * smallestSpacing());
@@ -221,12 +224,12 @@ class Checks {
     return std::min({spacing.x, spacing.y, spacing.z});
   }
 
-  /// Pictures at steps that fall.
+  /// Pictures at decreasing steps.
   struct Levels {
     std::vector<double> step;
     std::vector<Estimates> at;
-    /// Twice what is left at the last step of an error that is proportional to it, by the difference that
-    /// says most: errors fall at least so, but unevenly.
+    /// Bound on the error at the last step: twice the value for an error proportional to the step, by the
+    /// largest slope found. Errors fall at least that fast, but unevenly.
     double bias(std::size_t i, int c) const {
       double slope = 0;
       for (std::size_t k = 1; k < at.size(); ++k)
@@ -263,14 +266,15 @@ class Checks {
     const Estimates& found = more.at.back();
     const std::vector<double> hidden = hiddenFrom(scene);
     const Worst worst = worstOf(found, longTruth(), [&](std::size_t i, int c) {
-      // The range that was seen: values are the same function of a few numbers, and none of them is rare.
+      // The observed range: values are all the same function of a few random numbers, and none of them is
+      // rare.
       const double range = found.most[i][c] - found.least[i][c];
       return longNoise(found, range, i, c) + more.bias(i, c) + quadratureFloor(scene, longTruth(), i) +
              hidden[i] * largest_;
     });
     if (!worst.beyond()) return;
-    // How the front of a segment hides its back is left out, as the README says: as long as a step may be
-    // opaque, errors do not fall with it yet, and differences of steps tell no bound.
+    // Absorption within a segment is ignored (README): while a step may be opaque, errors do not fall with
+    // the step yet, and differences between steps give no bound.
     if (depthOfStep(scene) > 1) return;
     std::ostringstream text;
     text << textOf(worst, found) << "; at steps";
@@ -290,9 +294,8 @@ class Checks {
     return extinction * scene.step * smallestSpacing();
   }
 
-  /// Of every pixel and the picture's mean: opacity of features that lie between two samples, in the corner
-  /// that a field's ray makes at a plane of voxels, and that no step tells as long as all of them are too
-  /// long.
+  /// For every pixel and the picture's mean: the opacity of features that lie between two samples. The field
+  /// along a ray has a kink at each plane of voxels; steps that are too long never show such features there.
   std::vector<double> hiddenFrom(const Scene& scene) const {
     std::vector<double> hidden;
     double sum = 0;
@@ -307,7 +310,7 @@ class Checks {
     return hidden;
   }
 
-  /// RMSE of the mean picture over RGBA, less what noise and features that no step sees explain.
+  /// RMSE of the mean picture over RGBA, less the parts explained by noise and by features between samples.
   double errorOf(const Estimates& found, const Truth& truth, const std::vector<double>& hidden,
                  bool quick) const {
     double squares = 0;
@@ -324,8 +327,8 @@ class Checks {
     return std::sqrt(squares / (4.0 * double(pixels)));
   }
 
-  /// `auto` promises that bias stays below the error asked for, as a mean over pictures of some size: it
-  /// looks at 24 pixels across itself.
+  /// `auto` promises that the bias stays below the requested error, as a mean over pictures of some size: its
+  /// own measurement uses pictures 24 pixels across.
   void checkAutomatic(Scene scene) {
     const int side = scene.shadows ? 5 : 24, longer = std::max(scene.width, scene.height);
     scene.width = std::max(1, scene.width * side / longer);
@@ -334,7 +337,7 @@ class Checks {
     const auto chooser = makeCpuRenderer(drawn_.volume, 1);
     chooser->setScene(scene);
     const Choice choice = chooser->choice();
-    if (!hasStep(choice.method)) return;  // checked as itself
+    if (!hasStep(choice.method)) return;  // checked as a method of its own
     Scene chosen = scene;
     chosen.method = choice.method;
     chosen.step = choice.step;

@@ -59,7 +59,7 @@ class Marcher {
     radiance_ = std::fmax(radiance_, 1);
   }
 
-  /// The picture's ray: origin and direction of length 1, world space.
+  /// Marches the ray through the centre of a pixel.
   Marched pixel(int column, int row) const {
     const Camera& camera = scene_.camera;
     const dvec3 forward = unit(camera.target - camera.eye);
@@ -92,7 +92,7 @@ class Marcher {
     return voxelFromWorld_ * (world - dvec3(grid_.worldFromVoxel[3]));
   }
 
-  /// 0 <= t <= `length` of a ray in voxel space, as far as it is inside the box; false when it is not.
+  /// The part of 0 <= t <= `length` in which a ray in voxel space is inside the box; false if there is none.
   bool clip(const dvec3& origin, const dvec3& direction, double length, double* begin, double* end) const {
     *begin = 0;
     *end = length;
@@ -109,7 +109,7 @@ class Marcher {
     return *begin < *end && std::isfinite(*end);
   }
 
-  /// Whether planes and crop leave a channel at a point in voxel coordinates.
+  /// Whether the clip planes and crop keep a channel at a point in voxel coordinates.
   bool isLeft(int channel, const dvec3& p) const {
     const dvec3 world(grid_.worldFromVoxel * glm::dvec4(p, 1));
     for (const ClipPlane& plane : scene_.clip) {
@@ -130,7 +130,7 @@ class Marcher {
     double value = 0, extinction = 0;
     dvec3 color{0};
   };
-  /// What all channels are at a point; the extinction that counts, and each channel's share of the radiance.
+  /// All channels at a point: the blended extinction, and each channel's share of the radiance.
   struct Mixture {
     std::vector<Classified> parts;
     std::vector<double> share;
@@ -172,7 +172,7 @@ class Marcher {
     return mixture;
   }
 
-  /// Of a ray in voxel space.
+  /// Transmittance along a ray in voxel space.
   double transmittance(const dvec3& p, const dvec3& direction, double length, const Matters& matters,
                        double* error) const {
     double begin, end;
@@ -245,11 +245,11 @@ class Marcher {
     return c.color * ((1 - s) * a + s * (k.ambient + k.diffuse * diffuse)) + s * k.specular * specular;
   }
 
-  /// World length of a step that takes the n-th part of a voxel.
+  /// Length of a step of 1/n of a voxel.
   static double stepOf(const dvec3& way, int n) {
     return 1 / (n * (std::abs(way.x) + std::abs(way.y) + std::abs(way.z)));
   }
-  /// Marches from plane to plane of voxel centres, where the field has kinks.
+  /// Marches between the planes of voxel centres, where the field has kinks.
   template <class March>
   void marchCells(const dvec3& origin, const dvec3& way, double begin, double end, March& march) const {
     std::vector<double> cuts{begin, end};

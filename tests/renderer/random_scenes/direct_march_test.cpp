@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tester's own march against closed forms.
+// directMarch() against closed forms.
 #include "tests/renderer/random_scenes/direct_march.h"
 
 #include <gtest/gtest.h>
@@ -42,7 +42,7 @@ TEST(DirectMarch, OfAConstantVolumeIsTheExponential) {
   EXPECT_LT(found.error, 1e-6);
 }
 
-// A spike of opacity on a ramp from 0 to 1 over four voxels: its thickness is its area.
+// A spike of opacity on a ramp from 0 to 1 over four voxels: its optical thickness is its area.
 TEST(DirectMarch, FindsASpikeFarNarrowerThanItsSteps) {
   const glm::ivec3 dims(1, 1, 5);
   Drawing d = drawing(channelOf<float>(dims, [](int, int, int z) { return z / 4.0; }), dims);
@@ -53,7 +53,7 @@ TEST(DirectMarch, FindsASpikeFarNarrowerThanItsSteps) {
   EXPECT_LT(found.error, 1e-5);
 }
 
-// |gradient| of z^2 is 2z between the second voxel and the last but one: half a factor from 2 to 6.
+// |gradient| of z^2 is 2z from the second voxel to the last but one: the factor is a half from 2 to 6.
 TEST(DirectMarch, TakesOpacityByTheGradient) {
   const glm::ivec3 dims(1, 1, 8);
   Drawing d = drawing(channelOf<float>(dims, [](int, int, int z) { return z * z; }), dims);
@@ -63,7 +63,8 @@ TEST(DirectMarch, TakesOpacityByTheGradient) {
   Marched found = directMarch(d.source, d.scene, 0, 0);
   EXPECT_NEAR(found.rgba.a, 1 - std::exp(-0.7 * 4 / 2), found.error + 1e-9);
   EXPECT_LT(found.error, 1e-5);
-  // Where a voxel is not finite, no point has a gradient whose differences reach into its cells: [1, 5].
+  // Around a voxel that is not finite, points whose differences reach into its cells have no gradient: [1,
+  // 5].
   d.source.channels[0] = channelOf<float>(
       dims, [](int, int, int z) { return z == 3 ? std::numeric_limits<double>::quiet_NaN() : z; });
   d.scene.channels[0].gradientOpacity = GradientOpacity{0, 1, {{0, 1}}};
@@ -82,8 +83,7 @@ TEST(DirectMarch, FindsADipOfTheGradientFarNarrowerThanItsSteps) {
   EXPECT_LT(found.error, 1e-5);
 }
 
-// Half of a plate in the light of a headlight that shines through it: A = ka + (1 - ka) exp(-2 s t) / exp(-s
-// t).
+// A plate lit by a headlight that shines through it: A = ka + (1 - ka) exp(-2 s t) / exp(-s t).
 TEST(DirectMarch, CastsShadowsOfTheMatterBeforeIt) {
   const glm::ivec3 dims(2, 2, 3);
   Drawing d = drawing(channelOf<float>(dims, [](int, int, int) { return 1; }), dims);
@@ -96,7 +96,7 @@ TEST(DirectMarch, CastsShadowsOfTheMatterBeforeIt) {
   EXPECT_LT(found.error, 1e-3);
 }
 
-// Shaded matter whose normal turns: a march of 20,000 equal steps gives .22801.
+// Shaded matter with a rotating normal: a march of 20,000 equal steps gives .22801.
 TEST(DirectMarch, ShadesNormalsThatTurnAlongTheRay) {
   const glm::ivec3 dims(2, 2, 2);
   constexpr int kBytes[] = {255, 0, 255, 0, 0, 255, 255, 255};

@@ -11,7 +11,7 @@
 namespace scolopax::random_scenes {
 namespace {
 
-/// Sums of values around a first guess, which keeps the variance of small spreads exact.
+/// Sums of values relative to a first guess, which keeps the variance accurate when the spread is small.
 class Sums {
  public:
   explicit Sums(std::size_t pixels)

@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-/// What a field may depend on.
+/// What the value of a field may depend on.
 struct Surroundings {
   std::uint64_t scene;
   const Grid& grid;
@@ -28,7 +28,7 @@ struct Surroundings {
   }
 };
 
-/// `draw` gives the members that it sets: an empty object leaves the default.
+/// A field of the scene. `draw` returns the members that it sets; an empty object leaves the default.
 struct Field {
   const char* name;
   json (*draw)(Draw&, const Surroundings&);
@@ -41,7 +41,7 @@ json nameFrom(Draw& draw, const NamedValue (&list)[N]) {
   return list[draw.bits() % N].name;
 }
 
-/// 1 to 6 positions in [0, 1], not decreasing, at times equal (jumps), and at times the ends themselves.
+/// 1 to 6 non-decreasing positions in [0, 1], sometimes equal (jumps), and sometimes exactly 0 or 1.
 std::vector<double> drawPositions(Draw& draw) {
   std::vector<double> positions;
   const int count = draw.integer(1, 6);
@@ -70,8 +70,8 @@ json drawOpacity(Draw& draw, const Surroundings&) {
   return {{"opacity", drawPoints(draw)}};
 }
 
-/// Over gradients that the channel has, but no jump at exactly one of them: where the gradient is the same in
-/// a whole region, rounding would decide which side of the jump is seen.
+/// A range of gradients that the channel has, but without a jump at exactly one of them: where the gradient
+/// is constant in a region, rounding would decide on which side of the jump it lies.
 json drawGradientOpacity(Draw& draw, const Surroundings& around) {
   if (draw.chance(0.8)) return draw.chance(0.5) ? json::object() : json{{"gradientOpacity", nullptr}};
   json opacity = json::object();
@@ -111,7 +111,7 @@ json drawRange(Draw& draw, const Surroundings& around) {
   if (values.empty() || draw.chance(0.1)) return json::object();
   for (const double value : values) lo = std::min(lo, value), hi = std::max(hi, value);
   const int kind = draw.integer(0, 19);
-  if (kind == 0) {  // a step, at times at a voxel's own value
+  if (kind == 0) {  // a step, sometimes exactly at a voxel's value
     const double value = draw.chance(0.5) ? draw.oneOf(values) : draw.between(lo, hi);
     return {{"range", {value, value}}};
   }
@@ -127,7 +127,7 @@ json drawDensity(Draw& draw, const Surroundings& around) {
   const int kind = draw.integer(0, 19);
   if (kind == 0) return json::object();
   if (kind == 1) return {{"density", 0}};
-  // Of one number for several channels extinctions may be equal.
+  // With a number shared by several channels, their extinctions may be equal.
   Draw shared(around.scene, "shared density");
   Draw& from = kind <= 3 ? shared : draw;
   const double thickness = from.chance(0.15) ? from.decades(1e-4, 1e5) : from.decades(1e-2, 1e2);
@@ -189,7 +189,7 @@ const Field kLightFields[] = {
      }},
 };
 
-/// From outside, inside, faces, edges and corners; along the axes through voxel centres too.
+/// From outside and inside, from faces, edges and corners; also along the axes through voxel centres.
 json drawCamera(Draw& draw, const Surroundings& around) {
   if (draw.chance(0.05)) return json::object();
   const auto ends = [&](glm::dvec3 share, int count) {
@@ -217,7 +217,7 @@ json drawCamera(Draw& draw, const Surroundings& around) {
   return {{"camera", camera}};
 }
 
-/// Through anything, along the axes and through voxel centres and faces, of all channels or some or none.
+/// Planes anywhere, also along the axes and through voxel centres and faces; of all, some or no channels.
 json drawClip(Draw& draw, const Surroundings& around) {
   if (draw.chance(0.6)) return json::object();
   json planes = json::array();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is drawn: every field of the protocol, and scenes that can be rendered again from their files.
+// Random scenes cover every field of the protocol, and can be rendered again from their files.
 #include "tests/renderer/random_scenes/random_scene.h"
 
 #include <gtest/gtest.h>
@@ -19,8 +19,8 @@ namespace {
 
 using nlohmann::json;
 
-/// Calls visit("/channels/#/gamma") and so on for every field that is not an object, or null for none, or a
-/// list of objects.
+/// Calls visit("/channels/#/gamma") and so on for every field that is not an object (or null) or a list of
+/// objects.
 template <class Visit>
 void forEachField(const json& schema, const json& object, const std::string& path, const Visit& visit) {
   const auto target = [&](const json& reference) -> const json& {
@@ -42,7 +42,7 @@ void forEachField(const json& schema, const json& object, const std::string& pat
   }
 }
 
-/// Adds what stands at a path of a scene, `#` being every element.
+/// Adds the values at a path of a scene; `#` stands for every element.
 void collect(const json& value, const std::string& path, std::set<std::string>* found) {
   if (path.empty()) {
     found->insert(value.dump());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes in which everything is random: the reference against a march of the tester's own, and every method
-// against the reference. SCOLOPAX_RANDOM_SCENES says how many, SCOLOPAX_RANDOM_SCENES_FIRST from which on,
-// and SCOLOPAX_RANDOM_SCENES_FOLDER where scenes that fail are written.
+// Scenes in which everything is random: compares the reference with directMarch(), and every method with the
+// reference. SCOLOPAX_RANDOM_SCENES is the number of scenes, SCOLOPAX_RANDOM_SCENES_FIRST the number of the
+// first one, and SCOLOPAX_RANDOM_SCENES_FOLDER the folder for files of failing scenes.
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
@@ -19,7 +19,7 @@ std::uint64_t numberFrom(const char* variable, std::uint64_t otherwise) {
   return text ? std::strtoull(text, nullptr, 10) : otherwise;
 }
 
-/// The scenes are divided among as many tests, so that none takes too long for ctest.
+/// The scenes are divided among this many tests, so that none takes too long for ctest.
 constexpr int kParts = 10;
 
 class RandomScenes : public testing::TestWithParam<int> {};

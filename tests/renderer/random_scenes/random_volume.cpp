@@ -14,7 +14,7 @@
 namespace scolopax::random_scenes {
 namespace {
 
-/// Rounded to a float; through memory, because GCC 12 leaves out such a rounding of neighbouring numbers.
+/// Rounded to a float; through memory, because GCC 12 omits this rounding of neighbouring numbers.
 double asFloat(double value) {
   volatile float rounded = float(value);
   return double(rounded);
@@ -44,7 +44,7 @@ Grid drawGrid(std::uint64_t scene) {
   if (draw.chance(0.1)) axes[1] += 0.4 * axes[0];
   const double far = draw.chance(0.1) ? 1e4 : 3;
   const glm::dvec3 origin = draw.chance(0.5) ? glm::dvec3(0) : size * draw.vector(-far, far);
-  // As floats, which is what a NIfTI header holds.
+  // As floats, because a NIfTI header holds floats.
   for (int row = 0; row < 3; ++row) {
     for (int axis = 0; axis < 3; ++axis)
       grid.worldFromVoxel[axis][row] = asFloat(spacing[axis] * axes[axis][row]);
@@ -53,7 +53,7 @@ Grid drawGrid(std::uint64_t scene) {
   return grid;
 }
 
-/// Values in [0, 1] with what makes fields difficult: equal neighbours, ramps, extremes.
+/// Values in [0, 1] in patterns that are difficult: equal neighbours, ramps, extremes.
 std::vector<double> drawPattern(Draw& draw, const glm::ivec3& dims) {
   const std::size_t count = std::size_t(dims.x * dims.y * dims.z);
   std::vector<double> values(count);
@@ -106,7 +106,7 @@ void fillFloats(Draw& draw, const std::vector<double>& pattern, ChannelSource* c
 
 ChannelSource drawChannel(std::uint64_t scene, int number, const glm::ivec3& dims) {
   Draw draw(scene, "voxels of channel " + std::to_string(number));
-  // Channels of one field meet where extinctions are compared.
+  // Channels with the same field have equal values, which matters where their extinctions are compared.
   Draw pattern = draw.chance(0.15) ? Draw(scene, "shared pattern") : draw;
   const std::vector<double> values = drawPattern(pattern, dims);
   ChannelSource channel;

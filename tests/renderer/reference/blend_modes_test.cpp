@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the reference makes of several channels in each blend mode: closed forms, and tiny steps.
+// The reference with several channels in each blend mode, against closed forms and tiny steps.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -51,7 +51,7 @@ TEST(ReferenceBlend, MaxOfEqualChannelsShowsTheFirst) {
 }
 
 TEST(ReferenceBlend, MaxOfChannelsThatAreEqualButForRoundingShowsTheFirstAndEnds) {
-  // One field in units that differ by factors of a third and a tenth, over ranges that differ by the same.
+  // One field in units that differ by factors of a third and a tenth, over ranges scaled by the same factors.
   const VoxelFunction lumpy = [](int i, int j, int k) { return (i * 7 + j * 5 + k * 3) % 11; };
   const Grid grid = makeGrid({5, 5, 5});
   std::vector<ChannelSource> sources;
@@ -184,7 +184,7 @@ TEST(ReferenceBlend, Figure3InEveryModeMatchesAMillionMidpoints) {
   };
   const double sum = 1 - std::exp(-depths.x - depths.y - depths.z), most = 1 - std::exp(-largestDepth);
   expectColor(trace(BlendMode::density), density, sum, 1e-9);
-  expectColor(trace(BlendMode::max), max, most, 2 * dt);  // a step may straddle the change of channel
+  expectColor(trace(BlendMode::max), max, most, 2 * dt);  // a step may contain the change of channel
   expectColor(trace(BlendMode::mix), mix, most, 1e-9);
   expectColor(trace(BlendMode::composite), composite, sum, 1e-9);
   EXPECT_NE(max.x, 0);

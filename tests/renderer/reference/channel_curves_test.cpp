@@ -98,7 +98,7 @@ TEST(ChannelCurves, KnowWhenThereIsNothingToSee) {
   EXPECT_TRUE(ChannelCurves(a).visible());
   a.opacity = {{0, 0}, {1, 0}};
   EXPECT_FALSE(ChannelCurves(a).visible());
-  a.opacity = {{0, 0}, {0.5, 0}, {0.5, 1}, {0.5, 0}};  // the middle knot is nobody's neighbour
+  a.opacity = {{0, 0}, {0.5, 0}, {0.5, 1}, {0.5, 0}};  // no segment ends at the middle knot
   EXPECT_FALSE(ChannelCurves(a).visible());
   a.opacity = {{0, 1}};
   a.density = 0;

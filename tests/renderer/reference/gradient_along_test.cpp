@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The polynomial of the gradient against the gradient at points.
+// Compares the polynomial of the gradient along a ray with the gradient at points.
 #include "renderer/reference/gradient_along.h"
 
 #include <gtest/gtest.h>
@@ -53,7 +53,8 @@ TEST(GradientAlong, IsNoneWhereADifferenceIsNotFinite) {
       makeVolume(makeGrid(glm::ivec3(6, 4, 4)),
                  {[](int i, int, int) { return i == 0 ? std::numeric_limits<double>::quiet_NaN() : i; }});
   const ScalarField field(volume.channels()[0], {6, 4, 4});
-  EXPECT_FALSE(gradientAlong(field, {1.1, 1, 1}, {1.9, 2, 1.5}, glm::dmat3(1.0)));  // looks at x = 0.1
+  EXPECT_FALSE(
+      gradientAlong(field, {1.1, 1, 1}, {1.9, 2, 1.5}, glm::dmat3(1.0)));  // its differences reach x = 0.1
   const auto along = gradientAlong(field, {2.1, 1, 1}, {2.9, 2, 1.5}, glm::dmat3(1.0));
   ASSERT_TRUE(along);
   EXPECT_EQ(along->scaled(0.4) / along->scale(0.4), glm::dvec3(1, 0, 0));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opacity by the gradient along rays on which |gradient| has a closed form, and the cuts that it needs.
+// Opacity by the gradient along rays on which |gradient| has a closed form, and the cuts that integration
+// needs.
 #include "renderer/reference/gradient_factor.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,7 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 const glm::dvec3 kRed(1, 0, 0), kBlue(0, 0, 1);
 
-/// Extinction `density` times the factor.
+/// A channel with extinction `density` times the factor.
 ChannelAppearance factored(double density, GradientOpacity opacity, glm::dvec3 color = kRed) {
   ChannelAppearance appearance = uniform(density, color);
   appearance.gradientOpacity = std::move(opacity);
@@ -36,15 +37,15 @@ RayResult alongX(const Volume& volume, const std::vector<ChannelAppearance>& cha
 }
 double depthOf(const RayResult& ray) { return -std::log1p(-ray.rgba.a); }
 
-/// Voxel i of `count` is i^2: |gradient| is 2x from the second to the last but one, (1 + 3x) / (1 + x)
-/// before, (40 - 19w) / (2 - w) with w = x - 10 behind where `count` is 12, and constant in the outer half
-/// voxels.
+/// Voxel i of `count` is i^2. |gradient| is 2x from the second voxel to the last but one, (1 + 3x) / (1 + x)
+/// before, and constant in the outer half voxels; for a `count` of 12 it is (40 - 19w) / (2 - w) after, with
+/// w = x - 10.
 Volume squares(int count = 12, std::size_t channels = 1) {
   const VoxelFunction square = [](int i, int, int) { return i * i; };
   return makeVolume(makeGrid({count, 1, 1}), std::vector<VoxelFunction>(channels, square));
 }
 
-/// On a grid that is neither orthogonal nor of one spacing; all voxels are floats exactly.
+/// A linear field on a grid that is neither orthogonal nor isotropic; floats represent all voxels exactly.
 struct Linear {
   glm::dvec3 gradient{1.5, -0.5, 2};
   Grid grid = makeGrid({5, 6, 4});
@@ -88,7 +89,7 @@ TEST(ReferenceGradientOpacity, CutsAtTheKnotsOfItsCurve) {
   const auto depth = [&](const GradientOpacity& opacity) {
     return depthOf(alongX(volume, {factored(0.3, opacity)})) / 0.3;
   };
-  // Places of cuts are known to 1e-13 of the largest |gradient|^2.
+  // Positions of cuts are accurate to 1e-13 of the largest |gradient|^2.
   constexpr double kClose = 1e-10;
   EXPECT_NEAR(depth({4, 10, {{0, 0}, {1, 1}}}), 1.5 + 6.5, kClose);
   EXPECT_NEAR(depth({10, 4, {{0, 0}, {1, 1}}}), 2.5 + 1.5, kClose);  // reversed
@@ -147,7 +148,7 @@ TEST(ReferenceGradientOpacity, IsExactWhereTheGradientIsNearlyZero) {
 }
 
 TEST(ReferenceGradientOpacity, IsZeroWhereADifferenceIsNotFinite) {
-  // Cells [5, 7] have no scalar, and where x - 1 or x + 1 is in one of them there is no gradient.
+  // Cells [5, 7] have no scalar, and there is no gradient where x - 1 or x + 1 is in one of them.
   const Volume volume = makeVolume(makeGrid({12, 1, 1}), {[](int i, int, int) { return i == 6 ? kNaN : i; }});
   EXPECT_NEAR(depthOf(alongX(volume, {uniform(0.3, kRed)})), 0.3 * 10, 1e-12);
   for (const std::vector<OpacityKnot>& one : {std::vector<OpacityKnot>{{0, 1}}, {{0, 1}, {1, 1}}})
@@ -162,7 +163,7 @@ TEST(ReferenceGradientOpacity, OfASingleVoxelIsThatOfNoGradient) {
 }
 
 TEST(ReferenceGradientOpacity, HandsOverBetweenChannelsWhereTheFactorMakesOneTheLargest) {
-  // Red's extinction is (2x - 4) / 6 from 2 to 5 and then 1, blue's 0.5: they are equal at 3.5.
+  // The extinction of red is (2x - 4) / 6 from 2 to 5 and then 1, that of blue is 0.5: they are equal at 3.5.
   const Volume volume = squares(12, 2);
   const ChannelAppearance red = factored(1, {4, 10, {{0, 0}, {1, 1}}}, kRed), blue = uniform(0.5, kBlue);
   const double blueAlone = -std::expm1(-0.5 * 4), behind = std::exp(-0.5 * 4),
@@ -192,7 +193,7 @@ TEST(ReferenceGradientOpacity, RefusesWhatHasNoMeaning) {
   EXPECT_THROW(trace({0, 1, {{0.5, 0}, {0.25, 1}}}), Error);
 }
 
-/// Between two cuts |gradient| stays between the same knots of the factor, and only rises or only falls.
+/// Between two cuts |gradient| stays between the same two knots of the factor, and is monotonic.
 TEST(FactorAlong, HasOnePieceAndNoExtremumBetweenItsCuts) {
   int pieces = 0, whole = 0;
   for (unsigned seed = 1; seed <= 60; ++seed) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opacity by the gradient against tiny steps, on random small volumes on all kinds of grids: what the
-// reference claims of its own error must hold, in all blend modes and lights.
+// Opacity by the gradient against tiny steps, on random small volumes on all kinds of grids: the reference's
+// bound on its own error must hold in all blend modes and lights.
 #include <gtest/gtest.h>
 
 #include "renderer/reference/integrator.h"
@@ -11,7 +11,7 @@
 namespace scolopax::reference {
 namespace {
 
-/// Ranges of what the channel has, and around it; steps, reversed ones and jumps.
+/// Ranges within and around the channel's gradients; steps, reversed ranges and jumps.
 GradientOpacity randomFactor(RandomLight& draw, const Volume& volume, std::size_t channel) {
   const auto quantile = [&] { return test::gradientQuantile(volume, channel, draw.unit()); };
   GradientOpacity opacity{quantile(), quantile(), {}};
@@ -27,7 +27,8 @@ GradientOpacity randomFactor(RandomLight& draw, const Volume& volume, std::size_
   return opacity;
 }
 
-/// Claims of one ray through each of `count` random scenes against tiny steps.
+/// Compares one ray through each of `count` random scenes with tiny steps: the claimed error bounds must
+/// hold.
 void expectClaimsHold(bool shading, bool shadows, unsigned count, int steps, double largestClaim) {
   int seen = 0;
   for (unsigned seed = 1; seed <= count; ++seed) {
@@ -50,8 +51,7 @@ void expectClaimsHold(bool shading, bool shadows, unsigned count, int steps, dou
   EXPECT_GT(seen, int(count) / 2);
 }
 
-// The tolerances of kTolerance and kToleranceLit are those of a piece; blend mode composite adds three
-// channels.
+// kTolerance and kToleranceLit are tolerances of one piece; blend mode composite adds three channels.
 TEST(ReferenceGradientOpacity, KeepsWhatItClaimsOnRandomScenes) {
   expectClaimsHold(false, false, 150, 20000, 4 * Integrator::kTolerance);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Agreement with the simplest program there is: tiny steps, written again here.
+// Agreement with the simplest possible program, written independently here: tiny steps.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -36,8 +36,8 @@ struct Marcher {
     return channel.slope * sum + channel.intercept;
   }
 
-  /// Value of a curve: the segment that `position` lies in, from behind, so that the later of two equal knots
-  /// wins.
+  /// Value of a curve. Searches the segment of `position` from the end, so that the later of two equal knots
+  /// counts.
   template <class Knots, class Get>
   static auto curve(const Knots& knots, double position, Get value) {
     for (std::size_t i = knots.size(); i-- > 0;)
@@ -132,8 +132,8 @@ void compareOnRandomRays(unsigned seed, bool jumps, double tolerance) {
   }
 }
 
-// A step h is at most 5e-5 long. Kinks cost the marcher h^2, roots (gamma < 1) h^1.4, jumps h times their
-// height.
+// A step h is at most 5e-5 long. The marcher's error is h^2 at kinks, h^1.4 at roots (gamma < 1), and h times
+// the height at jumps.
 TEST(Reference, AgreesWithTinyStepsOnRandomContinuousCurves) { compareOnRandomRays(11, false, 2e-6); }
 TEST(Reference, AgreesWithTinyStepsOnRandomCurvesWithJumps) { compareOnRandomRays(12, true, 5e-4); }
 

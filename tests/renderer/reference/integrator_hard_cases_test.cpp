@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Curves, voxels and coordinates that quadratures and traversals get wrong.
+// Curves, voxels and coordinates that quadratures and traversals often get wrong.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -29,7 +29,7 @@ TEST(ReferenceCurve, NearDiracOpacityIsNeverMissed) {
     for (const double centre : {0.371234, 0.5, 0.73, 1.0 / 3}) {
       ChannelAppearance hat = ramp(0, n - 1, 1 / width);
       hat.opacity = {{centre - width / 2, 0}, {centre, 1}, {centre + width / 2, 0}};
-      // Area of the hat over |df/dt|.
+      // Area of the hat divided by |df/dt|.
       const double straight = 0.5 * (n - 1);
       const double tolerance = straight * 1e-15 * 4 / width + 1e-10;  // positions are rounded to 1e-16
       EXPECT_NEAR(depthOf(volume, hat, {-3, 5.2, 7.1}, {1, 0, 0}), straight, tolerance);
@@ -73,14 +73,14 @@ TEST(ReferenceCurve, AReversedRangeReverses) {
   colors.rangeHi = 0;
   colors.color = {{0, {1, 0, 0}}, {0.5, {1, 0, 0}}, {0.5, {0, 0, 1}}};
   const RayResult found = traceReference(volume, makeScene({colors}), {-3, 0, 0}, {1, 0, 0});
-  EXPECT_NEAR(found.rgba.b, 1 - std::exp(-0.4 * 3.5), 1e-12);  // low values have the high positions
+  EXPECT_NEAR(found.rgba.b, 1 - std::exp(-0.4 * 3.5), 1e-12);  // low values have high positions
 }
 
 TEST(ReferenceCurve, AnEmptyRangeIsAStep) {
   const int n = 7;
   EXPECT_NEAR(depthOf(rampAlongX({n, 1, 1}), ramp(2.25, 2.25, 0.4), {-3, 0, 0}, {1, 0, 0}),
               0.4 * (6.5 - 2.25), 1e-12);
-  // A volume that holds nothing but the value of the step is above it.
+  // A volume in which every voxel has exactly the value of the step is above it.
   const Volume constant = makeVolume(makeGrid({3, 4, 5}), {[](int, int, int) { return 0.1f; }});
   const double value = double(0.1f);
   EXPECT_NEAR(depthOf(constant, ramp(value, value, 0.4), {-3, 1.3, 2.2}, {1, 0.1, 0.2}),
@@ -120,7 +120,7 @@ TEST(ReferenceVoxels, ThatAreNotFiniteCountWithWeightZeroInTheCellOfTheSample) {
                                      {[&](int i, int j, int) { return i == 2 && j == badRow ? kNaN : 1.0; }});
     return depthOf(volume, uniform(1, kRed), {-3, y, 0}, {1, 0, 0});
   };
-  EXPECT_NEAR(depthAt(1, 0), 3, 1e-12);  // row 0 is in the cells [0,1), at whose corners row 1 lies
+  EXPECT_NEAR(depthAt(1, 0), 3, 1e-12);  // row 0 is in the cells [0,1), whose corners include row 1
   EXPECT_NEAR(depthAt(1, 1), 3, 1e-12);
   EXPECT_NEAR(depthAt(1, 1.99), 3, 1e-12);
   EXPECT_NEAR(depthAt(1, 2), 5, 1e-12);      // cells [2,3)
@@ -175,7 +175,7 @@ TEST(ReferenceVoxels, OfIntegerTypesBecomeDataBySlopeAndIntercept) {
   EXPECT_NEAR(depthOf(volume, ramp(299, 301, 0.5), {-3, 0, 0}, {1, 0, 0}), 0.5 * (1 + 0.5), 1e-12);
 }
 
-/// A lumpy field, traced in its own voxel coordinates mapped to some world.
+/// A lumpy field, traced along rays that are given in voxel coordinates and mapped to a world space.
 struct Mapped {
   glm::dmat4 worldFromVoxel{1.0};
   double density = 0.6;
@@ -227,14 +227,14 @@ TEST(ReferenceWorld, RotatedAndMirroredLooksTheSame) {
   mapped.worldFromVoxel[2] = {s, -c, 0, 0};
   mapped.worldFromVoxel[3] = {3, -8, 1, 1};
   expectSame(mapped.trace(kOrigin, kDirection), Mapped{}.trace(kOrigin, kDirection), 1e-9);
-  // Along a face and along an axis, where rounding makes components that are almost 0.
+  // Along a face and along an axis, where rounding produces components that are almost 0.
   expectSame(mapped.trace({-6, -0.5, 2}, {1, 0, 0}), Mapped{}.trace({-6, -0.5, 2}, {1, 0, 0}), 1e-9);
 }
 
 TEST(ReferenceWorld, AnisotropicSpacingOfOneToAHundredStretchesLengths) {
   const Volume volume = makeVolume(makeGrid({5, 5, 5}, {1, 1, 100}), {[](int, int, int k) { return k; }});
   EXPECT_NEAR(depthOf(volume, ramp(0, 4, 0.01), {2, 2, -300}, {0, 0, 1}), 0.01 * (200 + 50), 1e-12);
-  // Across all layers at a slope: z falls by 100 where x goes by 1.
+  // Across all layers obliquely: z decreases by 100 when x changes by 1.
   const double length = std::sqrt(1 + 1e4);
   EXPECT_NEAR(depthOf(volume, ramp(0, 4, 0.01), {-0.5, 2, 450}, {1, 0, -100}), 0.01 * length * (2 + 0.5),
               1e-11);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cases with an answer in closed form.
+// Cases with a closed-form answer.
 #include "renderer/reference/integrator.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ void expectColor(const RayResult& found, const glm::dvec3& color, double alpha, 
   EXPECT_LE(found.error, 1e-6);
 }
 
-/// 4 x 6 x 2.5 world units around `centre`.
+/// A box of 4 x 6 x 2.5 world units around `centre`.
 Volume box(glm::dvec3 centre) {
   return makeVolume(makeGrid({4, 3, 5}, {1, 2, 0.5}, centre - glm::dvec3(1.5, 2, 1)),
                     {[](int, int, int) { return 3; }});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between two cuts nothing changes sides, and nothing turns far: on random lines through random voxels, from
-// gradients at points.
+// Between two cuts no vector changes sides, and none rotates far: checked with gradients at points, on random
+// lines through random voxels.
 #include "renderer/reference/light_cuts.h"
 
 #include <gtest/gtest.h>
@@ -48,7 +48,8 @@ struct Lines {
   struct Place {
     glm::dvec3 normal;
     double steepness;
-    std::vector<double> sides;  // n.v, and n.l and n.h of every light, of the normal as it is
+    std::vector<double>
+        sides;  // n.v, and n.l and n.h of every light, with the normal not flipped to the viewer
     std::vector<glm::dvec3> halves;
   };
   Place at(const ScalarField& field, const glm::dvec3& pointVoxel, const glm::dvec3& v) const {
@@ -68,7 +69,7 @@ struct Lines {
     return place;
   }
 
-  /// Calls visit(places) with some places between every two cuts of a ray.
+  /// Calls visit(places) with several places between each two neighbouring cuts of a ray.
   template <class Visit>
   void forEachPiece(int rays, const Visit& visit) {
     const Lighting lighting(scene, glm::dvec3(0));
@@ -148,7 +149,7 @@ TEST(LightCuts, AHighlightIsWiderThanThePieceThatHoldsIt) {
         for (const Lines::Place& p : places) {
           if (!(std::pow(std::abs(glm::dot(p.normal, p.halves[light])), kShininess) > 1e-5)) continue;
           ++bright;
-          // From end to end n and h turn by two widths, sqrt(2 / shininess), each way from the middle.
+          // From end to end n and h rotate by two widths, sqrt(2 / shininess), to each side of the middle.
           EXPECT_GT(glm::dot(places.front().normal, places.back().normal),
                     std::cos(2 * std::sqrt(2 / kShininess)));
         }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the rules claim of their error, against closed forms.
+// The error bounds that the quadrature rules claim, against closed forms.
 #include "renderer/reference/piece_rules.h"
 
 #include <gtest/gtest.h>
@@ -11,14 +11,14 @@ namespace {
 
 constexpr double kThin = 1e-9;  // extinction of matter that hides nothing behind it
 
-/// Light of emission f(w) in thin matter, 3 long.
+/// Radiance of thin matter with emission f(w), 3 long.
 template <class F>
 PieceEstimate thin(const F& f) {
   return roughPiece([&](double w) { return Medium{kThin, glm::dvec3(f(w))}; }, 3);
 }
 
-/// The largest of |error| - factor x claim over places x in (0,1) of what f(x, w) is 0 before; `integral` is
-/// that of f over the piece.
+/// The largest |error| - factor x claim over places x in (0,1) before which f(x, w) is 0; `integral` is the
+/// integral of f over the piece.
 template <class F, class Integral>
 double largestExcess(double factor, const F& f, const Integral& integral) {
   double most = -1;

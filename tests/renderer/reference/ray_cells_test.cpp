@@ -46,7 +46,7 @@ TEST(RayCells, AreNoneWhereTheRayMissesOrEndsBeforeTheBox) {
   EXPECT_TRUE(cutAtCells({-20, -20, 0}, {1, 2, 0}, {4, 2, 2}).cuts.empty());
 }
 
-// A ray meant to run along a face of a rotated box comes here with rounding errors in origin and direction.
+// A ray along a face of a rotated box has rounding errors in its origin and direction.
 TEST(RayCells, CountAFaceAsInsideWhateverRoundingBroughtTheRayThere) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;

@@ -21,7 +21,7 @@ Camera perspective(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up, double fovY
   return camera;
 }
 
-/// A cube of 4 world units around the origin, seen along -z; 8x8 pixels of 1 unit.
+/// A cube of 4 world units around the origin, seen along -z in 8x8 pixels of 1 unit.
 struct CubeView {
   Volume volume =
       makeVolume(makeGrid(glm::ivec3(4), glm::dvec3(1), glm::dvec3(-1.5)), {[](int, int, int) { return 1; }});
@@ -64,7 +64,7 @@ TEST(RenderReference, APixelCutByAnEdgeHoldsItsShareWithinItsStandardError) {
       ++count;
     }
   }
-  // Only the 5 strata of the cut column vary, each with a cut at its middle: two points of variance 1/4.
+  // Only the 5 strata of the column with the edge vary, each cut at its middle: two points of variance 1/4.
   const double expected = std::sqrt(5 * 0.25 / 2) / 25;
   EXPECT_NEAR(std::sqrt(squares / count), expected, 0.2 * expected);
 }
@@ -107,7 +107,7 @@ TEST(RenderReference, PointFilterLooksThroughPixelCentres) {
 }
 
 TEST(RenderReference, FirstPixelIsTopLeft) {
-  // Only the voxel at the world's low x and high y is there.
+  // Only the voxel at low x and high y in world space is visible.
   const Volume volume = makeVolume(makeGrid(glm::ivec3(2), glm::dvec3(2), glm::dvec3(-1)),
                                    {[](int i, int j, int) { return i == 0 && j == 1; }});
   CubeView view;

@@ -11,7 +11,7 @@
 namespace scolopax::reference {
 namespace {
 
-/// Voxel (i,j,k) holds i^2 + 10 j k.
+/// The value of voxel (i,j,k): i^2 + 10 j k.
 double curved(int i, int j, int k) { return i * i + 10 * j * k; }
 
 TEST(ScalarField, InterpolatesBetweenVoxelsAndIsClampedBeyond) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shaded rays against tiny steps: in the picture of a data set of eight voxels, on random small volumes with
-// all that a scene may hold, and on real data. What the reference claims of its own error must hold.
+// all features of a scene, and on real data. The reference's bound on its own error must hold.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -55,7 +55,8 @@ TEST(ReferenceShading, OfEightBytesIsWhatTinyStepsSay) {
     }
 }
 
-/// Claims of one ray through each of `count` random scenes, in all blend modes, against tiny steps.
+/// Compares one ray through each of `count` random scenes, in all blend modes, with tiny steps: the claimed
+/// error bounds must hold.
 void expectClaimsHold(bool shading, bool shadows, unsigned count, int steps, double largestClaim) {
   for (unsigned seed = 1; seed <= count; ++seed) {
     RandomLight draw(seed);
@@ -79,8 +80,8 @@ TEST(ReferenceShadows, KeepsWhatItClaimsOnRandomScenes) {
 }
 
 TEST(ReferenceShadows, KeepsWhatItClaimsAgainstTheSameWithAThousandthOfTheTolerance) {
-  // Shadows narrower than a fifth of a voxel may be missed: of rays like these 1 in 2500 was off by more than
-  // it claims, by at most 4e-5.
+  // Shadows narrower than a fifth of a voxel may be missed: of rays like these, 1 in 2500 exceeded the
+  // claimed error, by at most 4e-5.
   for (unsigned seed = 1; seed <= 200; ++seed) {
     RandomLight draw(seed);
     const Volume volume = draw.volume();
@@ -96,7 +97,7 @@ TEST(ReferenceShadows, KeepsWhatItClaimsAgainstTheSameWithAThousandthOfTheTolera
 }
 
 TEST(ReferenceShading, SeesAHighlightHoweverNarrow) {
-  // The light stands so that the middle of its highlight lies on the ray, somewhere in a cell.
+  // The light is placed so that the middle of its highlight lies on the ray, somewhere in a cell.
   for (const double shininess : {50.0, 1e3, 1e5, 1e7})
     for (unsigned seed = 1; seed <= 8; ++seed) {
       RandomLight draw(seed);
@@ -122,7 +123,7 @@ TEST(ReferenceShading, SeesAHighlightHoweverNarrow) {
 }
 
 TEST(ReferenceShading, SeesTheGlowOfALightBesideTheRay) {
-  // Of matter that faces the light, as wide as the light is far from the ray.
+  // A highlight on matter that faces the light; it is as wide as the light's distance from the ray.
   const Volume volume = makeVolume(makeGrid(glm::ivec3(6)), {[](int i, int j, int) { return j - 1e-5 * i; }});
   Scene scene = makeScene({uniform(0.3, glm::dvec3(1))});
   scene.channels[0].material = {0, 1, 0, 20};
@@ -139,7 +140,7 @@ TEST(ReferenceShading, SeesTheGlowOfALightBesideTheRay) {
 }
 
 TEST(ReferenceShading, OfNormalsAcrossTheViewIsOneOfBothSides) {
-  // Along x + y = const, where rounding, 0.1 not being a double, would turn the normal at every point.
+  // Along x + y = const, where rounding (0.1 is not a double) could flip the normal at every point.
   std::vector<ChannelSource> channels(1);
   channels[0].voxels = VoxelBuffer(ScalarType::u8, 8 * 8 * 8);
   for (std::size_t i = 0; i < 512; ++i)
@@ -159,7 +160,7 @@ TEST(ReferenceShading, OfNormalsAcrossTheViewIsOneOfBothSides) {
 }
 
 TEST(ReferenceShading, ClaimsMoreWhereLightIsBright) {
-  // What hides behind matter too thick to look through may be as bright as the light.
+  // Matter hidden behind opaque matter may be as bright as the light.
   const Volume volume = makeVolume(makeGrid({2, 2, 40}), {[](int, int, int k) { return k; }});
   Scene scene = makeScene({uniform(1, glm::dvec3(1))});
   scene.shading = true;

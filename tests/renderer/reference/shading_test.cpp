@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradient shading in the reference. In a linear field of constant opacity radiance is the same everywhere,
-// so that the colour of a ray is its alpha times the formula, which is written out again here.
+// Gradient shading in the reference. In a linear field of constant opacity the radiance is the same
+// everywhere, so that the colour of a ray is its alpha times the formula, which is written independently
+// here.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +22,8 @@ Light directional(const glm::dvec3& to, const glm::dvec3& color = glm::dvec3(1),
   return {LightType::directional, to, color, intensity};
 }
 
-/// Value a . world, on a grid with the given columns around the origin; opacity does not depend on it.
+/// A field of value dot(a, world), on a grid with the given columns around the origin; opacity does not
+/// depend on the value.
 struct LinearField {
   glm::dvec3 a{1, 0, 0};
   glm::dmat3 columns{1.0};
@@ -41,7 +43,7 @@ struct LinearField {
                         return glm::dot(a, glm::dvec3(grid.worldFromVoxel * glm::dvec4(i, j, k, 1)));
                       }});
   }
-  /// Radiance: colour over alpha.
+  /// The radiance, which is colour over alpha.
   glm::dvec3 seenAlong(const glm::dvec3& direction) {
     scene.channels[0].rangeLo = 5;
     scene.channels[0].rangeHi = 5 + range;
@@ -55,7 +57,7 @@ void expectNear(const glm::dvec3& found, const glm::dvec3& expected, double tole
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(found[c], expected[c], tolerance) << "component " << c;
 }
 
-/// Fully shaded (s = 1) by one white light.
+/// The radiance with full shading (s = 1) by one white light.
 glm::dvec3 shaded(const Material& m, const glm::dvec3& color, double nl, double nh) {
   return color * (m.ambient + m.diffuse * nl) + m.specular * std::pow(nh, m.shininess);
 }
@@ -107,11 +109,12 @@ TEST(ReferenceShading, WithoutLightsThereIsAHeadlight) {
 TEST(ReferenceShading, APointLightShinesFromItsPositionWithoutFallOff) {
   LinearField field;
   for (const double far : {40.0, 4e7}) {
-    // So far that its direction is the same everywhere in the box.
+    // So far away that its direction is the same everywhere in the box.
     field.scene.lights = {{LightType::point, far * 1e6 * glm::dvec3(0.6, 0, 0.8), glm::dvec3(1), 1}};
     expectNear(field.seenAlong({-1, 0, 0}), shaded(kMaterial, kColor, 0.6, 1.6 / std::sqrt(3.2)), 1e-6);
   }
-  // Beside the ray at x = 0.75: the light is grazing there, in front of it what faces the eye sees it not.
+  // A point light next to the ray at x = 0.75: there its light is grazing; matter in front of it faces the
+  // eye and is not lit.
   field.scene.channels[0].material = {0, 1, 0, 1};
   field.scene.channels[0].color = {{0, {1, 1, 1}}};
   field.scene.lights = {{LightType::point, {0.75, 2, 0}, glm::dvec3(1), 1}};
@@ -136,7 +139,8 @@ TEST(ReferenceShading, FadesWithTheGradientsMagnitude) {
     const double g = std::min(1.0, 1 / std::abs(range)), s = 1 - (1 - g) * (1 - g);
     expectNear(field.seenAlong({-1, 0, 0}), kColor * ((1 - s) + s * (0.1 + 0.6)) + s * 0.35 * glm::dvec3(1));
   }
-  field.range = 0;  // a step: any gradient is infinitely steep; all values lie below it but show one opacity
+  field.range = 0;  // a step: any gradient is infinitely steep relative to it; all values lie below it but
+                    // have the same opacity
   expectNear(field.seenAlong({-1, 0, 0}), shaded(kMaterial, kColor, 1, 1));
 }
 
@@ -171,7 +175,7 @@ TEST(ReferenceShading, IsTheSameOnIsotropicAnisotropicAndRotatedGrids) {
   }
 }
 
-/// Two channels in one place, of extinction 0.2 and 0.3, whose gradients face the eye and the side.
+/// Two overlapping channels, of extinction 0.2 and 0.3, whose gradients point to the eye and to the side.
 struct TwoMaterials {
   Volume volume =
       makeVolume(makeGrid({6, 6, 6}), {[](int i, int, int) { return i; }, [](int, int j, int) { return j; }});

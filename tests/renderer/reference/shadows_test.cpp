@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shadows in the reference: closed forms in homogeneous boxes, and tiny steps where there is everything.
+// Shadows in the reference: closed forms in homogeneous boxes, and tiny steps for a scene with all features.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,7 +11,7 @@
 namespace scolopax::reference {
 namespace {
 
-constexpr double kTolerance = 1e-4;  // what the integrator aims at with light
+constexpr double kTolerance = 1e-4;  // the integrator's tolerance with light
 
 Light directional(const glm::dvec3& to, const glm::dvec3& color = glm::dvec3(1), double intensity = 1) {
   return {LightType::directional, to, color, intensity};
@@ -87,11 +87,11 @@ TEST(ReferenceShadows, ColoursOfLightsAreDimmedSeparately) {
   const double front = (1 - std::exp(-2 * Slab::depth)) / 2, side = alpha * std::exp(-Slab::sigma * 2.5);
   const glm::dvec4 found = slab.trace();
   EXPECT_NEAR(found.r, 0.2 * alpha + 0.8 * (front + 1.5 * side) / 2.5, kTolerance);
-  EXPECT_NEAR(found.g, alpha, kTolerance);  // no green light: nothing that could be in shadow
+  EXPECT_NEAR(found.g, alpha, kTolerance);  // no green light: nothing that could be shadowed
   EXPECT_NEAR(found.b, 0.2 * alpha + 0.8 * side, kTolerance);
 }
 
-/// With a second channel of extinction 0.6.
+/// Uses a second channel of extinction 0.6.
 TEST(ReferenceShadows, OccludersAreBlendedAsTheSceneIs) {
   Slab slab;
   slab.scene.lights = {directional({1, 0, 0})};
@@ -122,7 +122,7 @@ TEST(ReferenceShadows, HiddenChannelsThrowNone) {
 }
 
 TEST(ReferenceShadows, LightThatNothingIsInTheWayOfIsNotDimmed) {
-  // So thin that all visibilities are 1 within a millionth.
+  // So thin that every visibility is 1 within a millionth.
   const Volume volume = rampAlongX({8, 8, 8});
   Scene scene = makeScene({ramp(0, 7, 1e-8, {0.9, 0.5, 0.2})});
   scene.lights = {directional({-1, 0.4, 0.2}, {1, 0.5, 0}, 2), pointAt({20, 3, 4}), Light{}};
@@ -149,7 +149,7 @@ TEST(ReferenceShadows, DoNotReachWhatIsFullyAmbient) {
 }
 
 TEST(ReferenceShadows, AnOpaqueWallBlackensWhatIsBehindItAndNothingElse) {
-  // A wall at x = 3 between the light and the ray at x = 6, as high as y < 4.
+  // A wall at x = 3, for y < 4, between the light and the ray at x = 6.
   const Volume volume = makeVolume(makeGrid({8, 8, 8}), {[](int i, int j, int) { return i == 3 && j < 4; },
                                                          [](int i, int, int) { return i > 5; }});
   Scene scene = makeScene({ramp(0, 1, 1e5), uniform(0.2, glm::dvec3(1))});
@@ -159,12 +159,13 @@ TEST(ReferenceShadows, AnOpaqueWallBlackensWhatIsBehindItAndNothingElse) {
   scene.lights = {directional({1, 0, 0})};
   const auto seenAt = [&](double y) { return traceReference(volume, scene, {6, y, -9}, {0, 0, 1}).rgba; };
   EXPECT_NEAR(seenAt(2).r, 0, 1e-6);
-  // In front of the ray lies what begins at x = 5.5 where the value passes 1/2.
+  // Between the light and the ray is matter from x = 5.5 on, where the value exceeds 1/2.
   EXPECT_NEAR(seenAt(6).r, (1 - std::exp(-1.6)) * std::exp(-0.1), kTolerance);
   EXPECT_NEAR(seenAt(2).a, seenAt(6).a, 1e-7);
 }
 
-/// Figure 3 with everything, in tiny steps: extinctions are known in closed form, gradients are constant.
+/// Figure 3 with shading and shadows, in tiny steps: extinctions are known in closed form, gradients are
+/// constant.
 struct LitFigure3 : Figure3 {
   const double kRange = n - 1;
   LitFigure3() {
@@ -180,7 +181,7 @@ struct LitFigure3 : Figure3 {
     if (mode == BlendMode::density) return sigma.x + sigma.y + sigma.z;
     return mode == BlendMode::composite ? sigma[channel] : std::max({sigma.x, sigma.y, sigma.z});
   }
-  /// t at which a ray leaves the box, or enters it.
+  /// t at which a ray enters the box (with `entry`) or leaves it.
   static double passes(const glm::dvec3& origin, const glm::dvec3& direction, bool entry) {
     double begin = 0, end = 1e9;
     for (int axis = 0; axis < 3; ++axis) {

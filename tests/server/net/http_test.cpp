@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// HTTP as a client sees it, well-behaved or not.
+// HTTP from the view of well-behaved and other clients.
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
@@ -51,7 +51,7 @@ class HttpTest : public testing::Test {
   }
   std::uint16_t port() const { return server_->port(); }
 
-  /// Status of the answer to raw bytes; then the connection must end.
+  /// Status of the answer to raw bytes; the connection must end after it.
   int refusal(const std::string& raw) {
     TestClient client(port());
     client.send(raw);
@@ -227,7 +227,7 @@ TEST_F(HttpTest, RefusesABodyOverTheLimitAndIsHeard) {
   TestClient client(port());
   const Answer answer = client.request("POST /echo HTTP/1.1", std::string(1000, 'x'));
   EXPECT_EQ(answer.status, 200);
-  // The whole body is sent before the answer is read: a reset on the way would lose it.
+  // The client sends the whole body before it reads the answer; a reset in between would lose the answer.
   TestClient large(port());
   EXPECT_EQ(large.request("POST /echo HTTP/1.1", std::string(8 << 20, 'x')).status, 413);
   EXPECT_TRUE(large.ended());
@@ -399,7 +399,7 @@ TEST_F(HttpTest, NamesAHostThatItCannotBind) {
   EXPECT_THROW(server.start(), NetError);
 }
 
-/// Holds handlers until it is opened.
+/// Blocks handlers until it is opened.
 class Gate {
  public:
   ~Gate() { open(); }
@@ -514,7 +514,7 @@ TEST_F(HttpTest, TellsALongRequestThatItsClientHasGone) {
       },
       RouteKind::slow);
   server.start();
-  // Who waits, also with the next request sent already, is not gone.
+  // A client that waits is not gone, even if it has already sent its next request.
   TestClient patient(server.port());
   patient.send(
       "POST /long HTTP/1.1\r\nHost: a\r\nContent-Length: 1\r\n\r\nxPOST /long HTTP/1.1\r\nHost: a\r\n\r\n");

@@ -8,7 +8,7 @@ namespace {
 
 Frame frame(std::uint32_t number) { return {number, {}, nullptr}; }
 
-/// Number of the frame that goes out next; 0 when none does.
+/// Number of the frame that is sent next; 0 if there is none.
 std::uint32_t nextFrame(Outbox& outbox) {
   const auto item = outbox.next();
   return item ? std::get<Frame>(*item).number : 0;
@@ -94,7 +94,7 @@ TEST(Outbox, RefusesMoreBytesOfTextThanItsLimitButForASingleText) {
   EXPECT_TRUE(outbox.pushText(std::string(5000, 'x')));
   EXPECT_FALSE(outbox.pushText("y"));
   outbox.next();
-  EXPECT_TRUE(outbox.pushText("y"));  // and while the large one is being sent, one more
+  EXPECT_TRUE(outbox.pushText("y"));  // one more may wait while the large one is being sent
   EXPECT_FALSE(outbox.pushText("z"));
   outbox.next();
   EXPECT_TRUE(outbox.pushText(std::string(50, 'x')));

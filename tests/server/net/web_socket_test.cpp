@@ -16,7 +16,7 @@ using Payload = std::shared_ptr<const std::vector<unsigned char>>;
 
 Payload payload(std::size_t size) { return std::make_shared<const std::vector<unsigned char>>(size, 'p'); }
 
-/// Frame whose header is its number in two digits.
+/// A frame whose header is its number in two digits.
 Frame frame(std::uint32_t number, const Payload& data) {
   return {number,
           {static_cast<unsigned char>('0' + number / 10 % 10), static_cast<unsigned char>('0' + number % 10)},
@@ -66,7 +66,7 @@ class WebSocketTest : public testing::Test {
   }
   std::uint16_t port() const { return server_->port(); }
 
-  /// Connected, with the greeting read.
+  /// A connected client that has read the greeting.
   std::unique_ptr<TestClient> connect(int receiveBuffer = 0) {
     auto client = std::make_unique<TestClient>(port(), receiveBuffer);
     EXPECT_EQ(client->upgrade("/stream").status, 101);
@@ -77,7 +77,8 @@ class WebSocketTest : public testing::Test {
   std::mutex mutex_;
   std::vector<std::shared_ptr<WebSocket>> sockets_;
   std::atomic<int> closed_{0};
-  std::unique_ptr<Server> server_;  ///< last: stops before what its handlers use goes
+  std::unique_ptr<Server>
+      server_;  ///< last: must stop before the members that its handlers use are destroyed
 };
 
 TEST_F(WebSocketTest, FollowsRequestsOnAKeptConnection) {
@@ -200,7 +201,7 @@ TEST_F(WebSocketTest, SaysWhyItClosesToAClientThatGoesOnSending) {
   for (const std::string& first :
        {TestClient::frame(1, std::string(8 << 20, 'x')), TestClient::frame(2, "x")}) {
     const auto client = connect();
-    // More than the sockets' buffers hold: sent whole only when somebody reads it.
+    // More than the sockets' buffers hold: sending completes only if the server reads it.
     EXPECT_TRUE(client->send(first));
     EXPECT_TRUE(client->send(TestClient::frame(1, std::string(8 << 20, 'x'))));
     EXPECT_EQ(client->closeCode(), first.size() > 1000 ? 1009 : 1003);
@@ -249,7 +250,8 @@ TEST_F(WebSocketTest, SendsNoFrameThatWasWithdrawnWhileItWaited) {
   const auto client = connect();
   const Payload data = payload(10);
   for (std::uint32_t number = 1; number <= 3; ++number) socket()->offerFrame(frame(number, data));
-  // Both places of the window are taken, so frame 3 waits (or was 2, replaced); it is of a session just left.
+  // Frames 1 and 2 fill the window, so frame 3 waits (or 2 was replaced and 3 sent). The client leaves its
+  // session.
   socket()->withdrawFrame();
   socket()->offerFrame(frame(4, data));
   client->sendText("ack 1");
@@ -302,7 +304,7 @@ TEST_F(WebSocketTest, AClientThatAnswersPingsStays) {
 TEST_F(WebSocketTest, OverflowingControlQueueClosesTheConnection) {
   start();
   auto client = connect(4096);
-  // The big frame fills the socket, so that texts wait behind it.
+  // The large frame fills the socket, so that texts wait behind it.
   socket()->offerFrame(frame(1, payload(8 << 20)));
   ASSERT_TRUE(eventually([&] { return socket()->stats().framesSent == 1; }));
   for (int i = 0; i < 9; ++i) socket()->sendText("waits");
