@@ -104,7 +104,7 @@ class Engine final : public Renderer {
   }
   bool errorTakesLong() const override {
     // A film of few samples may be one of many that edits cause, and is not worth the thumbnails.
-    return hasStep(plan_->scene().method) && !bias_ && film_.samples() >= kSamplesWorthBias;
+    return plan_ && hasStep(plan_->scene().method) && !bias_ && film_.samples() >= kSamplesWorthBias;
   }
   Image image() const override {
     Image image;
