@@ -46,6 +46,8 @@ struct Choice {
   double step;  ///< step of quadrature, in smallest spacings; 0 for trackers, which have no step
 };
 
+/// Before the first setScene() there is no picture: choice(), renderPixels(), addPixels() and pick() need
+/// one.
 class Renderer {
  public:
   virtual ~Renderer() = default;
