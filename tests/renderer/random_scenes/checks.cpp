@@ -328,7 +328,7 @@ class Checks {
   }
 
   /// `auto` promises that the bias stays below the requested error, as a mean over pictures of some size: its
-  /// own measurement uses pictures 24 pixels across.
+  /// own measurement uses pictures 24 pixels across, or 16 with light.
   void checkAutomatic(Scene scene) {
     const int side = scene.shadows ? 5 : 24, longer = std::max(scene.width, scene.height);
     scene.width = std::max(1, scene.width * side / longer);
