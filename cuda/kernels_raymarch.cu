@@ -4,6 +4,6 @@
 
 namespace scolopax::cuda {
 
-template LaunchFunction chooseLaunch<kernel::RayMarch>(const Scene&, bool);
+template LaunchFunction chooseLaunch<kernel::RayMarch<kernel::EqualSteps>>(const Scene&, bool);
 
 }  // namespace scolopax::cuda

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cuda/launch.h"
 
+#include "renderer/core/error.h"
 #include "renderer/data/instances.h"
 
 namespace scolopax::cuda {
@@ -12,13 +13,19 @@ bool isPlain(const kernel::SceneView& view) {
   return true;
 }
 
+const kernel::SceneView& checked(const kernel::SceneView& view) {
+  if (view.voxelwise)
+    throw Error(ErrorCode::unsupported, "cuda: quadrature from one face of voxel cells to the next (step 0)");
+  return view;
+}
+
 }  // namespace
 
 Passes::Passes(const Scene& scene, const kernel::SceneView& view, bool counting)
     : launch_(visitIntegrator(
           scene,
           [&](auto type) { return chooseLaunch<typename decltype(type)::type>(scene, isPlain(view)); })),
-      scene_(view),
+      scene_(checked(view)),
       pixels_(std::size_t(view.width) * std::size_t(view.height)),
       cost_(counting ? pixels_.count() : 0) {
   cost_.fillWithZeros();

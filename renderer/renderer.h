@@ -8,6 +8,7 @@
 #include <memory>
 #include <stop_token>
 #include <string_view>
+#include <vector>
 
 #include "renderer/core/memory_budget.h"
 #include "renderer/data/aov.h"
@@ -43,7 +44,14 @@ struct RenderStats {
 /// renderer chose from the scene and the data.
 struct Choice {
   Method method;
-  double step;  ///< step of quadrature, in smallest spacings; 0 for trackers, which have no step
+  double step;  ///< as Scene::step; 0 for trackers, which have no step
+  /// For Method::automatic, the corrections of the film's picture: for each level, the step of the finer of
+  /// the two pictures whose difference it is (0: whole voxel cells), and how many passes it has.
+  struct Correction {
+    double step;
+    std::uint32_t passes;
+  };
+  std::vector<Correction> corrections;
 };
 
 /// Before the first setScene() there is no picture: choice(), renderPixels(), addPixels() and pick() need

@@ -28,6 +28,18 @@ constexpr double kSlice = 0.1;
 /// A number of seconds that can safely be added to a clock's time.
 constexpr double kForever = 1e9;
 
+/// As the header Scolopax-Corrections has it.
+std::string textOf(const std::vector<Choice::Correction>& corrections) {
+  std::string text;
+  for (const Choice::Correction& level : corrections) {
+    if (!text.empty()) text += ',';
+    text += shortText(level.step);
+    text += ':';
+    text += std::to_string(level.passes);
+  }
+  return text;
+}
+
 /// One of the places for renders that run at once; the constructor throws ProtocolError(503) if all are
 /// taken.
 class RenderPlace {
@@ -182,11 +194,13 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
                          {}};
   memory->resize(response.body.size());
   response.keep = memory;
+  const Choice choice = renderer->choice();
   response.headers = {{"Scolopax-Samples", std::to_string(renderer->samples())},
                       {"Scolopax-Error", error},
                       {"Scolopax-Seed", std::to_string(scene->render.seed)},
-                      {"Scolopax-Method", std::string(nameOf(renderer->choice().method))},
-                      {"Scolopax-Step", shortText(renderer->choice().step)},
+                      {"Scolopax-Method", std::string(nameOf(choice.method))},
+                      {"Scolopax-Step", shortText(choice.step)},
+                      {"Scolopax-Corrections", textOf(choice.corrections)},
                       {"Scolopax-Scene", sceneHash(*scene)},
                       {"Scolopax-Render-Ms", std::to_string(milliseconds)},
                       {"Scolopax-Rebuild-Ms", std::to_string(std::int64_t(rebuild->rebuildMs))},

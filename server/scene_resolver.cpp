@@ -12,6 +12,7 @@
 #include "protocol/problem.h"
 #include "protocol/scene_json.h"
 #include "renderer/core/error.h"
+#include "renderer/core/short_text.h"
 #include "renderer/data/clip_view.h"
 #include "renderer/data/colormap.h"
 #include "renderer/data/defaults.h"
@@ -209,9 +210,8 @@ void checkMacrocell(int size, const Volume& volume, std::size_t mostIntervals) {
 }
 
 /// The part of the resolved scene that determines the picture at a given number of samples.
-json pictureOf(json resolved, const Scene& render) {
+json pictureOf(json resolved) {
   resolved.erase("stop");
-  resolved["targetError"] = render.targetError;
   for (json& channel : resolved["channels"]) channel.erase("name");
   return resolved;
 }
@@ -340,11 +340,13 @@ SceneResolver::Resolved SceneResolver::resolve(json sparse, const Chosen& chosen
   resolveLights(scene, render);
   render.blend = valueOf<BlendMode>(kBlendModes, scene.blend.mode);
   render.method = valueOf<Method>(kMethods, scene.integrator.method);
-  if (render.method == Method::automatic && scene.stop.error.value_or(0) > 0)
-    render.targetError = *scene.stop.error;
   render.macrocell = int(scene.integrator.macrocell);
   checkMacrocell(render.macrocell, volume, options_.maxIntervals);
   render.step = scene.integrator.step;
+  if (render.step != 0 && render.step < kLeastStep)
+    throw ProtocolError(
+        422, "/integrator/step",
+        "expected 0, or at least " + shortText(kLeastStep) + ", found " + shortText(render.step));
   render.sampling = valueOf<Sampling>(kSamplings, scene.integrator.sampling);
   render.seed = scene.integrator.seed;
   render.width = int(scene.image.width);
@@ -358,7 +360,7 @@ SceneResolver::Resolved SceneResolver::resolve(json sparse, const Chosen& chosen
   result->stop = {scene.stop.samples.value_or(0), scene.stop.seconds.value_or(0),
                   scene.stop.error.value_or(0)};
   result->resolved = protocol::toJson(scene);
-  result->picture = pictureOf(result->resolved, render);
+  result->picture = pictureOf(result->resolved);
   result->sparse = std::move(sparse);
   return result;
 }

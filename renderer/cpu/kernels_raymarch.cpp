@@ -4,6 +4,7 @@
 
 namespace scolopax {
 
-template TileFunction chooseTileFunction<kernel::RayMarch>(const Scene&);
+template TileFunction chooseTileFunction<kernel::RayMarch<kernel::EqualSteps>>(const Scene&);
+template TileFunction chooseTileFunction<kernel::RayMarch<kernel::VoxelCells>>(const Scene&);
 
 }  // namespace scolopax

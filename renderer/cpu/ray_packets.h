@@ -17,7 +17,7 @@ TileFunction packetTileFunction(const Scene& scene, const kernel::SceneView& vie
 
 /// Packets of 8 and 16 rays. Each is compiled for its instruction set in a file of its own; null except on
 /// x86-64.
-TileFunction avx2PacketTiles(const Scene& scene);
-TileFunction avx512PacketTiles(const Scene& scene);
+TileFunction avx2PacketTiles(const Scene& scene, bool voxelwise);
+TileFunction avx512PacketTiles(const Scene& scene, bool voxelwise);
 
 }  // namespace scolopax

@@ -8,9 +8,9 @@
 
 namespace scolopax {
 
-TileFunction avx2PacketTiles([[maybe_unused]] const Scene& scene) {
+TileFunction avx2PacketTiles([[maybe_unused]] const Scene& scene, [[maybe_unused]] bool voxelwise) {
 #if defined(__x86_64__)
-  return lanes_avx2::packetTiles(scene);
+  return lanes_avx2::packetTiles(scene, voxelwise);
 #else
   return nullptr;
 #endif

@@ -8,9 +8,9 @@
 
 namespace scolopax {
 
-TileFunction avx512PacketTiles([[maybe_unused]] const Scene& scene) {
+TileFunction avx512PacketTiles([[maybe_unused]] const Scene& scene, [[maybe_unused]] bool voxelwise) {
 #if defined(__x86_64__)
-  return lanes_avx512::packetTiles(scene);
+  return lanes_avx512::packetTiles(scene, voxelwise);
 #else
   return nullptr;
 #endif

@@ -2,6 +2,7 @@
 // kernel/sample_volume.h for one point per lane, with the same bits. Single channels are gathered;
 // neighbouring channels are read four at a time. Included after lanes_*.h.
 #pragma once
+#include <bit>
 #include <cstring>
 
 #include "renderer/kernel/sample_volume.h"
@@ -61,23 +62,29 @@ SCOLOPAX_LANES Float voxelsAt(const T* voxels, Int index) {
   return toFloat(rightSigned<16>(left<16>(word)));
 }
 
-/// Interpolates along x between the voxels at `index` and their neighbours, `stride` further on. Adjacent
-/// voxels of less than 32 bits are read in pairs.
+/// Reads the voxels at `index` and their neighbours, `stride` further on. Adjacent voxels of less than 32
+/// bits are read in pairs.
+template <class T>
+SCOLOPAX_LANES void readPair(const T* voxels, Int index, int stride, Float* a, Float* b) {
+  if (sizeof(T) == 4 || stride != 1) {
+    *a = voxelsAt(voxels, index);
+    *b = voxelsAt(voxels + stride, index);
+    return;
+  }
+  const Int pair = gatherWords<int(sizeof(T))>(voxels, index);
+  if constexpr (std::is_same_v<T, std::uint8_t>)
+    *a = toFloat(pair & 0xff), *b = toFloat(right<8>(pair) & 0xff);
+  else if constexpr (std::is_same_v<T, std::uint16_t>)
+    *a = toFloat(pair & 0xffff), *b = toFloat(right<16>(pair));
+  else
+    *a = toFloat(rightSigned<16>(left<16>(pair))), *b = toFloat(rightSigned<16>(pair));
+}
+
+/// Interpolates along x between the voxels at `index` and their neighbours.
 template <class T>
 SCOLOPAX_LANES Float alongX(const T* voxels, Int index, int stride, const Axis& x) {
   Float a, b;
-  if (sizeof(T) == 4 || stride != 1) {
-    a = voxelsAt(voxels, index);
-    b = voxelsAt(voxels + stride, index);
-  } else {
-    const Int pair = gatherWords<int(sizeof(T))>(voxels, index);
-    if constexpr (std::is_same_v<T, std::uint8_t>)
-      a = toFloat(pair & 0xff), b = toFloat(right<8>(pair) & 0xff);
-    else if constexpr (std::is_same_v<T, std::uint16_t>)
-      a = toFloat(pair & 0xffff), b = toFloat(right<16>(pair));
-    else
-      a = toFloat(rightSigned<16>(left<16>(pair))), b = toFloat(rightSigned<16>(pair));
-  }
+  readPair(voxels, index, stride, &a, &b);
   return lerp(select(x.swapped, b, a), select(x.swapped, a, b), x.t);
 }
 
@@ -139,6 +146,26 @@ SCOLOPAX_LANES __m128 load4(const std::int16_t* v) {
 }
 SCOLOPAX_LANES __m128 load4(const float* v) { return _mm_loadu_ps(v); }
 
+/// Channels that are read together: up to four neighbours, the first of which is at `lane`.
+struct FourChannels {
+  int lane;
+  int channel[4];       ///< visible channel at lane + i; -1: none
+  std::uint32_t found;  ///< their bits
+  bool several() const { return (found & (found - 1)) != 0; }
+};
+/// Those of `channels` (bit n: visible channel n) that are read together with channel n.
+SCOLOPAX_SIMD inline FourChannels fourWith(const kernel::SceneView& scene, int n, std::uint32_t channels) {
+  const kernel::ChannelView& channel = scene.channels[n];
+  FourChannels four{channel.lane & ~3, {-1, -1, -1, -1}, 0};
+  for (int m = n; m < scene.channelCount; ++m)
+    if ((channels >> m & 1) && scene.channels[m].voxels == channel.voxels &&
+        (scene.channels[m].lane & ~3) == four.lane) {
+      four.channel[scene.channels[m].lane - four.lane] = m;
+      four.found |= 1u << m;
+    }
+  return four;
+}
+
 /// Samples four neighbouring channels, the first of which is at `lane`. The values of the channel at lane + i
 /// go to members[i], unless that is null.
 template <class T>
@@ -182,22 +209,109 @@ SCOLOPAX_LANES void sampleChannels(const kernel::SceneView& scene, std::uint32_t
   for (int n = 0; n < scene.channelCount; ++n) {
     if (!(channels >> n & 1)) continue;
     const kernel::ChannelView& channel = scene.channels[n];
-    // Finds the channels in the same group of four.
-    const int lane = channel.lane & ~3;
-    float* members[4] = {};
-    std::uint32_t found = 0;
-    for (int m = n; m < scene.channelCount; ++m)
-      if ((channels >> m & 1) && scene.channels[m].voxels == channel.voxels &&
-          (scene.channels[m].lane & ~3) == lane) {
-        members[scene.channels[m].lane - lane] = reinterpret_cast<float*>(&values[m]);
-        found |= 1u << m;
+    const FourChannels four = fourWith(scene, n, channels);
+    channels &= ~four.found;
+    if (!four.several() || isFlat(scene.dims)) {
+      for (std::uint32_t left = four.found; left != 0; left &= left - 1) {
+        const int m = std::countr_zero(left);
+        values[m] = sampleChannel(at, scene.channels[m]);
       }
-    if ((found & (found - 1)) != 0 && !isFlat(scene.dims))
-      visitScalarType(channel.type,
-                      [&](auto zero) { sampleFour<decltype(zero)>(at, channel, lane, members); });
-    else
-      found = 1u << n, values[n] = sampleChannel(at, channel);
-    channels &= ~found;
+      continue;
+    }
+    float* members[4] = {};
+    for (int k = 0; k < 4; ++k)
+      if (four.channel[k] >= 0) members[k] = reinterpret_cast<float*>(&values[four.channel[k]]);
+    visitScalarType(channel.type,
+                    [&](auto zero) { sampleFour<decltype(zero)>(at, channel, four.lane, members); });
+  }
+}
+
+/// Reads a cell's voxels of one channel, which are of type T, by gathering.
+template <class T>
+SCOLOPAX_LANES void cellVoxelsOfOne(const Points& at, const kernel::ChannelView& channel, Float* corners) {
+  const int stride = channel.stride;
+  const T* base = static_cast<const T*>(channel.voxels) + channel.lane +
+                  at.first * std::size_t(at.dims.x) * std::size_t(at.dims.y) * std::size_t(stride);
+  const Int row = Int(at.dims.x * stride), slice = Int(at.dims.x * at.dims.y * stride);
+  // The last voxel on an axis is the upper one of its cell.
+  const Int z = minimum(at.z.low, Int(at.dims.z - 2)) - Int(int(at.first));
+  const Int low = z * slice + minimum(at.y.low, Int(at.dims.y - 2)) * row +
+                  minimum(at.x.low, Int(at.dims.x - 2)) * Int(stride);
+  readPair(base, low, stride, &corners[0], &corners[1]);
+  readPair(base, low + row, stride, &corners[2], &corners[3]);
+  readPair(base, low + slice, stride, &corners[4], &corners[5]);
+  readPair(base, low + row + slice, stride, &corners[6], &corners[7]);
+}
+
+/// The same for four neighbouring channels, the first of which is at `lane`. The voxels of the channel at
+/// lane + i go to members[i], unless that is null.
+template <class T>
+SCOLOPAX_SIMD void cellVoxelsOfFour(const Points& at, const kernel::ChannelView& channel, int lane,
+                                    float* const* members) {
+  const auto stride = std::size_t(channel.stride), row = stride * std::size_t(at.dims.x),
+             slice = row * std::size_t(at.dims.y);
+  const T* base = static_cast<const T*>(channel.voxels) + lane;
+  alignas(4 * kLanes) std::int32_t low[3][kLanes];
+  store(minimum(at.x.low, Int(at.dims.x - 2)), low[0]);
+  store(minimum(at.y.low, Int(at.dims.y - 2)), low[1]);
+  store(minimum(at.z.low, Int(at.dims.z - 2)), low[2]);
+  for (int i = 0; i < kLanes; ++i) {
+    const T* first = base + std::size_t(low[2][i]) * slice + std::size_t(low[1][i]) * row +
+                     std::size_t(low[0][i]) * stride;
+    for (int c = 0; c < kernel::kCorners; ++c) {
+      alignas(16) float four[4];
+      _mm_store_ps(four, load4(first + (c & 1 ? stride : 0) + (c & 2 ? row : 0) + (c & 4 ? slice : 0)));
+      for (int k = 0; k < 4; ++k)
+        if (members[k]) members[k][c * kLanes + i] = four[k];
+    }
+  }
+}
+
+/// The same for one channel of any type.
+SCOLOPAX_LANES void cellVoxelsOfChannel(const kernel::SceneView& scene, const Points& at, int n,
+                                        Float* corners) {
+  const kernel::ChannelView& channel = scene.channels[n];
+  if (!isFlat(at.dims) && at.slices * float(at.dims.x) * float(at.dims.y) * float(channel.stride) < 0x1p29f) {
+    switch (channel.type) {
+      case ScalarType::u8:
+        return cellVoxelsOfOne<std::uint8_t>(at, channel, corners);
+      case ScalarType::u16:
+        return cellVoxelsOfOne<std::uint16_t>(at, channel, corners);
+      case ScalarType::i16:
+        return cellVoxelsOfOne<std::int16_t>(at, channel, corners);
+      case ScalarType::f32:
+        return cellVoxelsOfOne<float>(at, channel, corners);
+    }
+  }
+  const float* place[] = {reinterpret_cast<const float*>(&at.place[0]),
+                          reinterpret_cast<const float*>(&at.place[1]),
+                          reinterpret_cast<const float*>(&at.place[2])};
+  for (int i = 0; i < kLanes; ++i) {
+    float own[kernel::kCorners];
+    kernel::cellVoxels(channel, scene.dims, {place[0][i], place[1][i], place[2][i]}, own);
+    for (int c = 0; c < kernel::kCorners; ++c) put(own[c], i, &corners[c]);
+  }
+}
+
+/// kernel::cellVoxels for one point per lane.
+SCOLOPAX_LANES void cellVoxels(const kernel::SceneView& scene, std::uint32_t channels, const Vec& point,
+                               Float (*corners)[kernel::kCorners]) {
+  const Points at = pointsAt(scene.dims, point);
+  for (int n = 0; n < scene.channelCount; ++n) {
+    if (!(channels >> n & 1)) continue;
+    const FourChannels four = fourWith(scene, n, channels);
+    channels &= ~four.found;
+    if (!four.several() || isFlat(scene.dims)) {
+      for (std::uint32_t left = four.found; left != 0; left &= left - 1)
+        cellVoxelsOfChannel(scene, at, std::countr_zero(left), corners[std::countr_zero(left)]);
+      continue;
+    }
+    float* members[4] = {};
+    for (int k = 0; k < 4; ++k)
+      if (four.channel[k] >= 0) members[k] = reinterpret_cast<float*>(corners[four.channel[k]]);
+    visitScalarType(scene.channels[n].type, [&](auto zero) {
+      cellVoxelsOfFour<decltype(zero)>(at, scene.channels[n], four.lane, members);
+    });
   }
 }
 

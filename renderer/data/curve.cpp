@@ -98,8 +98,8 @@ OpticalCurve makeOpticalCurve(const Curve<float>& opacity, const Curve<glm::vec3
   const auto colorView = color.view();
   for (const float p : positions) {
     if (p > 0 && (jumpsAt(opacity, p) || jumpsAt(color, p)))
-      curve.knots.push_back({p, 0, valueBefore(opacity, p), valueBefore(color, p)});
-    curve.knots.push_back({p, 0, kernel::evaluate(opacityView, p), kernel::evaluate(colorView, p)});
+      curve.knots.push_back({p, 0, p, valueBefore(opacity, p), valueBefore(color, p)});
+    curve.knots.push_back({p, 0, p, kernel::evaluate(opacityView, p), kernel::evaluate(colorView, p)});
   }
   for (std::size_t i = 0; i + 1 < curve.knots.size(); ++i) {
     const float width = curve.knots[i + 1].position - curve.knots[i].position;

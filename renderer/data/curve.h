@@ -21,7 +21,8 @@ struct Curve {
   }
 };
 
-/// Owner of the opacity and colour curves, both given at the knots of either.
+/// Owner of the opacity and colour curves, both given at the knots of either. The knots' places are their
+/// positions, until a TransferFunction sets others.
 struct OpticalCurve {
   std::vector<kernel::OpticalKnot> knots;
   std::vector<std::uint16_t> buckets;

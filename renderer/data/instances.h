@@ -13,7 +13,10 @@ struct Superposed;
 struct Cumulative;
 struct SyncDda;
 struct NDda;
+template <class Steps>
 struct RayMarch;
+struct EqualSteps;
+struct VoxelCells;
 struct BlendDensity;
 struct BlendMax;
 struct BlendMix;
@@ -42,7 +45,7 @@ auto visitIntegrator(const Scene& scene, F&& f) {
     case Method::hybrid:
       break;
   }
-  return f(std::type_identity<kernel::RayMarch>{});
+  return f(std::type_identity<kernel::RayMarch<kernel::EqualSteps>>{});
 }
 
 /// Returns f(std::type_identity<LightFeatures<...>>{}).

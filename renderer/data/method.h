@@ -19,15 +19,16 @@ namespace scolopax {
   X(composite, "composite",                                                                                \
     "every channel is drawn by itself and the pictures are added: depth order between channels is lost")
 
-#define SCOLOPAX_METHODS(X) /* Listings 3 (n-dda, mended) and 4 (sync-dda); section 5.1 (cumulative) */    \
-  X(automatic, "auto",                                                                                     \
-    "raymarch (hybrid for shadows) with the largest step that meets the requested error, else superposed") \
-  X(superposed, "superposed", "tracks all channels at once and samples one of them per step; unbiased")    \
-  X(cumulative, "cumulative", "tracks all channels at once and samples all of them per step; unbiased")    \
-  X(syncDda, "sync-dda", "tracks one channel after the other inside each macrocell; unbiased")             \
-  X(nDda, "n-dda", "tracks every channel separately, and the nearest hit wins; unbiased")                  \
-  X(raymarch, "raymarch", "equal steps along the ray: little noise, and a bias that falls with the step")  \
-  X(hybrid, "hybrid",                                                                                      \
+#define SCOLOPAX_METHODS(X) /* Listings 3 (n-dda, mended) and 4 (sync-dda); section 5.1 (cumulative) */      \
+  X(automatic, "auto",                                                                                       \
+    "raymarch (hybrid for shadows) at a coarse step, corrected by pictures at ever finer steps, so that no " \
+    "bias stays; superposed where that would take longer")                                                   \
+  X(superposed, "superposed", "tracks all channels at once and samples one of them per step; unbiased")      \
+  X(cumulative, "cumulative", "tracks all channels at once and samples all of them per step; unbiased")      \
+  X(syncDda, "sync-dda", "tracks one channel after the other inside each macrocell; unbiased")               \
+  X(nDda, "n-dda", "tracks every channel separately, and the nearest hit wins; unbiased")                    \
+  X(raymarch, "raymarch", "equal steps along the ray: little noise, and a bias that falls with the step")    \
+  X(hybrid, "hybrid",                                                                                        \
     "as raymarch, with light computed at eight points of a ray: faster and noisier where light is costly")
 
 #define SCOLOPAX_LIGHT_TYPES(X)                                                   \

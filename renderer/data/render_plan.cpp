@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
@@ -57,8 +58,8 @@ void checkScene(const Scene& scene, const Volume& volume) {
          std::to_string(scene.lights.size()));
   for (const Light& light : scene.lights) checkLight(light);
   checkClipping(scene.clip, scene.crop, volume.channels().size());
-  if (!(scene.step >= 0.01 && scene.step <= 100))
-    fail("integrator.step: expected 0.01 to 100, found " + shortText(scene.step));
+  if (scene.step != 0 && !(scene.step >= kLeastStep && scene.step <= 100))
+    fail("integrator.step: expected 0, or 0.01 to 100, found " + shortText(scene.step));
   if (scene.macrocell < 1 || scene.macrocell > 64)
     fail("integrator.macrocell: expected 1 to 64, found " + std::to_string(scene.macrocell));
 }
@@ -110,6 +111,10 @@ void placeLights(const Scene& scene, const Grid& grid, kernel::SceneView* view) 
   }
 }
 }  // namespace
+
+kernel::OpacityLimit opacityLimit(double transmittance) {
+  return {float(transmittance), float(-std::log(transmittance))};
+}
 
 float stratumOf(Method method) { return method == Method::hybrid ? 1.0f / 8.0f : 1.0f / 64.0f; }
 
@@ -243,12 +248,15 @@ void RenderPlan::fillView(const kernel::CameraRays& rays, const std::optional<ke
   view_.width = scene_.width;
   view_.height = scene_.height;
   view_.seed = scene_.seed;
-  view_.filterBox = scene_.filter == PixelFilter::box;
+  view_.filterWidth = scene_.filter == PixelFilter::box ? 1.0f : 0.0f;
   view_.dims = volume_->grid().dims;
   view_.clip = clip.value_or(kernel::ClipView{});
   view_.channelCount = clip ? int(channelViews_.size()) : 0;
   view_.channels = channelViews_.data();
-  view_.step = view_.smallestSpacing * float(scene_.step);
+  view_.voxelwise = scene_.step == 0;
+  view_.step =
+      view_.voxelwise ? std::numeric_limits<float>::infinity() : view_.smallestSpacing * float(scene_.step);
+  view_.opaque = opacityLimit(kOpaqueTransmittance);
   view_.stratum = stratumOf(scene_.method);
   view_.majorants = majorants_->view();
 }

@@ -14,6 +14,9 @@
 
 namespace scolopax {
 
+/// Transmittance below which matter behind is invisible, even in float pictures of high contrast.
+inline constexpr double kOpaqueTransmittance = 1e-4;
+kernel::OpacityLimit opacityLimit(double transmittance);
 /// Share of a ray's light for which a method with a step computes lighting once.
 float stratumOf(Method method);
 /// Throws Error(badInput) if a side is not in 1..kMaxImageSide.

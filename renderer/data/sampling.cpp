@@ -57,7 +57,7 @@ kernel::SampleNumber sampleNumber(Sampling sampling, std::uint32_t sample) {
   for (std::uint32_t block = 0; block < kernel::kLowDiscrepancyBlocks; ++block)
     for (int i = 0; i < 3; ++i)
       number.point[block][i] =
-          kernel::reverseBits(sobol(kDimensions[block][i], sample % kernel::kReplicateSamples));
+          kernel::reverseBits(sobol(kDimensions[block][i], sample / kernel::kScramblings));
   return number;
 }
 

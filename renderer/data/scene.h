@@ -63,10 +63,8 @@ struct Scene {
   std::vector<Light> lights;  ///< at most kernel::kMaxLights; none means one headlight
   Method method = Method::superposed;
   int macrocell = 4;  ///< voxels per macrocell edge, 1 to 64
-  double step = 0.5;  ///< of raymarch and hybrid, in smallest spacings; 0.01 to 100
-  /// Target RMSE: `automatic` keeps the bias below half of it; other methods do not use it. The default is
-  /// about one step of an 8-bit picture.
-  double targetError = 4e-3;
+  /// Of raymarch and hybrid, in smallest spacings, 0.01 to 100; 0: from one face of voxel cells to the next
+  double step = 0.5;
   Sampling sampling = Sampling::lowDiscrepancy;
   std::uint32_t seed = 0;
   int width = 512, height = 512;
@@ -76,5 +74,6 @@ struct Scene {
 };
 
 inline constexpr int kMaxImageSide = 16384;
+inline constexpr double kLeastStep = 0.01;  ///< other than 0
 
 }  // namespace scolopax

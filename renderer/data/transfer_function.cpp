@@ -3,12 +3,44 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "renderer/core/error.h"
-#include "renderer/kernel/classify.h"
+#include "renderer/kernel/segment_cubics.h"
 
 namespace scolopax {
+
+namespace {
+
+/// The least float at which `reaches` is true, near `guess`.
+template <class Reaches>
+float leastThat(float guess, const Reaches& reaches) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  constexpr int kNear = 100;  // the guess is rounded, and so is what it is compared with
+  for (int i = 0; i < kNear && reaches(std::nextafter(guess, -kInfinity)); ++i)
+    guess = std::nextafter(guess, -kInfinity);
+  for (int i = 0; i < kNear && !reaches(guess); ++i) guess = std::nextafter(guess, kInfinity);
+  return guess;
+}
+
+/// Sets the places of the knots, so that kernels find the same values before and behind a knot whether they
+/// compare places or positions. `channel` has the placement and the gamma.
+void setPlaces(OpticalCurve& curve, const kernel::ChannelView& channel) {
+  kernel::ChannelView linear = channel;
+  linear.gamma = 1;
+  for (kernel::OpticalKnot& knot : curve.knots) {
+    const double position = std::pow(double(knot.position), 1.0 / double(channel.gamma));
+    const double place = (position - double(channel.offset)) / std::abs(double(channel.scale));
+    // With a gamma, all places before the range have the position 0.
+    const kernel::ChannelView& compared = knot.position > 0 ? channel : linear;
+    knot.place = leastThat(float(place), [&](float at) {
+      return kernel::positionAt<kernel::One>(compared, at) >= knot.position;
+    });
+  }
+}
+
+}  // namespace
 
 TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearance& a)
     : gamma_(float(a.gamma)),
@@ -30,20 +62,26 @@ TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearan
   const double lo = (a.rangeLo - channel.intercept) / channel.slope;
   const double hi = (a.rangeHi - channel.intercept) / channel.slope;
   placement_ = Placement(lo, hi, (channel.slope > 0) == (a.rangeLo <= a.rangeHi));
+  setPlaces(optical_, placed());
   inverseRange_ = float(1.0 / std::abs(hi - lo));
 }
 
-kernel::ChannelView TransferFunction::view(const Channel& channel) const {
+kernel::ChannelView TransferFunction::placed() const {
   kernel::ChannelView view{};
-  view.voxels = channel.voxels.base();
-  view.lane = int(channel.voxels.lane());
-  view.stride = int(channel.voxels.stride());
-  view.type = channel.voxels.type();
   view.origin = placement_.origin;
   view.scale = placement_.scale;
   view.offset = placement_.offset;
   view.gamma = gamma_;
   view.density = density_;
+  return view;
+}
+
+kernel::ChannelView TransferFunction::view(const Channel& channel) const {
+  kernel::ChannelView view = placed();
+  view.voxels = channel.voxels.base();
+  view.lane = int(channel.voxels.lane());
+  view.stride = int(channel.voxels.stride());
+  view.type = channel.voxels.type();
   view.weight = weight_;
   view.material = material_;
   view.inverseRange = inverseRange_;
@@ -56,12 +94,7 @@ kernel::ChannelView TransferFunction::view(const Channel& channel) const {
 
 float TransferFunction::majorant(ValueInterval interval) const {
   if (!(interval.lo <= interval.hi)) return 0.0f;
-  kernel::ChannelView channel{};
-  channel.origin = placement_.origin;
-  channel.scale = placement_.scale;
-  channel.offset = placement_.offset;
-  channel.gamma = gamma_;
-  channel.density = density_;
+  kernel::ChannelView channel = placed();
   channel.opacity = opacity_.view();
   return kernel::largestExtinction(channel, interval.lo, interval.hi);
 }

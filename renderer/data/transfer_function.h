@@ -20,6 +20,9 @@ class TransferFunction {
   bool invisible() const;
 
  private:
+  /// A view of placement, gamma and density alone.
+  kernel::ChannelView placed() const;
+
   Curve<float> opacity_;
   Curve<glm::vec3> color_;
   OpticalCurve optical_;

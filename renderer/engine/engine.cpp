@@ -7,14 +7,15 @@
 #include <new>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <utility>
 
 #include "renderer/core/error.h"
 #include "renderer/data/film.h"
 #include "renderer/data/render_plan.h"
 #include "renderer/data/sampling.h"
+#include "renderer/engine/corrections.h"
 #include "renderer/engine/picking.h"
+#include "renderer/engine/pilot.h"
 #include "renderer/engine/step_bias.h"
 #include "renderer/launcher.h"
 #include "renderer/renderer.h"
@@ -49,15 +50,14 @@ class Engine final : public Renderer {
       memory_.resize(bytesBefore);
       throw;
     }
-    if (newSize) {
+    if (newSize)
       film_ = std::move(resized);
-      memory_.resize(bytes);
-    } else if (stats.filmReset)
+    else if (stats.filmReset)
       film_.reset(scene.width, scene.height);
     if (stats.filmReset) {
+      memory_.resize(bytes);
       resetRecords();
       bias_.reset();
-      if (scene.method == Method::automatic) bias_ = automaticBias_;
     }
     return stats;
   }
@@ -70,25 +70,34 @@ class Engine final : public Renderer {
   }
   Choice choice() const override {
     const Scene& scene = plan_->scene();
-    return {scene.method, hasStep(scene.method) ? scene.step : 0};
+    Choice choice{scene.method, hasStep(scene.method) ? scene.step : 0, {}};
+    for (std::size_t l = 0; l < film_.levels() && film_.isIncluded(l); ++l)
+      choice.corrections.push_back({sceneStep(corrections_.levels()[l].estimate.fine), film_.corrections(l)});
+    return choice;
   }
 
   bool renderPixels(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
-    const Pass pass{plan_->view(),
-                    sampleNumber(plan_->scene().sampling, film_.samples()),
-                    film_.pass(),
-                    counting_ ? cost_.data() : nullptr,
-                    recording_ ? first_.pass() : nullptr,
-                    done_.data(),
-                    &cancel,
-                    std::chrono::steady_clock::now() + budget};
+    Pass pass{plan_->view(),
+              sampleNumber(plan_->scene().sampling, film_.samples()),
+              film_.pass(),
+              counting_ ? cost_.data() : nullptr,
+              recording_ ? first_.pass() : nullptr,
+              done_.data(),
+              &cancel,
+              std::chrono::steady_clock::now() + budget};
+    if (automaticChosen_ && hasStep(automatic_.method)) setResolution(pass.scene, automatic_.resolution);
     bool complete = false;
-    launcher_->run([&] { complete = launcher_->launch(plan_->scene(), pass); });
+    launcher_->run([&] {
+      complete = launcher_->launch(plan_->scene(), pass) &&
+                 corrections_.render(
+                     *launcher_, *plan_, film_, [&] { return addLevel(); }, cancel, pass.deadline);
+    });
     return complete;
   }
   void addPixels() override {
     launcher_->run([&] {
       film_.add();
+      corrections_.add(film_);
       noise_.reset();
       if (recording_) first_.add(plan_->visibleChannels());
       if (counting_) addCosts();
@@ -98,13 +107,15 @@ class Engine final : public Renderer {
 
   std::uint32_t samples() const override { return film_.samples(); }
   double estimatedError(std::stop_token stop) const override {
-    if (!noise_) launcher_->run([&] { noise_ = film_.estimatedError(); });
+    if (!noise_) launcher_->run([&] { noise_ = film_.noise(); });
     if (errorTakesLong()) launcher_->run([&] { bias_ = estimateBias(*launcher_, *plan_, stop); });
-    return std::hypot(*noise_, bias_.value_or(0));
+    return std::hypot(
+        *noise_, corrections_.levels().empty() ? bias_.value_or(0) : biasLeft(corrections_.levels(), film_));
   }
   bool errorTakesLong() const override {
     // A film of few samples may be one of many that edits cause, and is not worth the thumbnails.
-    return plan_ && hasStep(plan_->scene().method) && !bias_ && film_.samples() >= kSamplesWorthBias;
+    return plan_ && hasStep(plan_->scene().method) && !bias_ && corrections_.levels().empty() &&
+           film_.samples() >= kSamplesWorthBias;
   }
   Image image() const override {
     Image image;
@@ -156,10 +167,8 @@ class Engine final : public Renderer {
   /// valid.
   RebuildStats take(const Scene& scene, const std::stop_token& stop) {
     Scene chosen = scene;
-    chosen.targetError = 0;  // does not affect the picture
     const bool automatic = scene.method == Method::automatic;
-    Choice choice = automatic_;
-    double bias = automaticBias_;
+    AutomaticChoice choice = automatic_;
     std::shared_ptr<const RenderPlan> plan = plan_;
     RebuildStats stats;
     const auto makeNext = [&] {
@@ -173,32 +182,20 @@ class Engine final : public Renderer {
     if (automatic) {
       // Tries the previous choice first: if nothing else has changed, the film is kept.
       chosen.method = choice.method;
-      chosen.step = choice.step;
-      if (!plan_ || !plan_->makesSamePicture(chosen) || scene.targetError != target_) {
+      chosen.step = sceneStep(choice.resolution);
+      if (!plan_ || !automaticChosen_ || !plan_->makesSamePicture(chosen)) {
         makeNext();
-        std::tie(choice, bias) = choose(scene, *plan, stop);
+        choice = chooseAutomatically(*launcher_, *plan, stop);
       }
       chosen.method = choice.method;
-      chosen.step = choice.step;
+      chosen.step = sceneStep(choice.resolution);
     }
     makeNext();
-    stats.filmReset = !plan_ || !plan_->makesSamePicture(chosen);
+    stats.filmReset = !plan_ || automatic != automaticChosen_ || !plan_->makesSamePicture(chosen);
     plan_ = std::move(plan);
-    automatic_ = choice;
-    automaticBias_ = bias;
-    target_ = automatic ? scene.targetError : 0;  // the choice is not valid for other scenes
+    automatic_ = std::move(choice);
+    automaticChosen_ = automatic;
     return stats;
-  }
-
-  /// Chooses method and step for a scene with Method::automatic. Returns them with the estimated bias.
-  /// `trial` is a plan of the scene.
-  std::pair<Choice, double> choose(const Scene& scene, const RenderPlan& trial, const std::stop_token& stop) {
-    // Shadow rays, if there are any, cost the most.
-    const Method quadrature = scene.shadows ? Method::hybrid : Method::raymarch;
-    // Half of the error is left for noise.
-    const auto found = largestStep(*launcher_, trial, quadrature, scene.targetError / 2, stop);
-    if (!found) return {{Method::superposed, Scene().step}, 0};
-    return {{quadrature, found->step}, found->bias};
   }
 
   /// Bytes of a film of this size, with all records of its pixels.
@@ -209,10 +206,26 @@ class Engine final : public Renderer {
     return pixels * (Film::kPixelBytes + sizeof(std::uint8_t) + counted + recorded);
   }
 
+  /// Adds a level of corrections to the film, if there is memory for it.
+  bool addLevel() {
+    const std::uint64_t before = memory_.bytes();
+    const std::size_t bytes =
+        film_.levels() == 0 ? Film::kFirstLevelBytes + sizeof(std::uint8_t) : Film::kLevelBytes;
+    try {
+      memory_.resize(before + film_.pixelCount() * bytes);
+      film_.addLevel();
+      return true;
+    } catch (const Error&) {
+      memory_.resize(before);
+      return false;
+    }
+  }
+
   void resetRecords() {
     const std::size_t pixels = film_.pixelCount();
     stats_ = {};
     noise_.reset();
+    corrections_.reset(automaticChosen_ ? automatic_.levels : std::vector<Level>());
     try {
       done_.assign(pixels, 0);
       if (counting_) cost_.assign(pixels, {});
@@ -252,9 +265,9 @@ class Engine final : public Renderer {
   std::vector<std::uint64_t> fetches_;  // one per pixel while recording
   FirstCollisions first_;
   static constexpr std::uint32_t kSamplesWorthBias = 16;
-  Choice automatic_{Method::raymarch, 1};
-  double automaticBias_ = 0;
-  double target_ = 0;                    // target error of the choice
+  AutomaticChoice automatic_;
+  bool automaticChosen_ = false;  // automatic_ is that of the current scene
+  Corrections corrections_;
   mutable std::optional<double> noise_;  // of the current film, once its error was requested
   mutable std::optional<double> bias_;   // of the current film, once it is known
 };

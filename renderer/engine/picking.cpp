@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "renderer/data/sampling.h"
+#include "renderer/engine/resolution.h"
 
 namespace scolopax {
 namespace {
@@ -35,8 +36,8 @@ class SampledPicking final : public Picking {
     view_.rays.pixelSize *= unit_;
     view_.width = view_.height = side_;
     view_.seed = scene.seed;
-    view_.filterBox = false;
-    view_.step = view_.smallestSpacing * float(scene.step);
+    view_.filterWidth = 0;
+    setResolution(view_, resolutionOf(scene));
     view_.lightCount = 0;
     const auto samples = std::size_t(side_ * side_);
     met_.resize(samples);

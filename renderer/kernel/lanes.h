@@ -53,6 +53,7 @@ SCOLOPAX_HD inline float where(bool m, float a) { return m ? a : 0.0f; }
 SCOLOPAX_HD inline std::int32_t where(bool m, std::int32_t a) { return m ? a : 0; }
 SCOLOPAX_HD inline std::uint32_t where(bool m, std::uint32_t a) { return m ? a : 0u; }
 SCOLOPAX_HD inline std::int32_t onesOf(bool m) { return m ? 1 : 0; }
+SCOLOPAX_HD inline std::uint32_t unionOf(std::uint32_t a) { return a; }
 template <class Number>
 SCOLOPAX_HD inline Number firstIn(bool, Number a) {
   return a;

@@ -22,7 +22,7 @@ SCOLOPAX_LANES Float stretchPosition(const ChannelView& channel, Float stored) {
 /// One knot per lane.
 template <class L>
 struct Knots {
-  typename L::Float position, inverseWidth, opacity;
+  typename L::Float position, inverseWidth, place, opacity;
   typename L::Vec color;
 };
 
@@ -31,12 +31,13 @@ template <class L>
 SCOLOPAX_LANES Knots<L> knotsAt(const OpticalCurveView& curve, typename L::Int index) {
   if constexpr (L::kLanes == 1) {
     const OpticalKnot& knot = curve.knots[index];
-    return {knot.position, knot.inverseWidth, knot.opacity, knot.color};
+    return {knot.position, knot.inverseWidth, knot.place, knot.opacity, knot.color};
   } else {
     const auto at = index * kKnotFloats;
     const OpticalKnot& knot = curve.knots[0];
     return {gather(&knot.position, at),
             gather(&knot.inverseWidth, at),
+            gather(&knot.place, at),
             gather(&knot.opacity, at),
             {gather(&knot.color.x, at), gather(&knot.color.y, at), gather(&knot.color.z, at)}};
   }
@@ -46,7 +47,8 @@ template <class L>
 SCOLOPAX_LANES Knots<L> knotAt(const OpticalCurveView& curve, int index) {
   using Float = typename L::Float;
   const OpticalKnot& knot = curve.knots[index];
-  return {Float(knot.position), Float(knot.inverseWidth), Float(knot.opacity), typename L::Vec(knot.color)};
+  return {Float(knot.position), Float(knot.inverseWidth), Float(knot.place), Float(knot.opacity),
+          typename L::Vec(knot.color)};
 }
 template <class L>
 SCOLOPAX_LANES typename L::Float knotPositions(const OpticalCurveView& curve, typename L::Int index) {

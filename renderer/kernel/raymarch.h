@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ray marching by quadrature, one ray per lane. Segments are of equal length, from a jittered start. On each,
-// the scalars are taken to be linear and their curves are integrated exactly (the paper's baseline of 5.2-5.3
-// takes one point instead). Lighting is computed once per stratum of absorbed light. Biased; the error is of
-// second order in the step.
+// Ray marching by quadrature, one ray per lane. Segments are of equal length, from a jittered start, and
+// their scalars taken to be linear; or they end at the faces of voxel cells, between which scalars are
+// cubics. Curves are integrated over each (the paper's baseline of 5.2-5.3 takes one point instead). Lighting
+// is computed once per stratum of absorbed light. Biased; the error is of second order in the segments'
+// length.
 #pragma once
 #include "renderer/kernel/collision.h"
 #include "renderer/kernel/strata.h"
 
 namespace scolopax::kernel {
-
-/// Transmittance below which matter behind is invisible, even in float pictures of high contrast.
-inline constexpr float kOpaqueTransmittance = 1e-4f;
 
 /// Linear premultiplied RGBA.
 template <class L>
@@ -36,8 +34,8 @@ SCOLOPAX_LANES void keepNearer(FirstCollisionOf<L>* first, typename L::Mask whic
 }
 
 /// Records collisions that are nearer than the rays' nearest so far.
-template <class L, class Blend, class View>
-SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const SegmentEnds<L, View>& ends,
+template <class L, class Blend, class View, class Scalars>
+SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const Scalars& scalars,
                                Hidden<L, Blend::kSums>& hidden, const SegmentCollision<L>& collision,
                                FirstCollisionOf<L>* first) {
   using Float = typename L::Float;
@@ -46,7 +44,7 @@ SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const Segm
   Float left = collision.pick * collision.extinction, most(-1.0f);
   Int channel(0);
   Mask open = L::everywhere();
-  visitParts<Detail::emission>(scene, blend, collision.segment, ends, hidden,
+  visitParts<Detail::emission>(scene, blend, collision.segment, scalars, hidden,
                                [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
                                  const Mask seen = part.opacity > 0.0f;
                                  const Mask better = seen & (blend.mixes ? part.opacity > most : open);
@@ -61,7 +59,7 @@ SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const Segm
 
 /// Marches rays through `channels` (bit n: visible channel n). `set` keeps the random numbers of several such
 /// marches apart.
-template <class Features, class L, class Blend, class View>
+template <class Features, class Steps, class L, class Blend, class View>
 SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                     const IntervalOf<L>& inside, std::uint32_t channels, int set,
                                     SamplerOf<L>& sampler, const SamplerOf<L>& ofStrata, CostOf<L>* cost,
@@ -77,21 +75,22 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
   // A tracker's ray would end where the opacity passes this number.
   const Float end = uniformOf(random.y);
   Mask open = meets;
-  using OfStrata = Strata<Features, L, Blend, View>;
+  using OfStrata = Strata<Features, Steps, L, Blend, View>;
   [[maybe_unused]] typename OfStrata::Memory memory;
   [[maybe_unused]] OfStrata strata(memory, scene, blend, ray, channels, set, ofStrata, cost);
-  SegmentEnds<L, View> ends;
+  typename Steps::template Scalars<L, View> scalars;
   Hidden<L, Blend::kSums> hidden;
   Segment<L> segment;
   Spans<L> spans(scene, ray, inside, channels);
   for (bool last = false; !last;) {
-    const auto span = spans.next(transmittance > kOpaqueTransmittance);
-    Segments<L, View> along(ends, scene, ray, span, channels, uniformOf(random.x), scene.step, cost);
+    const auto span = spans.next(transmittance > scene.opaque.transmittance);
+    typename Steps::template Cuts<L, View> along(scalars, scene, ray, span, channels, uniformOf(random.x),
+                                                 scene.step, cost);
     for (bool more = true; more;) {
       more = along.next(segment);
       const Float length = segment.length(), before = opacity;
       Vec emission(0.0f);
-      const Float extinction = visitParts<kDetail>(scene, blend, segment, ends, hidden,
+      const Float extinction = visitParts<kDetail>(scene, blend, segment, scalars, hidden,
                                                    [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
                                                      if constexpr (Features::kAny) memory.parts[n] = part;
                                                      emission = emission + part.emission;
@@ -101,7 +100,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
         const Float alpha = absorbed(where(some, extinction * length)), absorbedHere = transmittance * alpha;
         opacity = opacity + absorbedHere;
         transmittance = transmittance * (1.0f - alpha);
-        more = more && along.keep(transmittance > kOpaqueTransmittance);
+        more = more && along.keep(transmittance > scene.opaque.transmittance);
         emission = emission * where(some, absorbedHere / extinction);
         if constexpr (!Features::kAny) color = color + emission;
         if (first) [[unlikely]]
@@ -109,12 +108,12 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
             open = without(open, met);
             // A copy, so that the segment itself need not be in memory.
             SegmentCollision<L> collision{segment, extinction, (end - before) / absorbedHere, met};
-            meet<L>(scene, blend, ends, hidden, collision, first);
+            meet<L>(scene, blend, scalars, hidden, collision, first);
           }
       } else if (more) {
         continue;
       }
-      last = !more && spans.done(transmittance > kOpaqueTransmittance);
+      last = !more && spans.done(transmittance > scene.opaque.transmittance);
       if constexpr (Features::kAny)
         strata.absorb(before, opacity, last, segment, extinction, emission, color);
     }
@@ -122,6 +121,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
   return {color, minimum(opacity, 1.0f)};
 }
 
+template <class Steps>
 struct RayMarch {
   template <class Blend, class Features, class View>
   SCOLOPAX_HD static glm::vec4 sample(const View& scene, const Ray& ray, Interval inside, Sampler& sampler,
@@ -141,8 +141,8 @@ struct RayMarch {
     for (int n = 0; n < (blend.separate ? scene.channelCount : 1); ++n) {
       const std::uint32_t channels =
           blend.separate ? 1u << n : ~0u >> (kMaxVisibleChannels - scene.channelCount);
-      const Radiance<L> alone = marchRay<Features>(scene, blend, ray, inside, channels,
-                                                   blend.separate ? n : 0, sampler, ofStrata, cost, first);
+      const Radiance<L> alone = marchRay<Features, Steps>(
+          scene, blend, ray, inside, channels, blend.separate ? n : 0, sampler, ofStrata, cost, first);
       sum.color = sum.color + alone.color;
       sum.opacity = sum.opacity + (1.0f - sum.opacity) * alone.opacity;
     }

@@ -20,11 +20,8 @@ template <class L>
 SCOLOPAX_LANES PixelRay<L> rayThrough(const SceneView& scene, typename L::Int column, typename L::Int row,
                                       SamplerOf<L>& sampler, typename L::Mask which) {
   const auto jitter = sampler.next(which);
-  typename L::Float x = toFloat(column) + 0.5f, y = toFloat(row) + 0.5f;
-  if (scene.filterBox) {
-    x = toFloat(column) + uniformOf(jitter.x);
-    y = toFloat(row) + uniformOf(jitter.y);
-  }
+  const auto x = toFloat(column) + 0.5f + scene.filterWidth * (uniformOf(jitter.x) - 0.5f);
+  const auto y = toFloat(row) + 0.5f + scene.filterWidth * (uniformOf(jitter.y) - 0.5f);
   const RayOf<L> ray = scene.rays.through<L>(x, y);
   return {x, y, ray, clipToScene(scene, ray)};
 }

@@ -48,15 +48,15 @@ SCOLOPAX_LANES Word hashOf(Word x) {
 
 /// Number of leading blocks of a sample whose words x, y, z come from a Sobol sequence.
 inline constexpr std::uint32_t kLowDiscrepancyBlocks = 3;
-/// Number of consecutive samples of a pixel that share a scrambling: a replicate. Different replicates are
-/// independent, so the error of a picture can be estimated from them.
-inline constexpr std::uint32_t kReplicateSamples = 64;
+/// Samples of a pixel alternate between this many scramblings. The halves of a pixel's samples are thus
+/// independent of each other, so that their difference tells the error of the picture.
+inline constexpr std::uint32_t kScramblings = 2;
 
 /// The part of a sample's random numbers that all pixels share (made by data/sampling.h).
 struct SampleNumber {
   std::uint32_t sample;
   bool lowDiscrepancy;  ///< false: all draws are independent
-  /// Point sample % kReplicateSamples of the Sobol sequence, with the bits of each coordinate reversed.
+  /// Point sample / kScramblings of the Sobol sequence, with the bits of each coordinate reversed.
   std::uint32_t point[kLowDiscrepancyBlocks][3];
 };
 
@@ -105,8 +105,8 @@ class SamplerOf {
     const Block random = pcg4d(pixel_, Word(number_.sample), block, Word(seed_));
     if (!any(low & which)) return random;
     // Samples stay below 2^31, so no other draw has this counter.
-    const Word replicate(0x80000000u | (number_.sample / kReplicateSamples));
-    const Block scrambling = pcg4d(pixel_, replicate, block, Word(seed_));
+    const Word half(0x80000000u | (number_.sample % kScramblings));
+    const Block scrambling = pcg4d(pixel_, half, block, Word(seed_));
     const Word row = minimum(block, Word(kLowDiscrepancyBlocks - 1)) * 3u;
     return {select(low, owenScramble(gather(&number_.point[0][0], row), scrambling.x), random.x),
             select(low, owenScramble(gather(&number_.point[0][1], row), scrambling.y), random.y),

@@ -53,4 +53,60 @@ SCOLOPAX_HD inline float sampleStored(const ChannelView& channel, glm::ivec3 dim
   });
 }
 
+/// The eight voxels of a cell, x fastest.
+inline constexpr int kCorners = 8;
+
+/// Voxels of the cell that contains a point in voxel coordinates. Beyond the outermost centres, those of the
+/// nearest cell; along an axis with a single voxel, both are that one.
+SCOLOPAX_HD inline void cellVoxels(const ChannelView& channel, glm::ivec3 dims, glm::vec3 point,
+                                   float* corners) {
+  std::size_t low = 0, step[3];
+  auto stride = std::size_t(channel.stride);
+  for (int axis = 0; axis < 3; ++axis) {
+    const int size = dims[axis];
+    low += std::size_t(int(clamp(point[axis], 0.0f, float(size > 1 ? size - 2 : 0)))) * stride;
+    step[axis] = size > 1 ? stride : 0;
+    stride *= std::size_t(size);
+  }
+  visitScalarType(channel.type, [&](auto zero) {
+    const auto* voxels = static_cast<const decltype(zero)*>(channel.voxels) + channel.lane + low;
+    for (int c = 0; c < kCorners; ++c)
+      corners[c] = float(voxels[(c & 1 ? step[0] : 0) + (c & 2 ? step[1] : 0) + (c & 4 ? step[2] : 0)]);
+  });
+}
+/// The same for all of `channels` (bit n: visible channel n); those of channel n go to corners[n].
+SCOLOPAX_HD inline void cellVoxels(const SceneView& scene, std::uint32_t channels, glm::vec3 point,
+                                   float (*corners)[kCorners]) {
+  for (int n = 0; n < scene.channelCount; ++n)
+    if (channels >> n & 1) cellVoxels(scene.channels[n], scene.dims, point, corners[n]);
+}
+
+/// Place of points in the cell of eight voxels that contains `point`: 0 at its lower voxel, 1 at its upper.
+template <class L>
+struct CellPlaces {
+  typename L::Vec low;
+  glm::ivec3 dims;
+
+  SCOLOPAX_LANES CellPlaces(glm::ivec3 size, const typename L::Vec& point) : low(0.0f), dims(size) {
+    for (int axis = 0; axis < 3; ++axis)
+      low[axis] = toFloat(truncated(clamp(point[axis], 0.0f, float(size[axis] > 1 ? size[axis] - 2 : 0))));
+  }
+  SCOLOPAX_LANES typename L::Vec of(const typename L::Vec& point) const {
+    typename L::Vec place(0.0f);
+    for (int axis = 0; axis < 3; ++axis)
+      place[axis] = clamp(point[axis], 0.0f, float(dims[axis] - 1)) - low[axis];
+    return place;
+  }
+};
+
+/// Interpolates between a cell's voxels at a place in it.
+template <class L>
+SCOLOPAX_LANES typename L::Float interpolate(const typename L::Float* corners, const typename L::Vec& place) {
+  using Float = typename L::Float;
+  const auto mix = [](Float a, Float b, Float t) SCOLOPAX_LANES_LAMBDA { return a + t * (b - a); };
+  const Float c00 = mix(corners[0], corners[1], place[0]), c10 = mix(corners[2], corners[3], place[0]);
+  const Float c01 = mix(corners[4], corners[5], place[0]), c11 = mix(corners[6], corners[7], place[0]);
+  return mix(mix(c00, c10, place[1]), mix(c01, c11, place[1]), place[2]);
+}
+
 }  // namespace scolopax::kernel

@@ -4,8 +4,25 @@
 // and strata.h.
 #pragma once
 #include "renderer/kernel/point_segments.h"
+#include "renderer/kernel/voxel_segments.h"
 
 namespace scolopax::kernel {
+
+/// How quadrature cuts rays into segments, and what it knows of the scalars on a segment: at equal steps,
+/// with scalars that are taken to be linear in between.
+struct EqualSteps {
+  template <class L, class View>
+  using Cuts = Segments<L, View>;
+  template <class L, class View>
+  using Scalars = SegmentEnds<L, View>;
+};
+/// At the faces of voxel cells, between which scalars are cubics.
+struct VoxelCells {
+  template <class L, class View>
+  using Cuts = VoxelSegments<L, View>;
+  template <class L, class View>
+  using Scalars = SegmentCubics<L, View>;
+};
 
 /// A blend mode as quadrature uses it. Only kSums is chosen at compile time.
 template <bool kSumsExtinction>
@@ -93,6 +110,15 @@ SCOLOPAX_LANES_RARE void dropWhereFactorChanges(const ChannelView& channel, cons
                opticalAt<Detail::extinction, L>(curve, h, L::everywhere()).opacity);
 }
 
+/// Rays for which the extinction of channel n is linear on the segment.
+template <class L, class View>
+SCOLOPAX_LANES typename L::Mask isStraight(const View& scene, const SegmentEnds<L, View>& ends, int n) {
+  typename L::Mask straight = ends.from[n].piece == ends.to[n].piece;
+  if (scene.hasFactor(n)) [[unlikely]]
+    dropWhereFactorChanges<L>(scene.channels[n], ends, n, &straight);
+  return straight;
+}
+
 /// Multiplies an opacity of channel n by its gradient factor at a place in [0,1] of a segment.
 template <class L, class View>
 SCOLOPAX_LANES_RARE void multiplyByFactor(const ChannelView& channel, const SegmentEnds<L, View>& ends, int n,
@@ -140,9 +166,9 @@ SCOLOPAX_LANES void add(typename L::Float opacity, const typename L::Vec& color,
 
 /// Compares the channels of a segment, for rays in `which`. Returns the mean of the largest extinction, and
 /// sets `hidden` to the visible part of each channel.
-template <Detail kDetail, class L, class View>
+template <Detail kDetail, class L, class View, class Scalars>
 SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Segment<L>& segment,
-                                         const SegmentEnds<L, View>& ends, typename L::Mask which,
+                                         const Scalars& scalars, typename L::Mask which,
                                          Hidden<L, false>& hidden) {
   using Float = typename L::Float;
   using Int = typename L::Int;
@@ -150,10 +176,7 @@ SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Se
   Mask bent = without(which, which);
   for (int n = 0; n < scene.channelCount; ++n) {
     if (!(segment.channels >> n & 1)) continue;
-    Mask straight = ends.from[n].piece == ends.to[n].piece;
-    if (scene.hasFactor(n)) [[unlikely]]
-      dropWhereFactorChanges<L>(scene.channels[n], ends, n, &straight);
-    bent = bent | without(segment.of(n), straight);
+    bent = bent | without(segment.of(n), isStraight<L>(scene, scalars, n));
     if constexpr (kDetail >= Detail::emission) hidden.of[n] = noPart<L>();
   }
   bent = bent & which;
@@ -170,7 +193,7 @@ SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Se
       if (!(segment.channels >> n & 1)) continue;
       const Mask here = on & segment.of(n);
       if (!any(here)) continue;
-      const Optical<L> optical = opticalOn<kDetail, L>(scene, ends, n, place, here);
+      const Optical<L> optical = opticalOn<kDetail, L>(scene, scalars, n, place, here);
       const Mask larger = here & (optical.opacity > largest);
       largest = select(larger, optical.opacity, largest);
       if constexpr (kDetail >= Detail::emission) {
@@ -193,16 +216,16 @@ SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Se
 }
 /// Calls visit(n, part of channel n) for all channels of the segment, and returns the mean of the visible
 /// extinction. Rays with a single channel need no comparisons.
-template <Detail kDetail, class L, class Blend, class Visit, class View>
+template <Detail kDetail, class L, class Blend, class Visit, class View, class Scalars>
 SCOLOPAX_LANES typename L::Float visitParts(const View& scene, const Blend& blend, const Segment<L>& segment,
-                                            const SegmentEnds<L, View>& ends,
+                                            const Scalars& scalars,
                                             [[maybe_unused]] Hidden<L, Blend::kSums>& hidden, Visit&& visit) {
   using Float = typename L::Float;
   Float extinction(0.0f);
   if constexpr (Blend::kSums) {
     for (int n = 0; n < scene.channelCount; ++n) {
       if (!(segment.channels >> n & 1)) continue;
-      const PartOf<L> part = partAlone<kDetail, L>(scene, ends, n, segment.of(n));
+      const PartOf<L> part = partAlone<kDetail, L>(scene, scalars, n, segment.of(n));
       extinction = extinction + part.opacity;
       visit(n, part);
     }
@@ -211,13 +234,13 @@ SCOLOPAX_LANES typename L::Float visitParts(const View& scene, const Blend& blen
     const typename L::Mask several = segment.several();
     const bool some = any(several);
     Float largest(0.0f);
-    if (some) largest = compare<kDetail, L>(scene, blend.mixes, segment, ends, several, hidden);
+    if (some) largest = compare<kDetail, L>(scene, blend.mixes, segment, scalars, several, hidden);
     for (int n = 0; n < scene.channelCount; ++n) {
       if (!(segment.channels >> n & 1)) continue;
       PartOf<L> part = noPart<L>();
       const typename L::Mask alone = without(segment.of(n), several);
       if (any(alone)) {
-        part = partAlone<kDetail, L>(scene, ends, n, alone);
+        part = partAlone<kDetail, L>(scene, scalars, n, alone);
         extinction = extinction + part.opacity;
         if (blend.mixes) part = scaled(part, Float(scene.channels[n].weight));
       }

@@ -9,44 +9,44 @@
 
 namespace scolopax::kernel {
 
-/// Optical depth at which a shadow ray counts as blocked: a transmittance of 1e-4.
-inline constexpr float kOpaqueDepth = 9.21034f;
 /// Step of shadow rays, as a multiple of the scene's step. A shadow ray estimates only one factor of the
 /// light, which varies less.
 inline constexpr float kShadowSteps = 2.0f;
 
 /// Transmittance of shadow rays through the channels in `channels` (bit n: visible channel n).
-template <class L, class Blend, class View>
+template <class L, class Steps, class Blend, class View>
 SCOLOPAX_LANES typename L::Float marchTransmittance(const View& scene, const Blend& blend,
                                                     const RayOf<L>& ray, const IntervalOf<L>& inside,
                                                     std::uint32_t channels, typename L::Float offset,
                                                     CostOf<L>* cost) {
-  SegmentEnds<L, View> ends;
+  typename Steps::template Scalars<L, View> scalars;
   Hidden<L, Blend::kSums> hidden;
   Segment<L> segment;
   typename L::Float depth(0.0f);
   Spans<L> spans(scene, ray, inside, channels);
   do {
-    const auto span = spans.next(depth < kOpaqueDepth);
-    Segments<L, View> along(ends, scene, ray, span, channels, offset, kShadowSteps * scene.step, cost);
-    for (bool more = true; more && along.next(segment); more = along.keep(depth < kOpaqueDepth))
-      depth = depth + visitParts<Detail::extinction>(scene, blend, segment, ends, hidden,
+    const auto span = spans.next(depth < scene.opaque.depth);
+    typename Steps::template Cuts<L, View> along(scalars, scene, ray, span, channels, offset,
+                                                 kShadowSteps * scene.step, cost);
+    for (bool more = true; more && along.next(segment); more = along.keep(depth < scene.opaque.depth))
+      depth = depth + visitParts<Detail::extinction>(scene, blend, segment, scalars, hidden,
                                                      [](int, const PartOf<L>&) SCOLOPAX_LANES_LAMBDA {}) *
                           segment.length();
-  } while (!spans.done(depth < kOpaqueDepth));
+  } while (!spans.done(depth < scene.opaque.depth));
   return 1.0f - absorbed(depth);
 }
 
-/// Mean place, in [0,1], at which a segment of optical depth `depth` absorbs light. `centre` is the mean
-/// place of its extinction. The thicker the segment, the further to the front: in homogeneous matter the mean
-/// is 1 / depth - 1 / (exp(depth) - 1).
+/// Place, in [0,1], up to which a segment of optical depth `depth` absorbs the share `share` of all that it
+/// absorbs. `centre` is the mean place of its extinction, which is taken to be linear.
 template <class Float>
-SCOLOPAX_LANES Float placeOfAbsorption(Float depth, Float centre) {
-  const auto thick = depth >= 0.25f;
-  const Float thin = centre * (1.0f - depth * 0.166666667f);
-  if (!any(thick)) return thin;
-  const Float alpha = absorbed(depth);
-  return select(thick, centre * (2.0f / depth - 2.0f * (1.0f - alpha) / alpha), thin);
+SCOLOPAX_LANES Float placeOfAbsorption(Float depth, Float centre, Float share) {
+  // In homogeneous matter, 1 - exp(-depth x) = share (1 - exp(-depth)).
+  const auto thick = depth >= 1e-3f;
+  const Float y = select(thick, opticalDepth(share * absorbed(depth)) / maximum(depth, 1e-3f), share);
+  // With an extinction of 1 + k (2 x - 1), x + k (x^2 - x) = y.
+  const Float k = clamp(6.0f * centre - 3.0f, -1.0f, 1.0f), base = 1.0f - k;
+  return minimum(2.0f * y / maximum(base + squareRoot(maximum(base * base + 4.0f * k * y, 0.0f)), 1e-6f),
+                 1.0f);
 }
 
 /// The point of each ray at which a stratum is lit, and the channels there.
@@ -63,7 +63,7 @@ struct StratumPlaces {
 };
 
 /// Lit radiance of a unit of absorbed light at such points, for lanes in `which`.
-template <class Features, class L, class Blend, class View>
+template <class Features, class Steps, class L, class Blend, class View>
 SCOLOPAX_LANES typename L::Vec lightOf(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                        std::uint32_t channels, const StratumPlaces<L>& places,
                                        typename L::Mask which, CostOf<L>* cost) {
@@ -73,7 +73,7 @@ SCOLOPAX_LANES typename L::Vec lightOf(const View& scene, const Blend& blend, co
 
   const Visibility<L> visibility = visibilityAt<Features>(
       scene, hit, which, [&](const RayOf<L>& shadow, const IntervalOf<L>& part) SCOLOPAX_LANES_LAMBDA {
-        return marchTransmittance<L>(scene, blend, shadow, part, channels, places.offset, cost);
+        return marchTransmittance<L, Steps>(scene, blend, shadow, part, channels, places.offset, cost);
       });
   Vec sum(0.0f);
   for (int n = 0; n < scene.channelCount; ++n) {
@@ -139,7 +139,7 @@ class StrataSum {
 /// absorption passes a record, the point moves on to that record's segment.
 ///
 /// With one lane, strata are lit as they end. With many, they wait until there is one for every lane.
-template <class Features, class L, class Blend, class View>
+template <class Features, class Steps, class L, class Blend, class View>
 class Strata {
  public:
   using Float = typename L::Float;
@@ -198,7 +198,10 @@ class Strata {
       Float place = select(beyond, shared_ * mass, Float(-1.0f));
       if (any(moves)) place = select(moves, largestRecord(mass, moves), place);
       const Mask here = on & (place >= before - begin_);
-      if (any(here)) keep(here, segment, extinction);
+      if (any(here)) {
+        const Float share = (place - (before - begin_)) / maximum(after - before, kLeastNormal);
+        keep(here, segment, extinction, clamp(share, 0.0f, 1.0f));
+      }
     }
     const Int reached = truncated(after * perLight_);
     const Mask done = last ? L::everywhere() : on & (reached > index_);
@@ -237,7 +240,8 @@ class Strata {
     return record;
   }
 
-  SCOLOPAX_LANES void keep(Mask which, const Segment<L>& segment, Float extinction) {
+  /// Moves the stratum's point to the place in the segment up to which it absorbs `share` of its light.
+  SCOLOPAX_LANES void keep(Mask which, const Segment<L>& segment, Float extinction, Float share) {
     StratumPlaces<L>& places = memory_.places;
     Float opacity(0.0f), moment(0.0f);
     kept_ = select(which, Word(0u), kept_);
@@ -255,8 +259,8 @@ class Strata {
       radiance_ = select(seen, radiance_ + places.color[n] * places.share[n], radiance_);
     }
     const Float length = segment.length();
-    const Float place =
-        segment.start + length * placeOfAbsorption(extinction * length, minimum(moment / opacity, 1.0f));
+    const Float place = segment.start + length * placeOfAbsorption(extinction * length,
+                                                                   minimum(moment / opacity, 1.0f), share);
     place_ = select(which, place, place_);
   }
 
@@ -271,8 +275,8 @@ class Strata {
     places.emission = emission_;
     if constexpr (L::kLanes == 1) {
       if (which)
-        sum_.add({lightOf<Features, L>(scene_, blend_, ray_, channels_, places, which, cost_), radiance_,
-                  emission_, mass},
+        sum_.add({lightOf<Features, Steps, L>(scene_, blend_, ray_, channels_, places, which, cost_),
+                  radiance_, emission_, mass},
                  color);
     } else {
       for (unsigned left = bitsOf(which); left != 0; left &= left - 1) {
@@ -308,8 +312,8 @@ class Strata {
       rays.direction[axis] = permuted(ray_.direction[axis], ray);
     }
     CostOf<L> spent{};
-    const Vec sum = lightOf<Features, L>(scene_, blend_, rays, channels_, waiting.places,
-                                         Int(count_) > L::laneNumbers(), &spent);
+    const Vec sum = lightOf<Features, Steps, L>(scene_, blend_, rays, channels_, waiting.places,
+                                                Int(count_) > L::laneNumbers(), &spent);
     for (int i = 0; i < count_; ++i) {
       const int to = at(ray, i);
       const Mask lane = L::laneNumbers() == Int(to);

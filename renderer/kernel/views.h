@@ -27,6 +27,8 @@ struct CurveView {
 struct OpticalKnot {
   float position;
   float inverseWidth;  ///< 1 / distance to the next knot, or 0
+  float place;  ///< where the position is reached: stored value less the channel's origin, negated where
+                ///< positions fall as stored values rise
   float opacity;
   glm::vec3 color;  ///< linear RGB
 };
@@ -105,19 +107,27 @@ struct ChannelView {
   GradientFactorView factor;
 };
 
+/// Matter behind this much is not marched.
+struct OpacityLimit {
+  float transmittance, depth;  ///< the same limit twice: depth = -log(transmittance)
+};
+
 struct SceneView {
   CameraRays rays;
   int width, height;
   std::uint32_t seed;
-  bool filterBox;  ///< false: every sample is at the pixel's centre
+  float filterWidth;  ///< samples are spread over a square of this side, in pixels; 0: at the pixel's centre
   glm::ivec3 dims;
   ClipView clip;
   int channelCount;
   const ChannelView* channels;
   MajorantView majorants;
-  float step;      ///< step of quadrature, world units
-  float stratum;   ///< share of a ray's light per lighting computation of quadrature (strata.h)
-  int lightCount;  ///< 0 unless shading or shadows are on
+  float step;           ///< step of quadrature, world units
+  bool voxelwise;       ///< quadrature also cuts rays at the faces of voxel cells, and integrates exactly in
+                        ///< between
+  OpacityLimit opaque;  ///< where marched rays end
+  float stratum;        ///< share of a ray's light per lighting computation of quadrature (strata.h)
+  int lightCount;       ///< 0 unless shading or shadows are on
   LightView lights[kMaxLights];
   glm::mat3 worldFromVoxel;  ///< linear part, in units of the smallest spacing, so that lengths are near 1 at
                              ///< any scale

@@ -36,7 +36,7 @@ struct Options {
   SceneArguments scene;
   std::vector<std::string> methods;
   std::vector<std::uint32_t> samples{1, 4, 16, 64};
-  std::vector<double> steps{4, 2, 1, 0.5};
+  std::vector<double> steps{4, 2, 1, 0.5, 0};
   std::vector<int> macrocells;  // none: the scene's
   std::vector<int> threads{0};
   int repetitions = 3;
@@ -255,9 +255,9 @@ CLI::App* addBenchCommand(CLI::App& root) {
       ->delimiter(',')
       ->check(CLI::Range(1u, 1u << 24));
   command
-      ->add_option("--steps", o->steps, "Steps of the methods that have one, in voxels; default: 4,2,1,0.5")
+      ->add_option("--steps", o->steps, "Steps of the methods that have one, in voxels; default: 4,2,1,0.5,0")
       ->delimiter(',')
-      ->check(CLI::Range(0.01, 100.0) & numberUpTo(100, false));
+      ->check(numberUpTo(100, true));
   command->add_option("--macrocells", o->macrocells, "Macrocell edges, in voxels; default: the scene's")
       ->delimiter(',')
       ->check(CLI::Range(1, 64));

@@ -90,13 +90,18 @@ void writeStats(const std::filesystem::path& path, const Renderer& renderer, con
                 double seconds, const server::ResolvedScene& scene) {
   const RenderStats counts = renderer.stats();
   const double error = renderer.estimatedError();
+  const Choice choice = renderer.choice();
+  json corrections = json::array();
+  for (const Choice::Correction& level : choice.corrections)
+    corrections.push_back({{"step", level.step}, {"passes", level.passes}});
   const json stats = {{"samples", renderer.samples()},
                       {"seconds", seconds},
                       {"estimatedError", std::isfinite(error) ? json(error) : json(nullptr)},
                       {"rebuildMs", rebuild.rebuildMs},
                       {"backend", renderer.backendName()},
-                      {"method", nameOf(renderer.choice().method)},
-                      {"step", renderer.choice().step > 0 ? json(renderer.choice().step) : json(nullptr)},
+                      {"method", nameOf(choice.method)},
+                      {"step", choice.step > 0 ? json(choice.step) : json(nullptr)},
+                      {"corrections", corrections},
                       {"seed", scene.render.seed},
                       {"rays", counts.rays},
                       {"fetches", counts.fetches},
@@ -127,8 +132,7 @@ void render(const Options& options) {
   // A stop rule on the command line replaces the scene's as a whole.
   if (options.samples || options.seconds || options.error)
     stop = {options.samples.value_or(0), options.seconds.value_or(0), options.error.value_or(0)};
-  Scene scene = resolved->render;
-  if (scene.method == Method::automatic && options.error) scene.targetError = *options.error;
+  const Scene& scene = resolved->render;
 
   const auto renderer = makeCpuRenderer(resolved->dataset->volume, options.threads);
   if (!options.stats.empty()) renderer->countCosts();

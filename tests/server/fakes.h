@@ -128,7 +128,7 @@ class FakeRenderer : public Renderer {
     return true;
   }
   void addPixels() override { ++samples_; }
-  Choice choice() const override { return {scene_.method, scene_.step}; }
+  Choice choice() const override { return {scene_.method, scene_.step, {}}; }
   std::uint32_t samples() const override { return samples_; }
   double estimatedError(std::stop_token stop) const override {
     if (errorTakesLong()) {

@@ -46,14 +46,11 @@ TEST(SceneResolver, FillsEveryValueOfAnEmptyScene) {
   EXPECT_EQ(scene->stop.samples, 64u);
 }
 
-TEST(SceneResolver, TellsAutoTheErrorThatIsAskedForWhichThenDecidesThePicture) {
+TEST(SceneResolver, LeavesStopRulesOutOfWhatDecidesThePicture) {
   const auto plain = resolver().replace(json::object());
   const auto fine = resolver().replace({{"stop", {{"error", 1e-4}}}});
-  EXPECT_EQ(fine->render.targetError, 1e-4);
-  EXPECT_NE(fine->picture, plain->picture);
-  const json tracker = {{"method", "superposed"}};
-  EXPECT_EQ(resolver().replace({{"stop", {{"error", 1e-4}}}, {"integrator", tracker}})->picture,
-            resolver().replace({{"integrator", tracker}})->picture);
+  EXPECT_EQ(fine->stop.error, 1e-4);
+  EXPECT_EQ(fine->picture, plain->picture);
 }
 
 TEST(SceneResolver, ResolvesAResolvedSceneToItself) {

@@ -109,34 +109,70 @@ inline double bernstein(double m, double largest, double n, double logTerm) {
 
 }  // namespace detail
 
-/// Whether the expected value of `found` is the picture `expected`.
-inline ::testing::AssertionResult haveMean(const Replicates& found, const Scene& scene,
-                                           const reference::ReferenceImage& expected) {
+namespace detail {
+
+inline Deviations deviationsFrom(const reference::ReferenceImage& expected, const Replicates& found,
+                                 const Scene& scene) {
   const std::size_t pixels = expected.image.pixels.size();
-  const double replicates = double(found.pictures.size()), n = replicates * found.samples;
-  const double logTerm = std::log(2.0 * 4.0 * double(pixels) / 1e-8);
   const glm::dvec4 largest = largestSample(scene);
-  // The reference's bound on its own error, and the rounding of pixels and weights in float.
-  const double slack = expected.maximumRayError + 2e-6;
-  detail::Deviations d;
+  Deviations d;
   d.mean.assign(pixels, glm::dvec4(0));
   d.spread = d.mean;
   for (const Image& picture : found.pictures) {
     std::vector<glm::dvec4>& deviation = d.ofReplicate.emplace_back(pixels);
     for (std::size_t i = 0; i < pixels; ++i) {
       deviation[i] = glm::dvec4(picture.pixels[i]) - glm::dvec4(expected.image.pixels[i]);
-      d.mean[i] += deviation[i] / replicates;
+      d.mean[i] += deviation[i] / double(found.pictures.size());
     }
   }
   for (std::size_t i = 0; i < pixels; ++i)
     for (int c = 0; c < 4; ++c) {
       const double m = std::clamp(double(expected.image.pixels[i][c]), 0.0, largest[c]);
       d.spread[i][c] = std::sqrt(m * (largest[c] - m));
+    }
+  return d;
+}
+
+}  // namespace detail
+
+/// Whether the expected value of `found` is the picture `expected`.
+inline ::testing::AssertionResult haveMean(const Replicates& found, const Scene& scene,
+                                           const reference::ReferenceImage& expected) {
+  const std::size_t pixels = expected.image.pixels.size();
+  const double n = double(found.pictures.size()) * found.samples;
+  const double logTerm = std::log(2.0 * 4.0 * double(pixels) / 1e-8);
+  const glm::dvec4 largest = largestSample(scene);
+  // The reference's bound on its own error, and the rounding of pixels and weights in float.
+  const double slack = expected.maximumRayError + 2e-6;
+  const detail::Deviations d = detail::deviationsFrom(expected, found, scene);
+  for (std::size_t i = 0; i < pixels; ++i)
+    for (int c = 0; c < 4; ++c) {
+      const double m = std::clamp(double(expected.image.pixels[i][c]), 0.0, largest[c]);
       const double bound = detail::bernstein(m, largest[c], n, logTerm);
       if (!(std::abs(d.mean[i][c]) <= bound + slack))
         return ::testing::AssertionFailure()
                << "pixel " << i << " component " << c << ": off by " << d.mean[i][c] << " from " << m
                << ", within " << bound << " expected";
+    }
+  return detail::areNoise(d, slack);
+}
+
+/// The same for samples of unknown distribution, whose noise is smaller than the largest possible. Pixels:
+/// Student's t with 31 degrees of freedom beyond 10, 3e-11 for each component. `slack` is allowed in
+/// addition.
+inline ::testing::AssertionResult haveMeanBySpread(const Replicates& found, const Scene& scene,
+                                                   const reference::ReferenceImage& expected, double slack) {
+  const double n = double(found.pictures.size());
+  const detail::Deviations d = detail::deviationsFrom(expected, found, scene);
+  for (std::size_t i = 0; i < d.mean.size(); ++i)
+    for (int c = 0; c < 4; ++c) {
+      double squares = 0;
+      for (const auto& replicate : d.ofReplicate) squares += std::pow(replicate[i][c] - d.mean[i][c], 2);
+      const double sigma = std::sqrt(squares / (n - 1) / n);
+      if (!(std::abs(d.mean[i][c]) <= 10 * sigma + slack))
+        return ::testing::AssertionFailure()
+               << "pixel " << i << " component " << c << ": off by " << d.mean[i][c] << ", "
+               << d.mean[i][c] / sigma << " standard errors";
     }
   return detail::areNoise(d, slack);
 }

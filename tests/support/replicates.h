@@ -2,11 +2,15 @@
 // Independent pictures of one scene: each has its own seed, which scrambles the low-discrepancy points
 // differently. Their spread shows how large the noise is; agreement.h compares them.
 #pragma once
+#include <chrono>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "renderer/data/film.h"
 #include "renderer/data/render_plan.h"
 #include "renderer/data/sampling.h"
+#include "renderer/engine/corrections.h"
 #include "renderer/kernel/analog.h"
 #include "renderer/kernel/render_pixel.h"
 #include "tests/support/statistics.h"
@@ -14,8 +18,8 @@
 namespace scolopax::test {
 
 inline constexpr int kReplicates = 32;
-/// Samples of a replicate, times statisticsFactor(): all points of one scrambling.
-inline constexpr int kSamplesPerReplicate = int(kernel::kReplicateSamples);
+/// Samples of a replicate, times statisticsFactor().
+inline constexpr int kSamplesPerReplicate = 64;
 inline int samplesPerReplicate() { return kSamplesPerReplicate * statisticsFactor(); }
 
 struct Replicates {
@@ -34,6 +38,51 @@ inline Replicates replicate(const std::shared_ptr<const Volume>& volume, Scene s
     renderer->setScene(scene);
     for (int s = 0; s < result.samples; ++s) renderer->renderSample(never);
     result.pictures.push_back(renderer->image());
+  }
+  return result;
+}
+
+/// The same pictures from multi-level quadrature through these resolutions of the ladder, the film's first.
+/// Every level has an eighth as many corrections as there are samples. `omitted`, a level's index, is a
+/// defect: that level is left out.
+inline Replicates replicateLevels(const std::shared_ptr<const Volume>& volume, Scene scene, Method method,
+                                  const std::vector<int>& resolutions,
+                                  std::optional<std::size_t> omitted = {}) {
+  scene.method = method;
+  scene.step = sceneStep(resolutionAt(resolutions[0]));
+  Replicates result{{}, samplesPerReplicate()};
+  std::vector<Level> levels;
+  for (std::size_t k = 1; k < resolutions.size(); ++k)
+    levels.push_back(
+        {{resolutionAt(resolutions[k]), resolutionAt(resolutions[k - 1]), 1, 0, 0, 0}, 1, 1, 1, 0.125});
+  if (omitted) levels.erase(levels.begin() + std::ptrdiff_t(*omitted));
+  const auto launcher = makeCpuLauncher(0);
+  const std::atomic<bool> never = false;
+  std::shared_ptr<const RenderPlan> plan;
+  for (int r = 0; r < kReplicates; ++r) {
+    scene.seed = std::uint32_t(1000 + r);
+    plan = std::make_shared<const RenderPlan>(volume, scene, plan.get());
+    Film film;
+    film.reset(scene.width, scene.height);
+    Corrections corrections;
+    corrections.reset(levels);
+    constexpr auto kNoDeadline = std::chrono::steady_clock::time_point::max();
+    launcher->run([&] {
+      for (int s = 0; s < result.samples; ++s) {
+        std::vector<std::uint8_t> done(film.pixelCount());
+        launcher->launch(scene, {plan->view(), sampleNumber(scene.sampling, film.samples()), film.pass(),
+                                 nullptr, nullptr, done.data(), &never, kNoDeadline});
+        const auto addLevel = [&] {
+          film.addLevel();
+          return true;
+        };
+        corrections.render(*launcher, *plan, film, addLevel, never, kNoDeadline);
+        film.add();
+        corrections.add(film);
+      }
+    });
+    for (std::size_t l = 0; l < levels.size(); ++l) EXPECT_GT(film.corrections(l), 1u);
+    result.pictures.push_back(film.image());
   }
   return result;
 }

@@ -56,8 +56,8 @@ class GradientDefect : public testing::Test {
   double marcherError(Change&& change) {
     made_.scene.method = Method::raymarch;
     made_.scene.step = 0.1;
-    const auto found =
-        replicateKernel<kernel::RayMarch, kernel::BlendDensity, Unlit>(made_.volume, made_.scene, change);
+    const auto found = replicateKernel<kernel::RayMarch<kernel::EqualSteps>, kernel::BlendDensity, Unlit>(
+        made_.volume, made_.scene, change);
     return compareImages(found.pictures[0], expected_.image).rmse;
   }
   /// Calls change(factor) for copies of the view's channels.

@@ -142,7 +142,7 @@ Scene anyScene(Draw& draw, const Volume& volume) {
   scene.method = draw.of({Method::raymarch, Method::hybrid});
   scene.blend = draw.of({BlendMode::density, BlendMode::composite, BlendMode::max, BlendMode::mix});
   scene.filter = draw.of({PixelFilter::point, PixelFilter::box});
-  scene.step = draw.of({0.1, 0.5, 1.0, 4.0, 20.0});
+  scene.step = draw.of({0.0, 0.1, 0.5, 1.0, 4.0, 20.0});
   scene.macrocell = draw.of({1, 4, 4, 7, 64});
   scene.seed = std::uint32_t(draw.upTo(1000));
   scene.shading = draw.upTo(1) == 1;
@@ -197,13 +197,19 @@ class RayPackets : public testing::TestWithParam<InstructionSet> {
     Picture picture{std::vector<glm::vec4>(count(), glm::vec4(3)), std::vector<kernel::SampleCost>(count()),
                     std::vector<kernel::FirstCollision>(count())};
     const kernel::SampleNumber number = sampleNumber(scene_.sampling, sample);
-    visitBlendAndLight(scene_, [&](auto blend, auto features) {
-      const kernel::RenderPixel<kernel::RayMarch, typename decltype(blend)::type,
-                                typename decltype(features)::type>
-          render{view_, number, picture.pixels.data(), picture.cost.data(), picture.first.data()};
-      for (int pixel = 0; pixel < int(count()); ++pixel)
-        if (!done[std::size_t(pixel)]) render(pixel);
-    });
+    const auto renderAll = [&]<class Steps>(std::type_identity<Steps>) {
+      visitBlendAndLight(scene_, [&](auto blend, auto features) {
+        const kernel::RenderPixel<kernel::RayMarch<Steps>, typename decltype(blend)::type,
+                                  typename decltype(features)::type>
+            render{view_, number, picture.pixels.data(), picture.cost.data(), picture.first.data()};
+        for (int pixel = 0; pixel < int(count()); ++pixel)
+          if (!done[std::size_t(pixel)]) render(pixel);
+      });
+    };
+    if (view_.voxelwise)
+      renderAll(std::type_identity<kernel::VoxelCells>{});
+    else
+      renderAll(std::type_identity<kernel::EqualSteps>{});
     return picture;
   }
   /// Compares by value, so that 0 equals -0. Counts pixels that are not empty, and opaque ones.

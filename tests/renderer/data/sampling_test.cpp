@@ -12,7 +12,7 @@
 namespace scolopax {
 namespace {
 
-using kernel::kReplicateSamples;
+using kernel::kScramblings;
 using kernel::RandomBlock;
 using kernel::Sampler;
 
@@ -57,38 +57,49 @@ TEST(Sobol, CoordinatesAreNotCopiesOfEachOther) {
     }
 }
 
-TEST(Sampling, SpreadsEveryWordOfAReplicateEvenly) {
+TEST(Sampling, SpreadsEveryWordOfEachHalfEvenly) {
+  // The even samples, and the odd ones: of any 64 that follow each other from a multiple of 64 on, one lies
+  // in each of the 64 intervals of every word.
   for (const std::uint32_t pixel : {0u, 1u, 99999u})
-    for (const std::uint32_t replicate : {0u, 1u, 5000u}) {
-      std::vector<std::vector<int>> counts(9, std::vector<int>(kReplicateSamples));
-      std::vector<int> places(kReplicateSamples);
-      for (std::uint32_t i = 0; i < kReplicateSamples; ++i) {
-        const auto w = words(pixel, replicate * kReplicateSamples + i);
-        for (std::size_t d = 0; d < w.size(); ++d) ++counts[d][w[d] >> 26];
-        ++places[(w[0] >> 29) * 8 + (w[1] >> 29)];
+    for (const std::uint32_t half : {0u, 1u})
+      for (const std::uint32_t first : {0u, 64u, 320000u}) {
+        std::vector<std::vector<int>> counts(9, std::vector<int>(64));
+        std::vector<int> places(64);
+        for (std::uint32_t i = 0; i < 64; ++i) {
+          const auto w = words(pixel, kScramblings * (first + i) + half);
+          for (std::size_t d = 0; d < w.size(); ++d) ++counts[d][w[d] >> 26];
+          ++places[(w[0] >> 29) * 8 + (w[1] >> 29)];
+        }
+        for (const auto& one : counts) EXPECT_EQ(std::count(one.begin(), one.end(), 1), 64);
+        // Positions in the pixel: one sample in every cell of 1/8 x 1/8.
+        EXPECT_EQ(std::count(places.begin(), places.end(), 1), 64);
       }
-      for (const auto& one : counts) EXPECT_EQ(std::count(one.begin(), one.end(), 1), 64);
-      // Positions in the pixel: one sample in every cell of 1/8 x 1/8.
-      EXPECT_EQ(std::count(places.begin(), places.end(), 1), 64);
-    }
+}
+
+TEST(Sampling, GoesOnToSpreadEvenlyAsSamplesGrow) {
+  std::vector<std::vector<int>> counts(9, std::vector<int>(4096));
+  for (std::uint32_t i = 0; i < 4096; ++i) {
+    const auto w = words(7, kScramblings * i);
+    for (std::size_t d = 0; d < w.size(); ++d) ++counts[d][w[d] >> 20];
+  }
+  for (const auto& one : counts) EXPECT_EQ(std::count(one.begin(), one.end(), 1), 4096);
 }
 
 TEST(Sampling, LeavesEverySampleUniform) {
-  // Over pixels, and over replicates of one pixel, the word of a fixed sample is uniform; this makes the
-  // estimator unbiased. Chi-square with 255 degrees of freedom exceeds 347 with probability 1e-4; 36 tables.
+  // Over pixels, and over seeds of one pixel, the word of a fixed sample is uniform; this makes the estimator
+  // unbiased. Chi-square with 255 degrees of freedom exceeds 347 with probability 1e-4; 36 tables.
   for (const std::uint32_t sample : {0u, 37u})
     for (const bool overPixels : {true, false}) {
       std::vector<std::vector<int>> counts(9, std::vector<int>(256));
       constexpr int kDraws = 1 << 15;
       for (std::uint32_t i = 0; i < kDraws; ++i) {
-        const auto w = overPixels ? words(i, sample) : words(3, i * kReplicateSamples + sample);
+        const auto w = overPixels ? words(i, sample) : words(3, sample, i);
         for (std::size_t d = 0; d < w.size(); ++d) ++counts[d][w[d] >> 24];
       }
       for (const auto& one : counts) {
         double chiSquare = 0;
         for (const int c : one) chiSquare += std::pow(c - kDraws / 256.0, 2) / (kDraws / 256.0);
-        EXPECT_LT(chiSquare, 347) << "sample " << sample
-                                  << (overPixels ? " over pixels" : " over replicates");
+        EXPECT_LT(chiSquare, 347) << "sample " << sample << (overPixels ? " over pixels" : " over seeds");
       }
     }
 }
@@ -101,20 +112,20 @@ double correlation(const std::vector<std::uint32_t>& a, const std::vector<std::u
   return sum / double(a.size());
 }
 
-TEST(Sampling, IsIndependentBetweenPixelsReplicatesSeedsAndWords) {
+TEST(Sampling, IsIndependentBetweenPixelsHalvesSeedsAndWords) {
   constexpr std::uint32_t kDraws = 1 << 14;
   const double limit = 5.0 / std::sqrt(double(kDraws));  // 5 sigma: 6e-7 each, 36 comparisons
   for (std::size_t d = 0; d < 9; ++d) {
-    std::vector<std::uint32_t> here, right, later, otherSeed, otherWord;
+    std::vector<std::uint32_t> here, right, otherHalf, otherSeed, otherWord;
     for (std::uint32_t i = 0; i < kDraws; ++i) {
       here.push_back(words(2 * i, 5)[d]);
       right.push_back(words(2 * i + 1, 5)[d]);
-      later.push_back(words(2 * i, 5 + kReplicateSamples)[d]);
+      otherHalf.push_back(words(2 * i, 4)[d]);
       otherSeed.push_back(words(2 * i, 5, 8)[d]);
       otherWord.push_back(words(2 * i, 5)[(d + 1) % 9]);
     }
     EXPECT_LT(std::abs(correlation(here, right)), limit) << "word " << d;
-    EXPECT_LT(std::abs(correlation(here, later)), limit) << "word " << d;
+    EXPECT_LT(std::abs(correlation(here, otherHalf)), limit) << "word " << d;
     EXPECT_LT(std::abs(correlation(here, otherSeed)), limit) << "word " << d;
     EXPECT_LT(std::abs(correlation(here, otherWord)), limit) << "word " << d;
   }

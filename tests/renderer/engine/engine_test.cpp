@@ -256,7 +256,7 @@ TEST(CpuRenderer, TakesItsMemoryFromTheBudgetAndRefusesWhatIsNotThere) {
   {
     const auto renderer = makeCpuRenderer(volume, 0, memory);
     renderer->setScene(scene);
-    EXPECT_EQ(memory->used(MemoryUse::films), 64u * 64u * (16 + 32 + 32 + 16 + 1));
+    EXPECT_EQ(memory->used(MemoryUse::films), 64u * 64u * (16 + 32 + 32 + 1));
     EXPECT_GT(memory->used(MemoryUse::grids), 0u);
     renderer->renderSample(kNever);
     const Image before = renderer->image();

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "renderer/core/error.h"
+#include "renderer/engine/pilot.h"
 #include "tests/support/volumes.h"
 
 namespace scolopax {
@@ -62,8 +63,17 @@ TEST(StepBias, EndsSoonAfterAStopIsRequested) {
   const auto launcher = makeCpuLauncher(0);
   const RenderPlan plan(volume, slowScene(*volume));
   expectToEndWhenStopped([&](const std::stop_token& stop) { estimateBias(*launcher, plan, stop); });
-  expectToEndWhenStopped(
-      [&](const std::stop_token& stop) { largestStep(*launcher, plan, Method::raymarch, 1e-9, stop); });
+  expectToEndWhenStopped([&](const std::stop_token& stop) { chooseAutomatically(*launcher, plan, stop); });
+}
+
+TEST(Automatic, ChoosesForAGridOnWhichEveryStepIsTooSmall) {
+  const glm::ivec3 dims(2, 2, 64);
+  const auto value = [](int x, int y, int z) { return (x * 89 + y * 57 + z * 131) % 256; };
+  const auto volume = volumeOf(gridOf(dims, {1e-6, 1e-6, 1}), channelOf<std::uint8_t>(dims, value));
+  const auto launcher = makeCpuLauncher(0);
+  const RenderPlan plan(volume, frontScene(*volume, 16, 16));
+  const AutomaticChoice choice = chooseAutomatically(*launcher, plan);
+  EXPECT_TRUE(choice.method == Method::superposed || choice.resolution.voxelwise);
 }
 
 TEST(StepBias, MarchesNoFinerThanTheSmallestStepOfARay) {
@@ -73,6 +83,9 @@ TEST(StepBias, MarchesNoFinerThanTheSmallestStepOfARay) {
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, value));
   Scene scene = frontScene(*volume, 24, 24);
   scene.method = Method::raymarch;
+  scene.channels[0].rangeHi = 255;
+  scene.height = 1;
+  scene.camera.orthoHeight = 4;
   const auto launcher = makeCpuLauncher(0);
   const auto biasAt = [&](double step) {
     scene.step = step;
@@ -81,7 +94,7 @@ TEST(StepBias, MarchesNoFinerThanTheSmallestStepOfARay) {
   };
   EXPECT_GT(biasAt(0.01), 0);
   EXPECT_EQ(biasAt(0.01), biasAt(0.04));
-  EXPECT_LT(biasAt(0.04), biasAt(0.5));
+  EXPECT_LT(biasAt(0.04), biasAt(2));
 }
 
 }  // namespace

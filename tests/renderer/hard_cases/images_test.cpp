@@ -41,57 +41,103 @@ TEST(Film, DoesNotDriftInTenMillionSamples) {
   }
   ASSERT_EQ(film.samples(), 10'000'000u);
   EXPECT_EQ(film.image().pixels[0], glm::vec4(0.1f, 0.7f, 1e-6f, 1.0f));
-  // Sums of n terms have a relative error of at most n 2^-53; their difference is 0 except for that.
-  EXPECT_LT(film.estimatedError(), std::sqrt(3 * 0x1p-53 * 1.5 / 4));
+  // Sums of n terms have a relative error of at most n 2^-53: the halves differ by no more.
+  EXPECT_LT(film.noise(), 10'000'000 * 0x1p-53);
 }
 
-TEST(Film, ClaimsTheErrorOfItsWholeReplicatesUntilTheNextIsWhole) {
-  // An incomplete replicate is not yet spread evenly: it neither contributes to the estimate nor counts as
-  // samples.
-  Film film;
-  film.reset(1, 1);
-  double whole = 0;
-  for (std::uint32_t i = 0; i < 18 * kernel::kReplicateSamples; ++i) {
-    film.pass()[0] = glm::vec4(float(i % 7), float(i % 3), float(i / 64 % 5), 1.0f);
+/// Adds passes to a film of one pixel, in which one component of each has a value of its own.
+void addPasses(Film& film, int count, int component, double (*value)(int pass)) {
+  for (int i = 0; i < count; ++i) {
+    film.pass()[0] = glm::vec4(0, 0, 0, 1);
+    film.pass()[0][component] = float(value(i));
     film.add();
-    if (film.samples() < 16 * kernel::kReplicateSamples) continue;
-    if (film.samples() % kernel::kReplicateSamples == 0) {
-      EXPECT_NE(film.estimatedError(), whole);
-      whole = film.estimatedError();
-    }
-    EXPECT_EQ(film.estimatedError(), whole) << film.samples();
   }
 }
 
-TEST(Film, TakesTheErrorFromTheSpreadOfTheReplicates) {
-  // Samples that differ strongly within every replicate but not between replicates: no error. Replicates
-  // whose means alternate between 0 and 1: the standard deviation of 16 of them is sqrt(4 / 15), that of
-  // their mean a quarter of it; one of the four components has it, which may be alpha.
-  for (const int component : {0, 3})
-    for (const bool alternate : {false, true}) {
-      Film film;
-      film.reset(1, 1);
-      for (std::uint32_t i = 0; i < 16 * kernel::kReplicateSamples; ++i) {
-        film.pass()[0] = glm::vec4(0, 0, 0, 1);
-        film.pass()[0][component] = alternate ? float(i / kernel::kReplicateSamples % 2) : float(i % 2);
-        film.add();
-      }
-      const double expected = alternate ? std::sqrt(4.0 / 15 / 16 / 4) : 0;
-      EXPECT_NEAR(film.estimatedError(), expected, 1e-9);
-    }
-}
-
-TEST(Film, TakesTheErrorFromTheSpreadOfSamplesWhileReplicatesAreFew) {
+TEST(Film, TakesItsNoiseFromTheDifferenceOfItsHalves) {
+  // The halves' means are 1 and 0: the variance of the mean of all is (1 - 0)^2 / 4, in one of four
+  // components, which may be alpha. Differences within a half do not count: samples of low discrepancy
+  // differ, and yet their mean is right.
   for (const int component : {0, 3}) {
     Film film;
     film.reset(1, 1);
-    for (int i = 0; i < 16; ++i) {
-      film.pass()[0] = glm::vec4(0, 0, 0, 1);
-      film.pass()[0][component] = float(i % 2);
-      film.add();
-    }
-    EXPECT_NEAR(film.estimatedError(), std::sqrt(4.0 / 15 / 16 / 4), 1e-9);
+    addPasses(film, 16, component, [](int i) { return double(i % 2); });
+    EXPECT_NEAR(film.noise(), std::sqrt(1.0 / 4 / 4), 1e-9);
+    film.reset(1, 1);
+    addPasses(film, 16, component, [](int i) { return double(i / 2 % 2); });
+    EXPECT_NEAR(film.noise(), 0, 1e-9);
   }
+}
+
+TEST(Film, KnowsItsNoiseAtAnyNumberOfSamples) {
+  // Independent samples of variance 1/12, over 10,000 pixels: 3 % is more than four standard deviations of
+  // the estimate.
+  Film film;
+  film.reset(100, 100);
+  std::uint32_t state = 1;
+  for (int n = 1; n <= 9; ++n) {
+    for (std::size_t i = 0; i < film.pixelCount(); ++i) {
+      state = kernel::hashOf(state + 0x9e3779b9u);
+      film.pass()[i] = glm::vec4(0, float(kernel::uniformOf(state)), 0, 0);
+    }
+    film.add();
+    if (n == 1)
+      EXPECT_TRUE(std::isnan(film.noise()));
+    else
+      EXPECT_NEAR(film.noise() / std::sqrt(1.0 / 12 / n / 4), 1, 0.03) << n;
+  }
+}
+
+TEST(Film, AddsTheMeanOfEveryLevelOfCorrections) {
+  Film film;
+  film.reset(1, 1);
+  addPasses(film, 3, 0, [](int) { return 0.5; });
+  for (int level = 0; level < 2; ++level) {
+    film.addLevel();
+    EXPECT_EQ(film.corrections(std::size_t(level)), 0u);
+  }
+  EXPECT_EQ(film.image().pixels[0], glm::vec4(0.5f, 0, 0, 1));
+  const auto correct = [&](std::size_t level, float by) {
+    film.fine()[0] = glm::vec4(0.25f + by, 0, 0, 0.5f);
+    film.coarse()[0] = glm::vec4(0.25f, 0, 0, 0.75f);
+    film.addCorrection(level);
+  };
+  correct(0, 0.25f);
+  EXPECT_EQ(film.image().pixels[0], glm::vec4(0.5f, 0, 0, 1));
+  EXPECT_EQ(film.noise(), 0);
+  film.include(0);
+  EXPECT_EQ(film.image().pixels[0], glm::vec4(0.75f, 0, 0, 0.75f));
+  // A single correction counts as noise of its own size.
+  EXPECT_NEAR(film.noise(), std::sqrt((0.25 * 0.25 + 0.25 * 0.25) / 4), 1e-9);
+  correct(0, -0.75f);
+  correct(1, 0.5f);
+  film.include(1);
+  EXPECT_EQ(film.image().pixels[0], glm::vec4(0.75f, 0, 0, 0.5f));
+  EXPECT_EQ(film.corrections(0), 2u);
+  // The product of both corrections of level 0 is negative. What is told is the estimate's standard
+  // deviation: half of the squared difference between the corrections, over the root of the number of
+  // components.
+  EXPECT_NEAR(film.correctionSize(0), std::sqrt(0.5 / 2 / 4), 1e-6);
+  film.reset(1, 1);
+  EXPECT_EQ(film.levels(), 0u);
+}
+
+TEST(Film, EstimatesTheSizeOfALevelsCorrectionsWithoutTheirNoise) {
+  // The expected correction is 0.01 in one component; its noise is 10 times as large.
+  Film film;
+  film.reset(200, 200);
+  film.addLevel();
+  std::uint32_t state = 1;
+  for (int n = 0; n < 4; ++n) {
+    for (std::size_t i = 0; i < film.pixelCount(); ++i) {
+      state = kernel::hashOf(state + 0x9e3779b9u);
+      film.fine()[i] = glm::vec4(0, 0, 0.01f + 0.35f * (float(kernel::uniformOf(state)) - 0.5f), 0);
+      film.coarse()[i] = glm::vec4(0);
+    }
+    film.addCorrection(0);
+  }
+  // The square is 1e-4 with a standard deviation of 0.01 / 4 / sqrt(40000).
+  EXPECT_NEAR(std::pow(film.correctionSize(0), 2), 1e-4 / 4, 5 * 0.0025 / 200 / 4);
 }
 
 TEST(Picture, OfOnePixelIsThatOfTheRayThroughItsCentre) {

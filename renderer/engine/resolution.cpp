@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/engine/resolution.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace scolopax {
+
+Resolution resolutionAt(int index) {
+  if (index < kEqualSteps) return {std::ldexp(32.0, -index), false};
+  if (index == kEqualSteps) return {kWholeCell, true};
+  return {std::ldexp(1.0, kEqualSteps + 1 - index), true};
+}
+
+Resolution resolutionOf(const Scene& scene) {
+  return scene.step > 0 ? Resolution{scene.step, false} : Resolution{kWholeCell, true};
+}
+
+double sceneStep(const Resolution& resolution) {
+  return std::isfinite(resolution.step) ? resolution.step : 0;
+}
+
+void setResolution(kernel::SceneView& view, const Resolution& resolution) {
+  view.voxelwise = resolution.voxelwise;
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  view.step = std::isfinite(resolution.step) ? view.smallestSpacing * float(resolution.step) : kInfinity;
+  // The bias of ending rays early must fall with that of the segments' lengths, which is of second order.
+  const double part = resolution.voxelwise ? std::min(1.0, resolution.step / 2) : 1.0;
+  view.opaque = opacityLimit(kOpaqueTransmittance * part * part);
+}
+
+}  // namespace scolopax

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+// Quadrature from one face of voxel cells to the next (step 0): where nothing hides anything within a cell,
+// it is exact up to rounding, without any noise.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/renderer/hard_cases/hard_scenes.h"
+#include "tests/support/estimator_scenes.h"
+
+namespace scolopax {
+namespace {
+
+using namespace test;
+
+/// Largest difference from the reference over pixels and components, beyond the error that it claims.
+double largestError(const std::shared_ptr<const Volume>& volume, Scene scene) {
+  scene.filter = PixelFilter::point;
+  scene.method = Method::raymarch;
+  scene.step = 0;
+  const auto expected = reference::renderReference(*volume, scene, 1);
+  const Image found = renderSamples(volume, scene, 1);
+  double largest = 0;
+  for (std::size_t i = 0; i < found.pixels.size(); ++i)
+    for (int c = 0; c < 4; ++c)
+      largest = std::max(largest, std::abs(double(found.pixels[i][c]) - double(expected.image.pixels[i][c])));
+  return largest - expected.maximumRayError;
+}
+
+/// One colour per channel, as colours that change within a cell hide each other, and little extinction.
+Scene thin(Scene scene, double factor) {
+  for (ChannelAppearance& channel : scene.channels) {
+    channel.density *= factor;
+    channel.color = {channel.color.front()};
+  }
+  return scene;
+}
+
+TEST(Voxelwise, IsExactInThinMatter) {
+  // What matter hides of other matter in the same cell is of second order in the density.
+  for (const TestScene which : kTestScenes) {
+    const auto made = testScene(which);
+    if (!made) continue;
+    for (const BlendMode blend : {BlendMode::density, BlendMode::composite}) {
+      Scene scene = thin(made->scene, 0.005);
+      scene.blend = blend;
+      EXPECT_LT(largestError(made->volume, scene), 2e-5)
+          << kTestSceneNames[int(which)] << ' ' << nameOf(blend);
+    }
+  }
+}
+
+TEST(Voxelwise, IsExactForOneChannelOfOneColor) {
+  // Nothing hides anything of another colour, however dense.
+  for (const TestScene which : kTestScenes) {
+    const auto made = testScene(which);
+    if (!made) continue;
+    for (std::size_t shown = 0; shown < made->scene.channels.size(); ++shown)
+      for (const double factor : {1.0, 100.0}) {
+        Scene scene = thin(made->scene, factor);
+        for (std::size_t i = 0; i < scene.channels.size(); ++i) scene.channels[i].visible = i == shown;
+        // Rays end at a transmittance of 1e-4.
+        EXPECT_LT(largestError(made->volume, scene), 1.2e-4) << kTestSceneNames[int(which)] << ' ' << shown;
+      }
+  }
+}
+
+TEST(Voxelwise, SeesPeaksOfAnyWidth) {
+  const VolumeAndScene made = *testScene(TestScene::orbitals);
+  Scene scene = thin(made.scene, 1);
+  for (std::size_t i = 1; i < scene.channels.size(); ++i) scene.channels[i].visible = false;
+  ChannelAppearance& channel = scene.channels[0];
+  for (const double width : {1e-1, 1e-3, 1e-5}) {
+    channel.opacity = {{0.3 - width, 0}, {0.3, 1}, {0.3 + width, 0}};
+    channel.density = 0.02 / width;
+    // Knots are floats: a width of 1e-5 is accurate to half a percent.
+    EXPECT_LT(largestError(made.volume, scene), width < 1e-4 ? 6e-3 : 1e-4) << width;
+  }
+}
+
+TEST(Voxelwise, LeavesOutWholeCellsWithVoxelsThatAreNotFinite) {
+  const glm::ivec3 dims(7, 6, 5);
+  const float kinds[] = {NAN, INFINITY, -INFINITY, 3e38f, -3e38f, 1e-45f};
+  std::uint32_t state = 5;
+  const auto value = [&](int, int, int) {
+    state = state * 1664525u + 1013904223u;
+    return (state >> 20) % 16 ? float(state >> 8) * 0x1p-24f : kinds[(state >> 24) % 6];
+  };
+  const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, value));
+  Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, 16);
+  scene.channels = {ramp(0, 1, 0.5, kRed)};
+  EXPECT_LT(largestError(volume, scene), 1e-4);
+}
+
+TEST(Voxelwise, KeepsTheGridsShape) {
+  const glm::ivec3 dims(9, 1, 6);
+  std::uint32_t state = 9;
+  const auto noise = [&](int, int, int) { return (state = state * 1664525u + 1013904223u) >> 24; };
+  for (const glm::dvec3 spacing : {glm::dvec3(1), glm::dvec3(1, 1, 100), glm::dvec3(0.01, 3, 1)}) {
+    const auto volume = volumeOf(gridOf(dims, spacing), channelOf<std::uint8_t>(dims, noise));
+    Scene scene = framed(*volume, 16);
+    scene.channels[0].rangeHi = 255;
+    scene.channels[0].density = 0.3 / volume->grid().smallestSpacing();
+    scene.channels[0].color = {{0, kRed}};
+    EXPECT_LT(largestError(volume, scene), 1.2e-4) << spacing.x << ' ' << spacing.z;
+  }
+}
+
+TEST(Voxelwise, IsExactAtAnyScaleOfValues) {
+  const glm::ivec3 dims(6, 7, 5);
+  for (const double scale : {1e-24, 1.0, 1e22}) {
+    std::uint32_t state = 3;
+    const auto noise = [&](int, int, int) {
+      return double((state = state * 1664525u + 1013904223u) >> 8) * 0x1p-24 * scale;
+    };
+    const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, noise));
+    Scene scene = framed(*volume, 16);
+    scene.channels[0] = ramp(0, scale, 0.5, kRed);
+    scene.channels[0].opacity = {{0.4, 0}, {0.5, 1}, {0.6, 0}};
+    EXPECT_LT(largestError(volume, scene), 1.2e-4) << scale;
+  }
+}
+
+TEST(Voxelwise, SplitsAtKnotsOfTheGradientFactor) {
+  // Equal steps integrate the factor's curve too: the finest of them agree.
+  const VolumeAndScene made = *testScene(TestScene::orbitals);
+  Scene scene = thin(made.scene, 0.2);
+  for (std::size_t i = 1; i < scene.channels.size(); ++i) scene.channels[i].visible = false;
+  ChannelAppearance& channel = scene.channels[0];
+  const double most = channel.rangeHi - channel.rangeLo;
+  for (const double width : {0.1, 0.01}) {
+    channel.gradientOpacity =
+        GradientOpacity{0, most, {{0.1 - width, 0}, {0.1, 1}, {0.1 + width, 0}, {1, 0}}};
+    scene.method = Method::raymarch;
+    scene.step = 0.02;
+    const Image expected = renderSamples(made.volume, scene, 4);
+    scene.step = 0;
+    const Image found = renderSamples(made.volume, scene, 1);
+    double largest = 0, seen = 0;
+    for (std::size_t i = 0; i < found.pixels.size(); ++i) {
+      largest = std::max(largest, std::abs(double(found.pixels[i].a) - double(expected.pixels[i].a)));
+      seen = std::max(seen, double(expected.pixels[i].a));
+    }
+    EXPECT_GT(seen, 1e-3);
+    // |gradient| within a cell is taken for a cubic, which it is not quite.
+    EXPECT_LT(largest, 0.05 * seen) << width;
+  }
+}
+
+TEST(Voxelwise, LosesNoRayInEmptyCells) {
+  // Blobs in empty space, met by rays close to diagonals, where several faces are met at once.
+  const glm::ivec3 dims(48, 48, 48);
+  const auto blob = [](int x, int y, int z) { return x / 8 % 2 == 0 && y / 8 % 2 == 0 && z / 8 % 2 == 0; };
+  const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, blob));
+  Scene scene = frontScene(*volume, 96, 96);
+  scene.channels[0] = solid(1e-4);
+  scene.channels[0].opacity = {{0, 0}, {1, 1}};
+  scene.method = Method::raymarch;
+  scene.step = 0;
+  for (const double away : {60.0, 200.0, 5000.0})
+    for (const glm::dvec3 from : {glm::dvec3(1, 1, 1), glm::dvec3(1, 1, 0), glm::dvec3(3, 1, 2)}) {
+      scene.camera.eye = scene.camera.target + away * from;
+      scene.camera.orthoHeight = 60;
+      const RenderStats stats = statsOf(volume, scene, Method::raymarch, 1);
+      EXPECT_EQ(stats.truncatedRays, 0u) << away << ' ' << from.y << ' ' << from.z;
+      // A ray meets at most three faces for every voxel of an edge.
+      EXPECT_LT(stats.cellSteps, stats.rays * 3 * 48);
+    }
+}
+
+}  // namespace
+}  // namespace scolopax
