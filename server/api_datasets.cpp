@@ -48,7 +48,8 @@ std::vector<Route> datasetRoutes(ApiContext& context) {
        kJson,
        {},
        [dataset](const net::Request& request) {
-         return jsonResponse(200, histogramJson(*dataset(request), queryUnsigned(request, "channel", 0)));
+         return jsonResponse(200,
+                             histogramJson(*dataset(request), int(queryUnsigned(request, "channel", 0))));
        }},
       {"GET",
        "/api/v1/datasets/{id}/gradient-histogram",

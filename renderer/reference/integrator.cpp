@@ -171,7 +171,7 @@ Integrator::Path Integrator::follow(const Ray& ray, Channels channels) const {
 }
 
 /// Adds the part [begin, end] of a stretch to the path, bisected until its error is small enough.
-void Integrator::integrate(const Rule& rule, const MediumAt& mediumAt, double stretchLength, double begin,
+void Integrator::integrate(Rule& rule, const MediumAt& mediumAt, double stretchLength, double begin,
                            double end, Path& path) const {
   if (path.opticalDepth > opaqueDepth_) return;
   const double middle = 0.5 * (begin + end);

@@ -66,7 +66,7 @@ class Integrator {
   Path follow(const Ray& ray, Channels channels) const;
   RayCells cutAtAll(const glm::dvec3& originVoxel, const glm::dvec3& directionWorld, double length) const;
   using Rule = PieceEstimate(const MediumAt&, double length);
-  void integrate(const Rule& rule, const MediumAt& mediumAt, double stretchLength, double begin, double end,
+  void integrate(Rule& rule, const MediumAt& mediumAt, double stretchLength, double begin, double end,
                  Path& path) const;
   Medium mediumAt(const Ray& ray, Channels channels, const Stretch& stretch, double u) const;
   double transmittance(const glm::dvec3& pointVoxel, const glm::dvec3& direction, double distance,
