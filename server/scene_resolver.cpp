@@ -344,9 +344,9 @@ SceneResolver::Resolved SceneResolver::resolve(json sparse, const Chosen& chosen
   checkMacrocell(render.macrocell, volume, options_.maxIntervals);
   render.step = scene.integrator.step;
   if (render.step != 0 && render.step < kLeastStep)
-    throw ProtocolError(
-        422, "/integrator/step",
-        "expected 0, or at least " + shortText(kLeastStep) + ", found " + shortText(render.step));
+    throw ProtocolError(422, "/integrator/step",
+                        "integrator.step: expected 0, or at least " + shortText(kLeastStep) + ", found " +
+                            shortText(render.step));
   render.sampling = valueOf<Sampling>(kSamplings, scene.integrator.sampling);
   render.seed = scene.integrator.seed;
   render.width = int(scene.image.width);
