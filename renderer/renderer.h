@@ -44,7 +44,9 @@ struct RenderStats {
 /// renderer chose from the scene and the data.
 struct Choice {
   Method method;
-  double step;  ///< as Scene::step; 0 for trackers, which have no step
+  /// As Scene::step; 0 for trackers, which have no step. Method::automatic may also choose parts of voxel
+  /// cells, which no scene can ask for: then the longest part.
+  double step;
   /// For Method::automatic, the corrections of the film's picture: for each level, the step of the finer of
   /// the two pictures whose difference it is (0: whole voxel cells), and how many passes it has.
   struct Correction {

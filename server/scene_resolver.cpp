@@ -12,7 +12,6 @@
 #include "protocol/problem.h"
 #include "protocol/scene_json.h"
 #include "renderer/core/error.h"
-#include "renderer/core/short_text.h"
 #include "renderer/data/clip_view.h"
 #include "renderer/data/colormap.h"
 #include "renderer/data/defaults.h"
@@ -343,10 +342,7 @@ SceneResolver::Resolved SceneResolver::resolve(json sparse, const Chosen& chosen
   render.macrocell = int(scene.integrator.macrocell);
   checkMacrocell(render.macrocell, volume, options_.maxIntervals);
   render.step = scene.integrator.step;
-  if (render.step != 0 && render.step < kLeastStep)
-    throw ProtocolError(422, "/integrator/step",
-                        "integrator.step: expected 0, or at least " + shortText(kLeastStep) + ", found " +
-                            shortText(render.step));
+  refuseAt("/integrator/step", [&] { checkStep(render.step); });
   render.sampling = valueOf<Sampling>(kSamplings, scene.integrator.sampling);
   render.seed = scene.integrator.seed;
   render.width = int(scene.image.width);

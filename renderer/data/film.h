@@ -67,8 +67,8 @@ class Film {
   /// Makes room for one more level of corrections. Throws Error(tooLarge) if the memory cannot be allocated.
   void addLevel();
   std::size_t levels() const { return corrections_.size(); }
-  /// Buffers for the two pictures whose difference is a correction: at a level's step, and at the step of the
-  /// level before. Null without levels.
+  /// Buffers for the two pictures whose difference is a correction: at a level's finer resolution, and
+  /// at its coarser one. Null without levels.
   glm::vec4* fine() { return fine_.data(); }
   glm::vec4* coarse() { return coarse_.data(); }
   /// Adds fine() - coarse() to the corrections of a level.

@@ -48,6 +48,11 @@ void checkLight(const Light& light) {
       fail("lights: colour and intensity must be finite and not negative");
 }
 
+void checkStep(double step) {
+  if (step != 0 && !(step >= kLeastStep && step <= 100))
+    fail("integrator.step: expected 0, or " + shortText(kLeastStep) + " to 100, found " + shortText(step));
+}
+
 void checkScene(const Scene& scene, const Volume& volume) {
   if (scene.channels.size() != volume.channels().size())
     fail("scene: expected " + std::to_string(volume.channels().size()) + " channels, found " +
@@ -58,8 +63,7 @@ void checkScene(const Scene& scene, const Volume& volume) {
          std::to_string(scene.lights.size()));
   for (const Light& light : scene.lights) checkLight(light);
   checkClipping(scene.clip, scene.crop, volume.channels().size());
-  if (scene.step != 0 && !(scene.step >= kLeastStep && scene.step <= 100))
-    fail("integrator.step: expected 0, or 0.01 to 100, found " + shortText(scene.step));
+  checkStep(scene.step);
   if (scene.macrocell < 1 || scene.macrocell > 64)
     fail("integrator.macrocell: expected 1 to 64, found " + std::to_string(scene.macrocell));
 }

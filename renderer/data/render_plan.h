@@ -24,6 +24,8 @@ void checkImageSize(const Scene& scene);
 /// Throws Error(badInput) for a light whose direction is zero, whose position or direction has no finite
 /// length, or whose colour or intensity is negative or not finite.
 void checkLight(const Light& light);
+/// Throws Error(badInput) for a step that Scene::step does not allow.
+void checkStep(double step);
 /// Throws Error(badInput) if RenderPlan would refuse the scene for anything but its camera and curves.
 void checkScene(const Scene& scene, const Volume& volume);
 

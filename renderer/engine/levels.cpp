@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace scolopax {
 namespace {
@@ -11,6 +10,11 @@ namespace {
 /// Pictures of few samples are seen while a scene is edited, where corrections would only delay them.
 constexpr double kFirstSamples = 4;
 constexpr double kMostSamples = 1u << 31;
+
+/// Corrections that a level should have once it has begun.
+double wanted(const Level& level, std::uint32_t samples) {
+  return std::max(level.first, std::floor(level.perSample * samples));
+}
 
 }  // namespace
 
@@ -26,24 +30,15 @@ std::vector<Level> scheduleLevels(double variance, std::span<const LevelEstimate
     const double removed = std::max(left * left - rest * rest, 1e-30);
     const double first = std::ceil(std::max(1.0, 2 * e.variance / removed));
     const double gain = std::max(removed - e.variance / first, 1e-30) / (first * e.cost);
-    // Another sample, after n of them, removes variance / n^2; another correction, after N, e.variance / N^2.
+    // Another sample, after n of them, removes variance / n^2.
+    from = std::min(std::max(from, std::ceil(std::sqrt(variance / gain))), kMostSamples);
     double perSample = e.variance > 0 ? 1 : 0;
     if (variance > 0) perSample = std::min(1.0, std::sqrt(e.variance / (variance * e.cost)));
-    const auto worth = std::uint32_t(std::min(std::ceil(std::sqrt(variance / gain)), kMostSamples));
-    from = std::min(std::max(from, double(worth)), kMostSamples);
-    levels.push_back({e, std::uint32_t(std::ceil(from)), worth, first, perSample});
+    levels.push_back({e, std::uint32_t(from), first, perSample});
     left = rest;
   }
   return levels;
 }
-
-namespace {
-/// Corrections that a level should have: as many as are best for so many samples, or as make it worthwhile.
-double wanted(const Level& level, std::uint32_t samples) {
-  const double best = std::max(1.0, std::floor(level.perSample * samples));
-  return samples >= level.worth ? std::max(level.first, best) : best;
-}
-}  // namespace
 
 bool isEnough(const Level& level, std::uint32_t corrections, std::uint32_t samples) {
   const double best = std::floor(level.perSample * samples);

@@ -20,17 +20,16 @@ struct LevelEstimate {
   Resolution fine, coarse;
   double cost;      ///< of one correction, in samples of the film
   double size;      ///< of the expected correction
-  double most;      ///< what it may be at most: some deviations above the estimate
+  double most;      ///< the same, one standard deviation above the estimate
   double variance;  ///< of one correction
 };
 
 /// When a level's corrections are rendered.
 struct Level {
   LevelEstimate estimate;
-  std::uint32_t from;   ///< number of samples at which the level begins
-  std::uint32_t worth;  ///< number of samples at which the first corrections are worth more than samples
-  double first;         ///< corrections that are better than none
-  double perSample;     ///< and those it has in all, for each sample of the film
+  std::uint32_t from;  ///< number of samples at which the level begins
+  double first;        ///< number of corrections with which it begins, so that they are better than none
+  double perSample;    ///< number of corrections in all, for each sample of the film
 };
 
 /// A schedule on which every pass goes where it reduces the squared error most for its cost. `variance` is

@@ -36,7 +36,7 @@ class Ladder {
   Ladder(Thumbnails& thumbnails, double leastStep) : leastStep_(leastStep) {
     while (next_ <= kFinestThumbnail) render(thumbnails);
     // In dense matter, halves of voxel cells may differ from whole ones, and finer parts from those as much.
-    while (next_ < kResolutions && next_ <= kFinestThumbnail + 1 && isRough()) render(thumbnails);
+    if (isRough()) render(thumbnails);
   }
 
   int size() const { return int(pictures_.size()); }

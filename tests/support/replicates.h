@@ -54,7 +54,7 @@ inline Replicates replicateLevels(const std::shared_ptr<const Volume>& volume, S
   std::vector<Level> levels;
   for (std::size_t k = 1; k < resolutions.size(); ++k)
     levels.push_back(
-        {{resolutionAt(resolutions[k]), resolutionAt(resolutions[k - 1]), 1, 0, 0, 0}, 1, 1, 1, 0.125});
+        {{resolutionAt(resolutions[k]), resolutionAt(resolutions[k - 1]), 1, 0, 0, 0}, 1, 1, 0.125});
   if (omitted) levels.erase(levels.begin() + std::ptrdiff_t(*omitted));
   const auto launcher = makeCpuLauncher(0);
   const std::atomic<bool> never = false;

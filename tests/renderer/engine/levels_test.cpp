@@ -61,7 +61,7 @@ TEST(Schedule, BeginsALevelWhenItIsWorthMoreThanSamples) {
   // With noise larger than what it removes, one correction would make the picture worse.
   const auto noisy = scheduleLevels(1e-2, secondOrder(1e-3, 1e-3));
   EXPECT_GT(noisy[0].first, 1000);
-  EXPECT_GT(noisy[0].worth, levels[0].worth);
+  EXPECT_GT(noisy[0].from, levels[0].from);
   EXPECT_FALSE(isEnough(noisy[0], 1, 4));
   EXPECT_TRUE(isEnough(noisy[0], std::uint32_t(noisy[0].first), 4));
   // But with so many samples that their noise is smaller than the level's share of it, it is not.
