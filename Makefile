@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # make run     builds the program and the page and serves DATA, or generated demo data, on loopback
 # make test    builds and runs the tests
-# make check   does more: sanitizers, clang-tidy, fuzzing, hostile clients with large volumes, four times the samples in
-#              the statistical tests and ten times the random scenes
+# make check   does more: sanitizers, clang-tidy, fuzzing, hostile clients with large volumes, and make test with four
+#              times the samples in the statistical tests and ten times the random scenes
 # make fuzz    runs every fuzzer for another FUZZ_SECONDS, on the corpus of earlier runs
 # make soak    tests SCENES more random scenes, starting where the last run ended; keeps failing ones in build/soak
 DATA ?=
@@ -22,7 +22,7 @@ SCOLOPAX := build/release/scolopax
 # Parallel recipes would run .ci/install twice at once; the tools called use all processors by themselves.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: fuzzers run build web test check check-asan-ubsan check-tsan check-tidy check-fuzz check-format check-cuda fuzz soak deps test-deps format clean
+.PHONY: fuzzers run build web test check check-hostile check-asan-ubsan check-tsan check-tidy check-fuzz check-format check-cuda fuzz soak deps test-deps format clean
 
 run: build web $(if $(strip $(DATA)),,$(DEMO))
 	exec $(SCOLOPAX) serve $(if $(strip $(DATA)),$(DATA),$(DEMO)) --port $(PORT)
@@ -44,15 +44,22 @@ test: test-deps web
 	cmake --build --preset release -j $(JOBS)
 	$(call run-tests,release,-j $(JOBS) -LE hostile)
 
-check: test check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
+# A target's variables hold for what it needs, too, unless that has its own: these are for test.
+check: export SCOLOPAX_STATISTICS := 4
+check: export SCOLOPAX_RANDOM_SCENES := 3000
+check-asan-ubsan: export SCOLOPAX_STATISTICS := 1
+check-asan-ubsan: export SCOLOPAX_RANDOM_SCENES := 20
+check: test check-hostile check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
+
+check-hostile: test-deps
+	cmake --preset release -DBUILD_TESTING=ON > /dev/null
+	cmake --build --preset release -j $(JOBS)
 	$(call run-tests,release,-L hostile)
-	SCOLOPAX_STATISTICS=4 $(call run-tests,release,-j $(JOBS) -L statistics)
-	SCOLOPAX_RANDOM_SCENES=3000 $(call run-tests,release,-j $(JOBS) -L random-scenes)
 
 check-asan-ubsan: test-deps
 	cmake --preset asan-ubsan > /dev/null
 	cmake --build --preset asan-ubsan -j $(JOBS)
-	SCOLOPAX_RANDOM_SCENES=20 $(call run-tests,asan-ubsan,-j $(JOBS) -LE 'web|statistics|hostile')
+	$(call run-tests,asan-ubsan,-j $(JOBS) -LE 'web|statistics|hostile')
 	$(call run-tests,asan-ubsan,-j $(JOBS) -L hard)
 
 # Checks the server's threads, with fake renderers: the real ones use TBB, which is not instrumented.
