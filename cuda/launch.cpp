@@ -16,6 +16,7 @@ bool isPlain(const kernel::SceneView& view) {
 const kernel::SceneView& checked(const kernel::SceneView& view) {
   if (view.voxelwise)
     throw Error(ErrorCode::unsupported, "cuda: quadrature from one face of voxel cells to the next (step 0)");
+  if (view.surfaces) throw Error(ErrorCode::unsupported, "cuda: surfaces (isovalues and peaks)");
   return view;
 }
 

@@ -47,6 +47,7 @@ struct Exclusive {
 inline constexpr std::size_t kMaxChannelItems = 32;
 inline constexpr std::size_t kMaxLightItems = 8;
 inline constexpr std::size_t kMaxClipItems = 8;
+inline constexpr std::size_t kMaxIsovalueItems = 32;
 inline constexpr std::size_t kMaxControlPoints = 4096;
 
 /// Specialised below: title, doc, exclusive pairs and the tuple of fields of one struct.
@@ -107,6 +108,19 @@ struct Table<GradientOpacity> {
 };
 
 template <>
+struct Table<Isovalue> {
+  static constexpr std::string_view title = "Isovalue";
+  static constexpr std::string_view doc = "A surface where the scalar equals a value.";
+  static constexpr auto fields = std::tuple{
+      field("value", &Isovalue::value, "The value; null is the middle of the channel's range.",
+            {.unit = "data units"}),
+      field("opacity", &Isovalue::opacity, "Share of the light from behind that the surface takes.",
+            {.atLeast = 0, .atMost = 1}),
+      field("color", &Isovalue::color, "Colour; null is the channel's at the value.", {.color = true}),
+  };
+};
+
+template <>
 struct Table<Channel> {
   static constexpr std::string_view title = "Channel";
   static constexpr std::string_view doc = "How one channel of the data set looks.";
@@ -131,6 +145,14 @@ struct Table<Channel> {
             {.maxItems = kMaxControlPoints}),
       field("gradientOpacity", &Channel::gradientOpacity,
             "Opacity by the magnitude of the gradient; null is opacity that does not depend on it."),
+      field("isovalues", &Channel::isovalues,
+            "Surfaces, drawn in every blend mode and whatever the opacity curve. Together with the peaks at "
+            "most 32.",
+            {.maxItems = kMaxIsovalueItems}),
+      field("peaks", &Channel::peaks,
+            "Surfaces at the maxima of the opacity curve, as opaque as matter there that is as thick as the "
+            "smallest voxel spacing.",
+            {.names = &Lists::peaks}),
       field("gamma", &Channel::gamma, "The position is raised to this power before both curves are read.",
             {.above = 0, .atMost = 100}),
       field("density", &Channel::density, "Extinction where opacity is 1; null is chosen from the data.",

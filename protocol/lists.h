@@ -19,6 +19,7 @@ struct Lists {
   std::vector<EnumEntry> samplings;
   std::vector<EnumEntry> colormaps;
   std::vector<EnumEntry> lightTypes;
+  std::vector<EnumEntry> peaks;
 };
 
 }  // namespace scolopax::protocol

@@ -41,6 +41,13 @@ struct GradientOpacity {
   std::vector<ControlPoint> points{{0, 0}, {1, 1}};
 };
 
+/// A surface where the scalar equals a value.
+struct Isovalue {
+  std::optional<double> value;
+  double opacity = 1;
+  std::optional<std::string> color;  ///< "#rrggbb"; none: the channel's at the value
+};
+
 struct Channel {
   std::optional<std::string> name;
   bool visible = true;
@@ -49,6 +56,8 @@ struct Channel {
   std::optional<Colormap> colormap;
   std::vector<ControlPoint> opacity{{0, 0}, {1, 1}};
   std::optional<GradientOpacity> gradientOpacity;  ///< none: opacity does not depend on the gradient
+  std::vector<Isovalue> isovalues;
+  std::string peaks = "off";
   double gamma = 1;
   std::optional<double> density;
   double weight = 1;

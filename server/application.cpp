@@ -67,6 +67,7 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
           {"samplings", named(lists.samplings)},
           {"aovs", std::move(aovs)},
           {"lightTypes", named(lists.lightTypes)},
+          {"peaks", named(lists.peaks)},
           {"colormaps", std::move(maps)},
           {"imageFormats", std::move(formats)},
           {"limits",

@@ -18,11 +18,13 @@
 #include "renderer/data/gradient_histogram.h"
 #include "renderer/data/image.h"
 #include "renderer/data/render_plan.h"
+#include "renderer/data/surfaces.h"
 #include "renderer/data/visible_hull.h"
 
 namespace scolopax::server {
 namespace {
 
+static_assert(protocol::kMaxIsovalueItems == std::size_t(kernel::kMaxSurfaces));
 static_assert(protocol::kMaxClipItems == std::size_t(kernel::kMaxClipPlanes));
 static_assert(std::tuple_size_v<decltype(protocol::Crop::regions)> == std::size_t(kernel::kCropRegions));
 
@@ -104,6 +106,14 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
     for (const auto& point : wire.opacity) look.opacity.push_back({point.position, point.value});
     look.color = wire.color ? std::vector<ColorKnot>{{0, linearOf(*wire.color)}} : knotsOf(*wire.colormap);
     look.density = *wire.density;
+    for (protocol::Isovalue& isovalue : wire.isovalues) {
+      if (!isovalue.value) isovalue.value = 0.5 * (*wire.range)[0] + 0.5 * (*wire.range)[1];
+      Isovalue& surface = look.isovalues.emplace_back(Isovalue{*isovalue.value, isovalue.opacity, {}});
+      if (isovalue.color) surface.color = linearOf(*isovalue.color);
+    }
+    look.peaks = valueOf<Peaks>(kPeaks, wire.peaks);
+    refuseAt("/channels/" + std::to_string(i),
+             [&] { Surfaces(channels[i], look, 0, volume.grid().smallestSpacing()); });
     look.weight = wire.weight;
     look.material = {wire.material.ambient, wire.material.diffuse, wire.material.specular,
                      wire.material.shininess};
@@ -225,6 +235,7 @@ protocol::Lists rendererLists() {
   lists.samplings = entries(kSamplings);
   lists.colormaps = entries(colormaps());
   lists.lightTypes = entries(kLightTypes);
+  lists.peaks = entries(kPeaks);
   return lists;
 }
 

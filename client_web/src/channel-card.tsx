@@ -4,9 +4,10 @@
 import { useState } from 'preact/hooks';
 import type { Named } from './api';
 import { CurveEditor } from './curve-editor';
-import { Row, TextControl } from './controls';
+import { Row, shortNumber, TextControl } from './controls';
 import { FieldControls } from './fields';
 import { GradientOpacity } from './gradient-opacity';
+import { linesOf, valueAtPosition } from './isovalues';
 import type { Channel } from './scene.generated';
 import type { Json } from './merge-patch';
 import { RangeEditor } from './range-editor';
@@ -112,6 +113,13 @@ export function ChannelCard({ store, index, open: openAtFirst }: { store: Store;
             histogram={histogram}
             paint={paint}
             onChange={(curve) => store.set(at('opacity'), curve as unknown as Json)}
+            lines={linesOf(channel, range, shortNumber)}
+            onMoveLine={(line, [position, opacity]) =>
+              store.set([...at('isovalues'), line], {
+                value: valueAtPosition(position, range, channel.gamma ?? 1),
+                opacity: Number(opacity.toFixed(3)),
+              })
+            }
           />
           <GradientOpacity store={store} index={index} />
           <FieldControls store={store} paths={furtherFields.map((path) => ['channels', index, ...path])} />

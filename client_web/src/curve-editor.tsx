@@ -2,7 +2,8 @@
 // Editor of a curve, such as opacity, drawn over the histogram within the range. Points are moved by dragging or
 // the arrow keys, added by a double click, Enter or Insert, and removed by a double click, Delete or Backspace.
 import { useEffect, useRef } from 'preact/hooks';
-import { addPoint, evaluate, movePoint, pointAfter, removePoint, type Curve, type Point } from './curve';
+import { addPoint, evaluate, kSteps, movePoint, pointAfter, removePoint, type Curve, type Point } from './curve';
+import { CurveLines, type CurveLine } from './curve-lines';
 import { fractionIn, followPointer } from './drag';
 import { histogramPath, type Histogram } from './histogram';
 import { shortNumber } from './controls';
@@ -16,16 +17,11 @@ interface Props {
   /** CSS background that shows the channel's colours from left to right. */
   paint: string;
   onChange(curve: Curve): void;
+  lines?: readonly CurveLine[];
+  onMoveLine?(index: number, to: Point): void;
 }
 
-const kSteps: Record<string, readonly [number, number]> = {
-  ArrowLeft: [-1, 0],
-  ArrowRight: [1, 0],
-  ArrowUp: [0, 1],
-  ArrowDown: [0, -1],
-};
-
-export function CurveEditor({ label, curve, range, histogram, paint, onChange }: Props) {
+export function CurveEditor({ label, curve, range, histogram, paint, onChange, lines = [], onMoveLine }: Props) {
   const plot = useRef<HTMLDivElement>(null);
   const handles = useRef<(HTMLDivElement | null)[]>([]);
   const focusNext = useRef<number | undefined>(undefined);
@@ -90,6 +86,7 @@ export function CurveEditor({ label, curve, range, histogram, paint, onChange }:
         {histogram && <path class="plot-bars" d={histogramPath(histogram, range[0], range[1], 100, 100)} />}
         <polyline class="curve-line" points={line} />
       </svg>
+      {onMoveLine && <CurveLines plot={plot} lines={lines} onMove={onMoveLine} />}
       {curve.map(([x, y], index) => (
         <div
           key={index}

@@ -4,6 +4,14 @@
 export type Point = readonly [number, number];
 export type Curve = readonly Point[];
 
+/** How far each arrow key moves a point, in steps. */
+export const kSteps: Record<string, Point> = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, 1],
+  ArrowDown: [0, -1],
+};
+
 const clamp = (x: number) => Math.max(0, Math.min(1, x));
 /** Four decimals: finer than a pixel of any editor, and short on the wire. */
 const round = (x: number) => Math.round(x * 1e4) / 1e4;

@@ -101,6 +101,12 @@ BoundTable buildBounds(const ValueLevels& levels, const TransferFunction& transf
   });
 }
 
+BoundTable buildPresence(const ValueLevels& levels, const Surfaces& surfaces, int column) {
+  return tableOfLevels(levels, column, [&](kernel::LevelInterval interval) {
+    return surfaces.presence(levels.decode(interval));
+  });
+}
+
 BoundTable boundsOfExtinction(const ValueLevels& levels, int column) {
   return tableOfLevels(levels, column,
                        [&](kernel::LevelInterval interval) { return levels.values[interval.hi]; });

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "renderer/core/memory_budget.h"
+#include "renderer/data/surfaces.h"
 #include "renderer/data/transfer_function.h"
 #include "renderer/kernel/majorants.h"
 
@@ -14,6 +15,9 @@ namespace scolopax {
 /// Bounds of the channel in `column` of the macrocells. Every sample x of a cell satisfies, in float,
 /// extinction(x) <= over(the cell's interval), the least upper bound over the interval's stored values.
 kernel::BoundTable buildBounds(const ValueLevels& levels, const TransferFunction& transfer, int column);
+
+/// A table that tells, for intervals of a channel in `column`, whether they may hold a surface: 1, else 0.
+kernel::BoundTable buildPresence(const ValueLevels& levels, const Surfaces& surfaces, int column);
 
 /// Bounds of a channel whose column of the macrocells holds levels of the extinction itself.
 kernel::BoundTable boundsOfExtinction(const ValueLevels& levels, int column);

@@ -45,6 +45,11 @@ namespace scolopax {
     "the first numbers of a pixel's samples are spread evenly (scrambled Sobol points): less noise") \
   X(independent, "independent", "every number is drawn on its own, as textbook error estimates assume")
 
+#define SCOLOPAX_PEAKS(X)                                                     \
+  X(off, "off", "the opacity curve is drawn, and nothing else")               \
+  X(both, "both", "surfaces at the curve's peaks are drawn beside the curve") \
+  X(only, "only", "surfaces at the curve's peaks are drawn instead of the curve")
+
 #define SCOLOPAX_AOVS(X)                                                                           \
   X(depth, "depth", "mean distance of the first collision from the eye, along the view direction") \
   X(transmittance, "transmittance", "share of the light from behind that comes through")           \
@@ -68,6 +73,7 @@ SCOLOPAX_DECLARE_ENUM(Method, SCOLOPAX_METHODS, kMethods)
 SCOLOPAX_DECLARE_ENUM(LightType, SCOLOPAX_LIGHT_TYPES, kLightTypes)
 SCOLOPAX_DECLARE_ENUM(PixelFilter, SCOLOPAX_PIXEL_FILTERS, kPixelFilters)
 SCOLOPAX_DECLARE_ENUM(Sampling, SCOLOPAX_SAMPLINGS, kSamplings)
+SCOLOPAX_DECLARE_ENUM(Peaks, SCOLOPAX_PEAKS, kPeaks)
 SCOLOPAX_DECLARE_ENUM(Aov, SCOLOPAX_AOVS, kAovs)
 
 /// Whether a method has a step, and a bias that falls with it.

@@ -21,7 +21,7 @@ static_assert(kMaxChannels <= kernel::kMaxVisibleChannels);
 /// Whether two appearances give the same voxels the same extinction, on which the bounds depend.
 bool sameExtinction(const ChannelAppearance& a, const ChannelAppearance& b) {
   return a.rangeLo == b.rangeLo && a.rangeHi == b.rangeHi && a.gamma == b.gamma && a.density == b.density &&
-         a.opacity == b.opacity && a.gradientOpacity == b.gradientOpacity;
+         a.opacity == b.opacity && a.gradientOpacity == b.gradientOpacity && a.peaks == b.peaks;
 }
 
 /// Whether both scenes make the same film. They may differ only in the background, which is added to the
@@ -156,7 +156,8 @@ bool RenderPlan::nextTakesLong(const Scene& scene) const {
 bool RenderPlan::makesSamePicture(const Scene& scene) const { return samePicture(scene_, scene); }
 
 bool RenderPlan::ChannelPlan::visible(const ChannelAppearance& appearance) const {
-  return appearance.visible && !transfer.invisible() && !(factor && factor->isEverywhere(0));
+  return appearance.visible &&
+         (surfaces.any() || (!transfer.invisible() && !(factor && factor->isEverywhere(0))));
 }
 
 /// None if the factor makes no difference.
@@ -179,10 +180,13 @@ void RenderPlan::planChannels(const RenderPlan* before, const std::shared_ptr<Me
     const Channel& channel = volume_->channels()[i];
     const ChannelAppearance& appearance = scene_.channels[i];
     std::optional<ChannelPlan>& plan = channels_.plans[i];
-    if (newCells || !sameExtinction(before->scene_.channels[i], appearance))
-      plan = {TransferFunction(channel, appearance), factorOf(channel, appearance), {}, {}};
-    else if (before->scene_.channels[i] != appearance)
-      plan->transfer = TransferFunction(channel, appearance);
+    if (newCells || before->scene_.channels[i] != appearance) {
+      TransferFunction transfer(channel, appearance);
+      if (newCells || !sameExtinction(before->scene_.channels[i], appearance))
+        plan = {transfer, {}, factorOf(channel, appearance), {}, {}};
+      plan->surfaces = Surfaces(channel, appearance, transfer.origin(), volume_->grid().smallestSpacing());
+      plan->transfer = std::move(transfer);
+    }
     if (!plan->visible(appearance)) continue;
     channels_.visible.push_back(int(i));
     if (!plan->bounds) {
@@ -210,6 +214,20 @@ std::vector<kernel::BoundTable> RenderPlan::boundTables() const {
   return tables;
 }
 
+/// Whether the macrocells may hold surfaces of the visible channels.
+std::vector<kernel::BoundTable> RenderPlan::presenceTables() const {
+  std::vector<kernel::BoundTable> tables;
+  for (const int i : channels_.visible)
+    tables.push_back(
+        buildPresence(macrocells_->levels[std::size_t(i)], channels_.plans[std::size_t(i)]->surfaces, i));
+  return tables;
+}
+
+bool RenderPlan::hasSurfaces() const {
+  return std::any_of(channels_.visible.begin(), channels_.visible.end(),
+                     [&](int i) { return channels_.plans[std::size_t(i)]->surfaces.any(); });
+}
+
 /// Whether packets need the active channels of every ray: if channels hide each other, if clipping differs
 /// between channels or regions, if voxels are not finite, or if an extinction depends on more than a value
 /// and so may be 0 at both ends of a segment but not between them.
@@ -235,12 +253,17 @@ RenderPlan::RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene,
     const ChannelPlan& plan = *channels_.plans[std::size_t(i)];
     channelViews_.push_back(plan.transfer.view(volume_->channels()[std::size_t(i)]));
     if (plan.factor) channelViews_.back().factor = plan.factor->view();
+    plan.surfaces.addTo(channelViews_.back());
   }
   const auto clip = clipView(scene_.clip, scene_.crop, volume_->grid(), channels_.visible);
   majorants_.emplace(bounded_, boundTables(), sumsExtinction(scene_.blend),
                      needsApart(clip.value_or(kernel::ClipView{})), before ? &*before->majorants_ : nullptr,
                      memory);
   rebuilt_.majorantCells = majorants_->cellsRebuilt();
+  if (hasSurfaces()) {
+    const auto* surfaceCellsBefore = before && before->surfaceCells_ ? &*before->surfaceCells_ : nullptr;
+    surfaceCells_.emplace(macrocells_, presenceTables(), false, true, surfaceCellsBefore, memory);
+  }
   fillView(rays, clip);
   rebuilt_.rebuildMs =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -263,6 +286,8 @@ void RenderPlan::fillView(const kernel::CameraRays& rays, const std::optional<ke
   view_.opaque = opacityLimit(kOpaqueTransmittance);
   view_.stratum = stratumOf(scene_.method);
   view_.majorants = majorants_->view();
+  view_.surfaces = surfaceCells_.has_value();
+  if (surfaceCells_) view_.surfaceCells = surfaceCells_->view();
 }
 
 }  // namespace scolopax

@@ -55,6 +55,7 @@ class RenderPlan {
  private:
   struct ChannelPlan {
     TransferFunction transfer;
+    Surfaces surfaces;
     std::optional<GradientFactor> factor;
     // Empty until the channel is first visible with these curves.
     std::optional<kernel::BoundTable> bounds;   // by value alone
@@ -72,6 +73,8 @@ class RenderPlan {
                     const std::stop_token& stop);
   std::optional<GradientFactor> factorOf(const Channel& channel, const ChannelAppearance& appearance) const;
   std::vector<kernel::BoundTable> boundTables() const;
+  std::vector<kernel::BoundTable> presenceTables() const;
+  bool hasSurfaces() const;
   bool needsApart(const kernel::ClipView& clip) const;
   void fillView(const kernel::CameraRays& rays, const std::optional<kernel::ClipView>& clip);
 
@@ -82,6 +85,7 @@ class RenderPlan {
   Channels channels_;
   std::shared_ptr<const MacrocellGrid> bounded_;  // macrocells with channels_.columns appended
   std::optional<MajorantGrid> majorants_;         // set by the constructor
+  std::optional<MajorantGrid> surfaceCells_;      // 1 where a macrocell may hold a surface; if there are any
   std::vector<kernel::ChannelView> channelViews_;
   kernel::SceneView view_{};
 };

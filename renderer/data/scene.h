@@ -35,6 +35,15 @@ struct GradientOpacity {
   bool operator==(const GradientOpacity&) const = default;
 };
 
+/// A surface where the scalar equals a value: between where it is at least that value and where it is below.
+/// A ray that crosses it loses the share `opacity` of its light to it.
+struct Isovalue {
+  double value;                     ///< data units
+  double opacity = 1;               ///< in [0,1], whatever the density
+  std::optional<glm::dvec3> color;  ///< linear RGB; none: that of the channel at the value
+  bool operator==(const Isovalue&) const = default;
+};
+
 /// How one channel looks. Scalar s (data units) -> clamp((s - lo) / (hi - lo), 0, 1)^gamma -> both curves,
 /// linear between knots and constant outside the first and last. Positions do not decrease; of two equal
 /// ones, the later knot applies from there on. lo > hi reverses the range; lo == hi is a step: 0 below lo, 1
@@ -49,6 +58,10 @@ struct ChannelAppearance {
   std::vector<OpacityKnot> opacity{{0, 0}, {1, 1}};
   std::vector<ColorKnot> color{{0, {1, 1, 1}}};
   std::optional<GradientOpacity> gradientOpacity{};
+  std::vector<Isovalue> isovalues{};
+  /// Whether every interior maximum of the opacity curve is a surface, with the opacity that matter of the
+  /// curve's extinction has if it is as thick as the smallest spacing. A plateau has one, in its middle.
+  Peaks peaks = Peaks::off;
   bool operator==(const ChannelAppearance&) const = default;
 };
 

@@ -49,6 +49,7 @@ TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearan
       material_{float(a.material.ambient), float(a.material.diffuse), float(a.material.specular),
                 float(a.material.shininess)} {
   opacity_ = makeCurve(a.opacity, "opacity");
+  if (a.peaks == Peaks::only) std::fill(opacity_.values.begin(), opacity_.values.end(), 0.0f);
   color_ = makeCurve(a.color, "colormap");
   optical_ = makeOpticalCurve(opacity_, color_);
   if (!(a.gamma > 0) || !(a.density >= 0) || !std::isfinite(a.rangeLo) || !std::isfinite(a.rangeHi))

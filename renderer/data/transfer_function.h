@@ -16,8 +16,10 @@ class TransferFunction {
   kernel::ChannelView view(const Channel& channel) const;
   /// Least upper bound, in float, of the kernels' extinction over an interval of stored values.
   float majorant(ValueInterval interval) const;
-  /// True when no value has any extinction: the channel need not be in the plan.
+  /// True when no value has any extinction.
   bool invisible() const;
+  /// Of the view.
+  float origin() const { return placement_.origin; }
 
  private:
   /// A view of placement, gamma and density alone.

@@ -56,6 +56,9 @@ std::vector<glm::vec3> visibleHull(const Volume& volume, const MacrocellGrid& ce
     if (!channels[i].visible) continue;
     const TransferFunction transfer(volume.channels()[i], channels[i]);
     if (!transfer.invisible()) tables.push_back(buildBounds(cells.levels[i], transfer, int(i)));
+    const Surfaces surfaces(volume.channels()[i], channels[i], transfer.origin(),
+                            volume.grid().smallestSpacing());
+    if (surfaces.any()) tables.push_back(buildPresence(cells.levels[i], surfaces, int(i)));
   }
   if (tables.empty()) return {};
   const std::vector<Stretch> rows = visibleRows(cells, tables);

@@ -3,6 +3,7 @@
 // tracker its expected value is the exact picture, whatever the lighting.
 #pragma once
 #include "renderer/kernel/shade.h"
+#include "renderer/kernel/surfaces.h"
 
 namespace scolopax::kernel {
 
@@ -36,10 +37,25 @@ SCOLOPAX_HD std::optional<Collision> trackAlone(const View& scene, int n, const 
   });
 }
 
-/// Whether a shadow ray has a collision; in separate blend modes, with the channel that cast it.
+/// The surface of one of `channels` (bit n: visible channel n) at which a ray ends if it has no collision
+/// before.
+template <class View>
+SCOLOPAX_HD std::optional<SurfaceHit<One>> endingSurface(const View& scene, const Ray& ray,
+                                                         const Interval& inside, std::uint32_t channels,
+                                                         const SurfaceStart<One>& start, Sampler& sampler,
+                                                         SampleCost* cost) {
+  if (!scene.hasSurfaces()) [[likely]]
+    return std::nullopt;
+  return endAtSurface(scene, ray, inside, channels, start, uniformOf(sampler.next().x), cost);
+}
+
+/// Whether a shadow ray has a collision or ends at a surface; in separate blend modes, of the channel that
+/// cast it. `start`: the surface at which it begins.
 template <class Tracker, class Blend, class View>
-SCOLOPAX_HD bool isBlocked(const View& scene, const Ray& ray, Interval inside, int channel, Sampler& sampler,
-                           SampleCost* cost) {
+SCOLOPAX_HD bool isBlocked(const View& scene, const Ray& ray, Interval inside, int channel,
+                           const SurfaceStart<One>& start, Sampler& sampler, SampleCost* cost) {
+  const std::uint32_t channels = Blend::kSeparate ? 1u << channel : ~0u;
+  if (endingSurface(scene, ray, inside, channels, start, sampler, cost)) return true;
   if constexpr (Blend::kSeparate) {
     return trackAlone<Blend>(scene, channel, ray, inside, sampler, cost).has_value();
   } else {
@@ -48,22 +64,27 @@ SCOLOPAX_HD bool isBlocked(const View& scene, const Ray& ray, Interval inside, i
 }
 
 /// The lit colour at a collision: that of its channel or, in mix, of all channels, each lit with its own
-/// material before it is weighted (Eq. 10).
+/// material before it is weighted (Eq. 10). If the ray ends at `surface` instead, which may be null, the lit
+/// colour of that.
 template <class Tracker, class Blend, class Features, class View>
-SCOLOPAX_HD glm::vec3 radiance(const View& scene, const Ray& ray, const Collision& hit, Sampler& sampler,
-                               SampleCost* cost) {
+SCOLOPAX_HD glm::vec3 radiance(const View& scene, const Ray& ray, const Collision& hit,
+                               const SurfaceHit<One>* surface, Sampler& sampler, SampleCost* cost) {
+  const bool onSurface = surface != nullptr;
   const LitPoint<One> at{ray, hit.place.t(), insideOf<One>(scene.clip, hit.point)};
   Visibility<One> visibility;
   if constexpr (Features::kAny)
     visibility = visibilityAt<Features>(scene, at, true, [&](const Ray& shadowRay, Interval part) {
-      return isBlocked<Tracker, Blend>(scene, shadowRay, part, hit.channel, sampler, cost) ? 0.0f : 1.0f;
+      const SurfaceStart<One> start = onSurface ? surface->surface : SurfaceStart<One>{};
+      return isBlocked<Tracker, Blend>(scene, shadowRay, part, hit.channel, start, sampler, cost) ? 0.0f
+                                                                                                  : 1.0f;
     });
   const auto show = [&](const ChannelView& channel, float position) {
-    const glm::vec3 color = evaluate(channel.color, position);
-    if constexpr (Features::kAny) return lit<Features>(scene, channel, color, at, visibility, true, cost);
+    const glm::vec3 color = onSurface ? surface->color : evaluate(channel.color, position);
+    if constexpr (Features::kAny)
+      return lit<Features>(scene, channel, color, at, visibility, true, onSurface, cost);
     return color;
   };
-  if constexpr (Blend::kMixes) {
+  if (Blend::kMixes && !onSurface) {
     glm::vec3 sum(0.0f);
     float largest = 0.0f;
     const std::uint32_t left =
@@ -83,29 +104,45 @@ SCOLOPAX_HD glm::vec3 radiance(const View& scene, const Ray& ray, const Collisio
 
 template <class Tracker>
 struct Analog {
-  /// Linear premultiplied RGBA of one sample along a ray. If there is a collision and `first` is not null,
-  /// sets `first` to it.
+  /// Linear premultiplied RGBA of one sample along a ray. If it ends at a collision or surface and `first` is
+  /// not null, sets `first` to it.
   template <class Blend, class Features, class View>
   SCOLOPAX_HD static glm::vec4 sample(const View& scene, const Ray& ray, Interval inside, Sampler& sampler,
                                       SampleCost* cost, FirstCollision* first) {
+    const auto follow = [&](std::uint32_t channels, auto&& track, glm::vec4* sum) {
+      const auto surface = endingSurface(scene, ray, inside, channels, {}, sampler, cost);
+      Interval before = inside;
+      if (surface) [[unlikely]]
+        before.exit = minimum(before.exit, surface->t);
+      std::optional<Collision> hit = track(before);
+      const SurfaceHit<One>* ending = nullptr;
+      if (!hit) {
+        if (!surface) [[likely]]
+          return;
+        ending = &*surface;
+        hit = Collision{
+            {surface->t, 0.0f}, ray.origin + surface->t * ray.direction, surface->surface.channel, 0.0f};
+      }
+      if (first) keepNearer(first, {hit->place.t(), hit->channel});
+      const glm::vec3 color = radiance<Tracker, Blend, Features>(scene, ray, *hit, ending, sampler, cost);
+      *sum = glm::vec4(glm::vec3(*sum) + color, 1.0f);
+    };
+    glm::vec4 sum(0.0f);
     if constexpr (Blend::kSeparate) {
       // Channels draw independent numbers, so 1 - prod(1 - hit_n) has the expected value 1 - prod(1 -
       // alpha_n).
-      glm::vec4 sum(0.0f);
-      for (int n = 0; n < scene.channelCount; ++n) {
-        const auto hit = trackAlone<Blend>(scene, n, ray, inside, sampler, cost);
-        if (!hit) continue;
-        if (first) keepNearer(first, {hit->place.t(), n});
-        sum = glm::vec4(glm::vec3(sum) + radiance<Tracker, Blend, Features>(scene, ray, *hit, sampler, cost),
-                        1.0f);
-      }
-      return sum;
+      for (int n = 0; n < scene.channelCount; ++n)
+        follow(
+            1u << n,
+            [&](const Interval& before) { return trackAlone<Blend>(scene, n, ray, before, sampler, cost); },
+            &sum);
     } else {
-      const auto hit = trackAll<Tracker, Blend>(scene, ray, inside, sampler, cost);
-      if (!hit) return glm::vec4(0.0f);
-      if (first) *first = {hit->place.t(), hit->channel};
-      return glm::vec4(radiance<Tracker, Blend, Features>(scene, ray, *hit, sampler, cost), 1.0f);
+      follow(
+          ~0u,
+          [&](const Interval& before) { return trackAll<Tracker, Blend>(scene, ray, before, sampler, cost); },
+          &sum);
     }
+    return sum;
   }
 };
 

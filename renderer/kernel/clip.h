@@ -125,8 +125,11 @@ class Spans {
 
   /// Returns the next span of every ray in `wants`. It is empty for other rays, where none of the channels is
   /// kept, and at the end.
-  SCOLOPAX_LANES IntervalOf<L> next(Mask wants) {
+  SCOLOPAX_LANES IntervalOf<L> next(Mask wants) { return next(wants, Float(kInfinity)); }
+  /// The same, with spans that end at `limit` at the latest.
+  SCOLOPAX_LANES IntervalOf<L> next(Mask wants, Float limit) {
     IntervalOf<L> span = rest_;
+    span.exit = minimum(span.exit, maximum(span.enter, limit));
     Mask some = wants;
     if (clip_.parts) {
       for (int axis = 0; axis < 3; ++axis)

@@ -17,6 +17,11 @@ struct Cubic {
   SCOLOPAX_LANES Float slopeAt(Float y) const { return c1 + y * (2.0f * c2 + y * (3.0f * c3)); }
 };
 
+template <class L>
+SCOLOPAX_LANES Cubic<L> select(typename L::Mask m, const Cubic<L>& a, const Cubic<L>& b) {
+  return {select(m, a.c0, b.c0), select(m, a.c1, b.c1), select(m, a.c2, b.c2), select(m, a.c3, b.c3)};
+}
+
 /// Where a cubic is sampled: inside the interval, as the voxels at its ends belong to two cells.
 inline constexpr int kCubicNodes = 4;
 inline constexpr float kCubicNode[kCubicNodes] = {-0.75f, -0.25f, 0.25f, 0.75f};

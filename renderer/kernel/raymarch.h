@@ -57,6 +57,58 @@ SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const Scal
              channel);
 }
 
+/// What is known of rays when they meet surfaces.
+template <class L>
+struct Marched {
+  typename L::Float transmittance;
+  typename L::Float opacity;  ///< of surfaces
+  typename L::Vec color;      ///< what they have added
+  typename L::Mask open;      ///< rays that a tracker would have followed up to here
+};
+
+/// Adds the surfaces that rays meet up to `reached`. A tracker's ray would end where the opacity of surfaces
+/// passes `end`; `offset` is the jitter of shadow rays.
+template <class Features, class Steps, class L, class Blend, class View>
+SCOLOPAX_LANES_RARE void meetSurfaces(const View& scene, const Blend& blend, const RayOf<L>& ray,
+                                      std::uint32_t channels, const typename L::Float& reached,
+                                      const typename L::Float& end, const typename L::Float& offset,
+                                      SurfacesAhead<L>& ahead, Marched<L>& light, CostOf<L>* cost,
+                                      FirstCollisionOf<L>* first) {
+  using Float = typename L::Float;
+  using Word = typename L::Word;
+  using Mask = typename L::Mask;
+  using Vec = typename L::Vec;
+  [[maybe_unused]] StratumPlaces<L> places;
+  for (;;) {
+    const SurfaceHit<L>& hit = ahead.hit();
+    const Mask met =
+        (hit.t < kInfinity) & (hit.t <= reached) & (light.transmittance > scene.opaque.transmittance);
+    if (!any(met)) return;
+    Vec radiance = hit.color;
+    if constexpr (Features::kAny) {
+      places.t = hit.t;
+      places.offset = offset;
+      places.kept = Word(0u);
+      for (int n = 0; n < scene.channelCount; ++n) {
+        const Mask here = met & (hit.surface.channel == typename L::Int(n));
+        if (!any(here)) continue;
+        places.kept = places.kept | where(here, Word(1u << n));
+        places.share[n] = Float(1.0f);
+        places.color[n] = hit.color;
+      }
+      findLight<Features, Steps, L>(scene, blend, ray, channels, places, hit.surface, met, cost, &radiance);
+    }
+    const Float absorbedHere = where(met, light.transmittance * hit.opacity);
+    light.color = light.color + radiance * absorbedHere;
+    light.opacity = light.opacity + absorbedHere;
+    light.transmittance = select(met, light.transmittance * (1.0f - hit.opacity), light.transmittance);
+    const Mask ends = light.open & met & (light.opacity > end);
+    light.open = without(light.open, ends);
+    if (first) keepNearer<L>(first, ends, hit.t, hit.surface.channel);
+    ahead.advance(met);
+  }
+}
+
 /// Marches rays through `channels` (bit n: visible channel n). `set` keeps the random numbers of several such
 /// marches apart.
 template <class Features, class Steps, class L, class Blend, class View>
@@ -75,6 +127,12 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
   // A tracker's ray would end where the opacity passes this number.
   const Float end = uniformOf(random.y);
   Mask open = meets;
+  SurfacesAhead<L> ahead;
+  const bool hasSurfaces = scene.hasSurfaces();
+  Float solid(0.0f);     // opacity of surfaces; that of matter is apart, because it is lit in strata
+  Vec ofSurfaces(0.0f);  // and so is what they add to the colour
+  if (hasSurfaces) [[unlikely]]
+    ahead.begin(scene, ray, inside, channels, cost);
   using OfStrata = Strata<Features, Steps, L, Blend, View>;
   [[maybe_unused]] typename OfStrata::Memory memory;
   [[maybe_unused]] OfStrata strata(memory, scene, blend, ray, channels, set, ofStrata, cost);
@@ -83,7 +141,8 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
   Segment<L> segment;
   Spans<L> spans(scene, ray, inside, channels);
   for (bool last = false; !last;) {
-    const auto span = spans.next(transmittance > scene.opaque.transmittance);
+    const auto span = spans.next(transmittance > scene.opaque.transmittance,
+                                 hasSurfaces ? ahead.hit().t : Float(kInfinity));
     typename Steps::template Cuts<L, View> along(scalars, scene, ray, span, channels, uniformOf(random.x),
                                                  scene.step, cost);
     for (bool more = true; more;) {
@@ -104,10 +163,10 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
         emission = emission * where(some, absorbedHere / extinction);
         if constexpr (!Features::kAny) color = color + emission;
         if (first) [[unlikely]]
-          if (const Mask met = open & some & (opacity > end); any(met)) {
+          if (const Mask met = open & some & (opacity + solid > end); any(met)) {
             open = without(open, met);
             // A copy, so that the segment itself need not be in memory.
-            SegmentCollision<L> collision{segment, extinction, (end - before) / absorbedHere, met};
+            SegmentCollision<L> collision{segment, extinction, (end - (before + solid)) / absorbedHere, met};
             meet<L>(scene, blend, scalars, hidden, collision, first);
           }
       } else if (more) {
@@ -117,8 +176,18 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
       if constexpr (Features::kAny)
         strata.absorb(before, opacity, last, segment, extinction, emission, color);
     }
+    if (hasSurfaces) [[unlikely]] {
+      // A copy, so that the ray's light itself need not be in memory.
+      Marched<L> marched{transmittance, solid, ofSurfaces, open};
+      meetSurfaces<Features, Steps, L>(scene, blend, ray, channels, span.exit, end - opacity,
+                                       uniformOf(random.z), ahead, marched, cost, first);
+      transmittance = marched.transmittance;
+      solid = marched.opacity;
+      ofSurfaces = marched.color;
+      open = marched.open;
+    }
   }
-  return {color, minimum(opacity, 1.0f)};
+  return {color + ofSurfaces, minimum(opacity + solid, 1.0f)};
 }
 
 template <class Steps>

@@ -84,11 +84,12 @@ SCOLOPAX_LANES Visibility<L> visibilityAt(const SceneView& scene, const LitPoint
 
 /// L = c [(1-s) A + s (ka + kd sum I V max(n.l, 0))] + s ks sum I V max(n.h, 0)^p. Shading fades with the
 /// magnitude g of the gradient, by s = 1 - (1-g)^2 (Kniss et al. 2002, 6.3). A dims unshaded matter in
-/// shadow.
+/// shadow. For rays in `onSurface`, s = 1 where there is a gradient.
 template <class Features, class L>
 SCOLOPAX_LANES typename L::Vec lit(const SceneView& scene, const ChannelView& channel,
                                    const typename L::Vec& color, const LitPoint<L>& hit,
-                                   const Visibility<L>& visibility, typename L::Mask which, CostOf<L>* cost) {
+                                   const Visibility<L>& visibility, typename L::Mask which,
+                                   typename L::Mask onSurface, CostOf<L>* cost) {
   using Float = typename L::Float;
   using Mask = typename L::Mask;
   using Vec = typename L::Vec;
@@ -110,7 +111,7 @@ SCOLOPAX_LANES typename L::Vec lit(const SceneView& scene, const ChannelView& ch
   const Vec scaled(gradient[0] / largest, gradient[1] / largest, gradient[2] / largest);
   const Float length = squareRoot(dot(scaled, scaled));
   const Float g = minimum(1.0f, largest * channel.inverseRange * length);
-  const Float s = 1.0f - (1.0f - g) * (1.0f - g);
+  const Float s = select(onSurface, Float(1.0f), 1.0f - (1.0f - g) * (1.0f - g));
   shaded = shaded & (s > 0.0f);
   if (!any(shaded)) return unshaded;
   const Vec toViewer = normalize(-toWorld<L>(scene, hit.ray.direction));

@@ -6,6 +6,7 @@
 #include "renderer/kernel/rng.h"
 #include "renderer/kernel/segment_parts.h"
 #include "renderer/kernel/shade.h"
+#include "renderer/kernel/surfaces.h"
 
 namespace scolopax::kernel {
 
@@ -13,12 +14,18 @@ namespace scolopax::kernel {
 /// light, which varies less.
 inline constexpr float kShadowSteps = 2.0f;
 
-/// Transmittance of shadow rays through the channels in `channels` (bit n: visible channel n).
+/// Transmittance of shadow rays through the channels in `channels` (bit n: visible channel n) and their
+/// surfaces. `start`: the surface at which the rays begin.
 template <class L, class Steps, class Blend, class View>
 SCOLOPAX_LANES typename L::Float marchTransmittance(const View& scene, const Blend& blend,
-                                                    const RayOf<L>& ray, const IntervalOf<L>& inside,
+                                                    const RayOf<L>& ray, IntervalOf<L> inside,
                                                     std::uint32_t channels, typename L::Float offset,
-                                                    CostOf<L>* cost) {
+                                                    const SurfaceStart<L>& start, CostOf<L>* cost) {
+  typename L::Float ofSurfaces(1.0f);
+  if (scene.hasSurfaces()) [[unlikely]] {
+    passSurfaces<L>(scene, ray, inside, channels, start, scene.opaque.transmittance, cost, &ofSurfaces);
+    inside.exit = select(ofSurfaces > scene.opaque.transmittance, inside.exit, inside.enter);
+  }
   typename Steps::template Scalars<L, View> scalars;
   Hidden<L, Blend::kSums> hidden;
   Segment<L> segment;
@@ -33,7 +40,7 @@ SCOLOPAX_LANES typename L::Float marchTransmittance(const View& scene, const Ble
                                                      [](int, const PartOf<L>&) SCOLOPAX_LANES_LAMBDA {}) *
                           segment.length();
   } while (!spans.done(depth < scene.opaque.depth));
-  return 1.0f - absorbed(depth);
+  return ofSurfaces * (1.0f - absorbed(depth));
 }
 
 /// Place, in [0,1], up to which a segment of optical depth `depth` absorbs the share `share` of all that it
@@ -62,29 +69,33 @@ struct StratumPlaces {
   typename L::Vec color[kMaxVisibleChannels];
 };
 
-/// Lit radiance of a unit of absorbed light at such points, for lanes in `which`.
+/// Computes the lit radiance of a unit of absorbed light at such points, for lanes in `which`. `surface`: on
+/// which they lie, if they do.
 template <class Features, class Steps, class L, class Blend, class View>
-SCOLOPAX_LANES typename L::Vec lightOf(const View& scene, const Blend& blend, const RayOf<L>& ray,
-                                       std::uint32_t channels, const StratumPlaces<L>& places,
-                                       typename L::Mask which, CostOf<L>* cost) {
+SCOLOPAX_LANES_APART void findLight(const View& scene, const Blend& blend, const RayOf<L>& ray,
+                                    std::uint32_t channels, const StratumPlaces<L>& places,
+                                    const SurfaceStart<L>& surface, const typename L::Mask& which,
+                                    CostOf<L>* cost, typename L::Vec* radiance) {
   using Word = typename L::Word;
   using Vec = typename L::Vec;
   const LitPoint<L> hit{ray, places.t, insideOf<L>(scene.clip, ray.origin + places.t * ray.direction)};
 
   const Visibility<L> visibility = visibilityAt<Features>(
       scene, hit, which, [&](const RayOf<L>& shadow, const IntervalOf<L>& part) SCOLOPAX_LANES_LAMBDA {
-        return marchTransmittance<L, Steps>(scene, blend, shadow, part, channels, places.offset, cost);
+        return marchTransmittance<L, Steps>(scene, blend, shadow, part, channels, places.offset, surface,
+                                            cost);
       });
+  const typename L::Mask onSurface = surface.channel > typename L::Int(-1);
   Vec sum(0.0f);
   for (int n = 0; n < scene.channelCount; ++n) {
     const Word bit(1u << n);
     const typename L::Mask here = which & ((places.kept & bit) == bit);
     if (!any(here)) continue;
-    const Vec light = places.share[n] *
-                      lit<Features>(scene, scene.channels[n], places.color[n], hit, visibility, here, cost);
+    const Vec light = places.share[n] * lit<Features>(scene, scene.channels[n], places.color[n], hit,
+                                                      visibility, here, onSurface, cost);
     sum = select(here, sum + light, sum);
   }
-  return sum;
+  *radiance = sum;
 }
 
 /// A stratum whose point has been lit.
@@ -274,10 +285,11 @@ class Strata {
     places.radiance = radiance_;
     places.emission = emission_;
     if constexpr (L::kLanes == 1) {
-      if (which)
-        sum_.add({lightOf<Features, Steps, L>(scene_, blend_, ray_, channels_, places, which, cost_),
-                  radiance_, emission_, mass},
-                 color);
+      if (which) {
+        Vec lit;
+        findLight<Features, Steps, L>(scene_, blend_, ray_, channels_, places, {}, which, cost_, &lit);
+        sum_.add({lit, radiance_, emission_, mass}, color);
+      }
     } else {
       for (unsigned left = bitsOf(which); left != 0; left &= left - 1) {
         if (count_ == L::kLanes) shine();
@@ -312,8 +324,9 @@ class Strata {
       rays.direction[axis] = permuted(ray_.direction[axis], ray);
     }
     CostOf<L> spent{};
-    const Vec sum = lightOf<Features, Steps, L>(scene_, blend_, rays, channels_, waiting.places,
-                                                Int(count_) > L::laneNumbers(), &spent);
+    Vec sum;
+    findLight<Features, Steps, L>(scene_, blend_, rays, channels_, waiting.places, {},
+                                  Int(count_) > L::laneNumbers(), &spent, &sum);
     for (int i = 0; i < count_; ++i) {
       const int to = at(ray, i);
       const Mask lane = L::laneNumbers() == Int(to);

@@ -89,6 +89,15 @@ struct GradientFactorView {
   glm::mat3 fromVoxel;          ///< as SceneView::gradientFromVoxel
 };
 
+/// A surface of a channel.
+struct SurfaceView {
+  float
+      value;  ///< stored value less the channel's origin, negated where data values fall as stored ones rise
+  float opacity;    ///< in (0,1]
+  glm::vec3 color;  ///< linear RGB
+};
+inline constexpr int kMaxSurfaces = 32;  ///< of a channel
+
 /// One channel: where its voxels are and how a stored value becomes extinction and colour.
 struct ChannelView {
   const void* voxels;  ///< voxels of this channel, interleaved with others of its type
@@ -105,6 +114,9 @@ struct ChannelView {
   float inverseRange;  ///< 1 / |hi - lo| of the channel's range, in stored values
   bool finite;         ///< whether all voxels are finite
   GradientFactorView factor;
+  const SurfaceView* surfaces;
+  int surfaceCount;
+  bool dataFalls;  ///< data values fall as stored values rise
 };
 
 /// Matter behind this much is not marched.
@@ -122,7 +134,9 @@ struct SceneView {
   int channelCount;
   const ChannelView* channels;
   MajorantView majorants;
-  float step;           ///< step of quadrature, world units
+  bool surfaces;              ///< some channel has surfaces
+  MajorantView surfaceCells;  ///< the macrocells that may have one; only if there are surfaces
+  float step;                 ///< step of quadrature, world units
   bool voxelwise;       ///< quadrature also cuts rays at the faces of voxel cells, and integrates exactly in
                         ///< between
   OpacityLimit opaque;  ///< where marched rays end
@@ -137,6 +151,14 @@ struct SceneView {
   static constexpr int kFactors = kMaxVisibleChannels;  ///< channels that may have one: length of arrays
   /// Whether the opacity of channel n depends on the gradient.
   SCOLOPAX_HD bool hasFactor(int n) const { return channels[n].factor.curve.count != 0; }
+  /// Kernels for devices are compiled without surfaces.
+  SCOLOPAX_HD bool hasSurfaces() const {
+#if defined(__CUDA_ARCH__)
+    return false;
+#else
+    return surfaces;
+#endif
+  }
 };
 
 /// A scene in which no opacity depends on the gradient. Kernels of this view are compiled without the code

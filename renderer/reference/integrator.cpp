@@ -18,6 +18,7 @@ namespace scolopax::reference {
 namespace {
 
 constexpr double kShadowError = 0.02;  // share of the tolerance, for the light that arrives
+constexpr double kSamePlace = 1e-9;    // smallest spacings within which two surfaces coincide
 
 /// The channels at a point, blended.
 struct Blended {
@@ -68,6 +69,10 @@ struct Integrator::Path {
     error += transmittance * pieceError;
     opticalDepth += piece.opticalDepth;
   }
+  void addSurface(double opacity, const glm::dvec3& radiance) {
+    color += std::exp(-opticalDepth) * opacity * radiance;
+    opticalDepth -= std::log1p(-opacity);
+  }
 };
 
 Integrator::Integrator(const Volume& volume, const Scene& scene, double tolerance)
@@ -94,18 +99,25 @@ Integrator::Integrator(const Volume& volume, const Scene& scene, double toleranc
     if (!std::isfinite(appearance.weight) || appearance.weight < 0)
       throw Error(ErrorCode::badInput, "reference: a weight must be finite and not negative");
     ChannelCurves curves(appearance);
-    if (!curves.visible()) continue;
     std::optional<GradientFactor> factor;
-    if (appearance.gradientOpacity) {
+    if (appearance.gradientOpacity)
       factor.emplace(*appearance.gradientOpacity, glm::transpose(voxelFromWorld_));
-      if (!factor->visible()) continue;
+    const std::vector<Surface> surfaces = surfacesOf(appearance, curves, smallestSpacing_);
+    double brightest = curves.brightest();
+    for (const Surface& s : surfaces) brightest = std::max({brightest, s.color.x, s.color.y, s.color.z});
+    if (appearance.peaks == Peaks::only || (factor && !factor->visible())) {
+      ChannelAppearance surfacesAlone = appearance;
+      for (OpacityKnot& knot : surfacesAlone.opacity) knot.value = 0;
+      curves = ChannelCurves(surfacesAlone);
+      factor.reset();
     }
-    const double radiance = lighting_.brightest(appearance.material, curves.brightest());
+    if (!curves.visible() && surfaces.empty()) continue;
+    const double radiance = lighting_.brightest(appearance.material, brightest);
     brightest_ =
         blend_ == BlendMode::mix ? brightest_ + appearance.weight * radiance : std::max(brightest_, radiance);
     channels_.push_back({int(n), ScalarField(volume.channels()[n], dims_), std::move(curves),
                          appearance.weight, appearance.gamma != 1 || factor, appearance.material,
-                         std::abs(appearance.rangeHi - appearance.rangeLo), std::move(factor)});
+                         std::abs(appearance.rangeHi - appearance.rangeLo), std::move(factor), surfaces});
   }
 }
 
@@ -137,11 +149,20 @@ RayCells Integrator::cutAtAll(const glm::dvec3& originVoxel, const glm::dvec3& d
 
 /// Integrates the given channels along a ray.
 Integrator::Path Integrator::follow(const Ray& ray, Channels channels) const {
-  const RayCells cells =
+  RayCells cells =
       cutAtAll(voxelFromWorld_ * ray.origin, ray.direction, std::numeric_limits<double>::infinity());
+  const std::vector<Crossing> crossings = crossingsOf(cells, dims_, clipping_, channels);
+  for (const Crossing& crossing : crossings) cells.cuts.push_back(crossing.t);
+  std::sort(cells.cuts.begin(), cells.cuts.end());
   Path path;
+  std::size_t met = 0;  // crossings behind
+  const auto meetUpTo = [&](double t) {
+    for (; met < crossings.size() && crossings[met].t <= t && path.opticalDepth <= opaqueDepth_; ++met)
+      meet(ray, cells, crossings[met], channels, path);
+  };
   forEachSmoothPart(cells, dims_, clipping_, blend_, channels,
                     [&](const Stretch& stretch, double begin, double end) {
+                      meetUpTo(stretch.start);
                       const auto medium = [&](double u) { return mediumAt(ray, channels, stretch, u); };
                       if (lighting_.any()) {
                         const std::vector<double> cuts = lightCuts_.of(stretch, begin, end, ray.direction);
@@ -163,11 +184,37 @@ Integrator::Path Integrator::follow(const Ray& ray, Channels channels) const {
                       }
                       return path.opticalDepth <= opaqueDepth_;
                     });
+  meetUpTo(std::numeric_limits<double>::infinity());
   if (path.opticalDepth > opaqueDepth_)  // what lies behind adds at most this
     path.error += std::exp(-path.opticalDepth) * std::max(1.0, brightest_);
   if (lighting_.shadows())
     path.error -= kShadowError * tolerance_ * brightest_ * std::expm1(-path.opticalDepth);
   return path;
+}
+
+/// Adds a surface to the path.
+void Integrator::meet(const Ray& ray, const RayCells& cells, const Crossing& crossing, Channels channels,
+                      Path& path) const {
+  const ActiveChannel& channel = *crossing.channel;
+  glm::dvec3 radiance = crossing.surface->color;
+  if (lighting_.any()) {
+    const glm::dvec3 point = cells.origin + crossing.t * cells.direction;
+    glm::dvec3 gradient(0);
+    if (lighting_.shading()) gradient = glm::transpose(voxelFromWorld_) * channel.field.gradient(point);
+    radiance = lighting_.radiance(channel.material, radiance, gradient, gradient == glm::dvec3(0) ? 0 : 1,
+                                  -ray.direction, lightsAt(point, true, ray.origin, channels));
+  }
+  path.addSurface(crossing.surface->opacity, radiance);
+}
+
+/// The lights as they arrive at a point.
+std::vector<ArrivingLight> Integrator::lightsAt(const glm::dvec3& pointVoxel, bool onSurface,
+                                                const glm::dvec3& eye, Channels channels) const {
+  std::vector<ArrivingLight> lights = lighting_.arriving(worldFromVoxel_ * pointVoxel, eye);
+  if (lighting_.shadows())
+    for (ArrivingLight& light : lights)
+      light.visibility = transmittance(pointVoxel, onSurface, light.direction, light.distance, channels);
+  return lights;
 }
 
 /// Adds the part [begin, end] of a stretch to the path, bisected until its error is small enough.
@@ -203,10 +250,7 @@ Medium Integrator::mediumAt(const Ray& ray, Channels channels, const Stretch& st
   }
   if (!(medium.extinction > 0)) return medium;
   const glm::dvec3 pointVoxel = stretch.point(u);
-  std::vector<ArrivingLight> lights = lighting_.arriving(worldFromVoxel_ * pointVoxel, ray.origin);
-  if (lighting_.shadows())
-    for (ArrivingLight& light : lights)
-      light.visibility = transmittance(pointVoxel, light.direction, light.distance, channels);
+  const std::vector<ArrivingLight> lights = lightsAt(pointVoxel, false, ray.origin, channels);
   for (std::size_t n = 0; n < stretch.channels.size(); ++n) {
     if (!(blend.share[n] > 0)) continue;
     const ActiveChannel& channel = *stretch.channels[n].channel;
@@ -220,11 +264,17 @@ Medium Integrator::mediumAt(const Ray& ray, Channels channels, const Stretch& st
   return medium;
 }
 
-/// Transmittance of the given channels between a point and a light.
-double Integrator::transmittance(const glm::dvec3& pointVoxel, const glm::dvec3& direction, double distance,
-                                 Channels channels) const {
+/// Transmittance of the given channels between a point and a light. `onSurface`: the point lies on a surface,
+/// which does not shadow it.
+double Integrator::transmittance(const glm::dvec3& pointVoxel, bool onSurface, const glm::dvec3& direction,
+                                 double distance, Channels channels) const {
   if (!(distance > 0)) return 1;
   const RayCells cells = cutAtAll(pointVoxel, direction, distance);
+  double passes = 1;
+  for (const Crossing& crossing : crossingsOf(cells, dims_, clipping_, channels))
+    if (!onSurface || crossing.t > cells.cuts.front() + kSamePlace * smallestSpacing_)
+      passes *= 1 - crossing.surface->opacity;
+  if (passes == 0) return 0;
   // A third of kShadowError each: for cutting off the darkness, for the absolute errors of all cells on the
   // way, and for the relative error of the whole depth.
   const double dark = -std::log(kShadowError / 3 * tolerance_);
@@ -235,7 +285,7 @@ double Integrator::transmittance(const glm::dvec3& pointVoxel, const glm::dvec3&
                       depth += opticalDepth(stretch, begin, end, allowed * (end - begin));
                       return depth <= dark;
                     });
-  return depth <= dark ? std::exp(-depth) : 0.0;
+  return depth <= dark ? passes * std::exp(-depth) : 0.0;
 }
 
 /// Optical depth of a part of a stretch.

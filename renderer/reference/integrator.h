@@ -10,6 +10,7 @@
 
 #include "renderer/data/scene.h"
 #include "renderer/data/volume.h"
+#include "renderer/reference/crossings.h"
 #include "renderer/reference/light_cuts.h"
 #include "renderer/reference/lighting.h"
 #include "renderer/reference/piece_rules.h"
@@ -36,6 +37,9 @@ struct RayResult {
 /// the gradient has a kink or a jump (FactorAlong), and, in max and mix, where the largest extinction passes
 /// from one channel to another. Without light, no feature is narrower than the resulting pieces, and each is
 /// bisected until two Gauss rules agree.
+///
+/// Where a ray crosses a surface, it loses the share of its light that is the surface's opacity, in every
+/// blend mode. A surface is lit as matter is whose gradient is steep.
 ///
 /// With shading, the ray is also cut where a normal flips, where n.l or n.h passes zero, where a fade
 /// saturates, and wherever a highlight would be narrower than a piece (LightCuts). Edges of shadows are left
@@ -64,13 +68,17 @@ class Integrator {
   };
   struct Path;
   Path follow(const Ray& ray, Channels channels) const;
+  void meet(const Ray& ray, const RayCells& cells, const Crossing& crossing, Channels channels,
+            Path& path) const;
   RayCells cutAtAll(const glm::dvec3& originVoxel, const glm::dvec3& directionWorld, double length) const;
   using Rule = PieceEstimate(const MediumAt&, double length);
   void integrate(Rule& rule, const MediumAt& mediumAt, double stretchLength, double begin, double end,
                  Path& path) const;
   Medium mediumAt(const Ray& ray, Channels channels, const Stretch& stretch, double u) const;
-  double transmittance(const glm::dvec3& pointVoxel, const glm::dvec3& direction, double distance,
-                       Channels channels) const;
+  std::vector<ArrivingLight> lightsAt(const glm::dvec3& pointVoxel, bool onSurface, const glm::dvec3& eye,
+                                      Channels channels) const;
+  double transmittance(const glm::dvec3& pointVoxel, bool onSurface, const glm::dvec3& direction,
+                       double distance, Channels channels) const;
   double opticalDepth(const Stretch& stretch, double begin, double end, double allowed) const;
 
   glm::ivec3 dims_;

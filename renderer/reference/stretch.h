@@ -15,6 +15,7 @@
 #include "renderer/reference/gradient_factor.h"
 #include "renderer/reference/ray_cells.h"
 #include "renderer/reference/scalar_field.h"
+#include "renderer/reference/surfaces.h"
 
 namespace scolopax::reference {
 
@@ -28,6 +29,7 @@ struct ActiveChannel {
   Material material;
   double range;                            ///< |hi - lo|, data units
   std::optional<GradientFactor> factor{};  ///< of the opacity
+  std::vector<Surface> surfaces{};
 };
 
 /// A channel along a stretch, and the piece of its curves that applies.
@@ -43,8 +45,18 @@ struct ChannelInCell {
   }
 };
 
+/// The part of a ray between two neighbouring cuts, and the cell of eight voxels in which it lies. In the
+/// outer half voxels, where values are clamped to the edge, that is the outermost cell.
+struct CellOnRay {
+  CellOnRay(const RayCells& ray, double begin, double end, const glm::ivec3& dims);
+  glm::dvec3 middle;      ///< voxel coordinates
+  glm::dvec3 cell;        ///< its first voxel
+  glm::dvec3 begin, end;  ///< in the cell's coordinates, [0,1]^3
+};
+
 /// One cell's stretch of a ray, u in [0,1].
 struct Stretch {
+  double start = 0;                     ///< t of u = 0
   double length = 0;                    ///< world units
   glm::dvec3 begin{0}, end{0};          ///< voxel coordinates
   std::vector<ChannelInCell> channels;  ///< those that are finite, not clipped and not of factor 0 here

@@ -34,7 +34,8 @@ void tryPatch(std::string_view sceneText, std::string_view patchText) try {
                                       .filters = {{"box", ""}},
                                       .samplings = {{"independent", ""}},
                                       .colormaps = {{"gray", ""}},
-                                      .lightTypes = {{"headlight", ""}}};
+                                      .lightTypes = {{"headlight", ""}},
+                                      .peaks = {{"off", ""}}};
   const nlohmann::json scene = protocol::parseJson(sceneText);
   protocol::parseScene(scene, kLists);
   const nlohmann::json sparse = protocol::applyPatch(nlohmann::json::object(), scene, kChannels);

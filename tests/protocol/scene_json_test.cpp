@@ -69,6 +69,7 @@ TEST(ParseScene, ReadsEveryField) {
     "channels": [{"name": "T1", "visible": false, "range": [10, -2.5], "color": "#Ff8000",
                   "opacity": [[0, 0], [0.5, 0], [0.5, 1]], "gamma": 2, "density": 0, "weight": 0.5,
                   "gradientOpacity": {"range": [3, 0.5], "points": [[0.25, 1], [0.75, 0]]},
+                  "isovalues": [{"value": -2, "opacity": 0.5, "color": "#00ff80"}], "peaks": "only",
                   "material": {"ambient": 0, "diffuse": 1, "specular": 0.5, "shininess": 8}},
                  {"colormap": "fire"}, {"colormap": [[0, "#000000"], [1, "#ffffff"]]}],
     "clip": [{"point": [1, 2, 3], "normal": [0, 1, 0], "media": [2, 0]}],
@@ -93,6 +94,10 @@ TEST(ParseScene, ReadsEveryField) {
   EXPECT_EQ(scene.channels[0].gradientOpacity.value().range, (std::array<double, 2>{3, 0.5}));
   EXPECT_EQ(scene.channels[0].gradientOpacity->points.at(1).position, 0.75);
   EXPECT_EQ(scene.channels[0].gradientOpacity->points.at(0).value, 1);
+  EXPECT_EQ(scene.channels[0].isovalues.at(0).value, -2);
+  EXPECT_EQ(scene.channels[0].isovalues[0].opacity, 0.5);
+  EXPECT_EQ(scene.channels[0].isovalues[0].color, "#00ff80");
+  EXPECT_EQ(scene.channels[0].peaks, "only");
   EXPECT_EQ(scene.channels[0].gamma, 2);
   EXPECT_EQ(scene.channels[0].density, 0.0);
   EXPECT_EQ(std::get<std::string>(*scene.channels[1].colormap), "fire");
@@ -114,6 +119,8 @@ TEST(ParseScene, ReadsEveryField) {
   expected["channels"][1].update(
       {{"visible", true},
        {"opacity", {{0, 0}, {1, 1}}},
+       {"isovalues", json::array()},
+       {"peaks", "off"},
        {"gamma", 1},
        {"weight", 1},
        {"material", {{"ambient", 0.3}, {"diffuse", 0.7}, {"specular", 0.2}, {"shininess", 20}}}});

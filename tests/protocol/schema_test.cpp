@@ -80,7 +80,7 @@ TEST(Schema, GivesEveryFieldADescriptionAndADefaultThatIsTaken) {
     EXPECT_TRUE(isTaken(path, field["default"]));
     ++fields;
   });
-  EXPECT_EQ(fields, 42);
+  EXPECT_EQ(fields, 44);
 }
 
 TEST(Schema, SaysOfAnObjectThatMayBeNullWhatItIsAndThatNullIsTheDefault) {

@@ -31,11 +31,17 @@ inline glm::dvec4 largestSample(const Scene& scene) {
   for (const ChannelAppearance& a : scene.channels) {
     glm::dvec3 color(0);
     for (const ColorKnot& knot : a.color) color = glm::max(color, knot.color);
-    glm::dvec3 shown = color;
-    if (scene.shading)
-      shown = color * glm::max(glm::dvec3(1), a.material.ambient + a.material.diffuse * light) +
-              a.material.specular * light;
+    glm::dvec3 ofSurfaces = a.peaks == Peaks::off ? glm::dvec3(0) : color;
+    for (const Isovalue& isovalue : a.isovalues)
+      ofSurfaces = glm::max(ofSurfaces, isovalue.color.value_or(color));
+    const auto lit = [&](const glm::dvec3& c) {
+      if (!scene.shading) return c;
+      return c * glm::max(glm::dvec3(1), a.material.ambient + a.material.diffuse * light) +
+             a.material.specular * light;
+    };
+    glm::dvec3 shown = lit(color);
     if (scene.blend == BlendMode::mix) shown *= a.weight;
+    shown = glm::max(shown, ofSurfaces == glm::dvec3(0) ? ofSurfaces : lit(ofSurfaces));
     largest = glm::max(largest, shown);
     sum += shown;
   }

@@ -98,7 +98,7 @@ struct LitAtPlacesApart {
         [&](const kernel::Ray& way, kernel::Interval part) { return track(way, part) ? 0.0f : 1.0f; });
     const kernel::ChannelView& channel = scene.channels[hit->channel];
     return glm::vec4(kernel::lit<Features>(scene, channel, kernel::evaluate(channel.color, hit->position),
-                                           place(*hit), visibility, true, cost),
+                                           place(*hit), visibility, true, false, cost),
                      1);
   }
 };

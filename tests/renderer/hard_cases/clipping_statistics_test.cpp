@@ -165,7 +165,9 @@ TEST(Clipping, LeavesNoLightThroughWhatLiesAlongAFace) {
       double sum = 0;
       for (int row = 0; row < 8; ++row)  // except the column that the light reaches
         for (int column = 1; column < 7; ++column) sum += picture.pixels[std::size_t(8 * row + column)].r;
-      EXPECT_EQ(sum, 0) << nameOf(method) << " face " << kind;
+      // The transmittance of quadrature is 1 - (1 - exp(-depth)), in float.
+      EXPECT_LE(sum, hasStep(method) || method == Method::automatic ? 48 * 0x1p-24 : 0)
+          << nameOf(method) << " face " << kind;
     }
 }
 

@@ -38,6 +38,7 @@ class Marcher {
         for (const auto voxel : channel.voxels.template as<decltype(zero)>())
           matter.values.push_back(channel.slope * double(voxel) + channel.intercept);
       });
+      matter.findSurfaces(smallest_);
       matters_.push_back(std::move(matter));
     }
     lights_ = scene.lights;
@@ -48,12 +49,13 @@ class Marcher {
       density_ += m.look->density;
       dvec3 color(0);
       for (const ColorKnot& knot : m.look->color) color = glm::max(color, knot.color);
+      for (const Matter::Surface& surface : m.surfaces) color = glm::max(color, surface.color);
       dvec3 shown = color;
       const Material& k = m.look->material;
       if (scene.shadows) shown = color * std::fmax(1, k.ambient);
       if (scene.shading)
         shown = glm::max(shown, color * (k.ambient + k.diffuse * light)) + k.specular * light;
-      if (scene.blend == BlendMode::mix) shown *= m.look->weight;
+      if (scene.blend == BlendMode::mix) shown *= std::fmax(1, m.look->weight);
       for (int c = 0; c < 3; ++c) radiance_ = std::fmax(radiance_, shown[c]);
     }
     radiance_ = std::fmax(radiance_, 1);
@@ -149,8 +151,9 @@ class Marcher {
       if (isThere) {
         const double position = m.position(c.value);
         decisions->note(std::uint64_t((position > 0) + (position >= 1)));
-        c.extinction = m.look->density * Matter::curve(m.look->opacity, position, decisions,
-                                                       [](const OpacityKnot& k) { return k.value; });
+        if (m.look->peaks != Peaks::only)
+          c.extinction = m.look->density * Matter::curve(m.look->opacity, position, decisions,
+                                                         [](const OpacityKnot& k) { return k.value; });
         if (c.extinction > 0) c.extinction *= m.factor(p, glm::transpose(voxelFromWorld_), decisions);
         c.color =
             Matter::curve(m.look->color, position, decisions, [](const ColorKnot& k) { return k.color; });
@@ -172,18 +175,46 @@ class Marcher {
     return mixture;
   }
 
-  /// Transmittance along a ray in voxel space.
-  double transmittance(const dvec3& p, const dvec3& direction, double length, const Matters& matters,
-                       double* error) const {
+  /// On which side of every surface a point is.
+  std::vector<Side> sidesAt(const dvec3& p, const Matters& matters, Decisions* decisions) const {
+    std::vector<Side> sides;
+    for (const Matter& m : matters) {
+      if (m.surfaces.empty()) continue;
+      const double value = m.at(p);
+      const bool isThere = std::isfinite(value) && isLeft(m.number, p);
+      for (const Matter::Surface& surface : m.surfaces)
+        sides.push_back(!isThere ? Side::neither : value >= surface.value ? Side::above : Side::below);
+    }
+    for (const Side side : sides) decisions->note(std::uint64_t(side));
+    return sides;
+  }
+  /// Surface number k of these.
+  static std::pair<const Matter*, const Matter::Surface*> surface(const Matters& matters, std::size_t k) {
+    for (const Matter& m : matters) {
+      if (k < m.surfaces.size()) return {&m, &m.surfaces[k]};
+      k -= m.surfaces.size();
+    }
+    return {};
+  }
+
+  /// Transmittance along a ray in voxel space. A surface at which it begins does not count.
+  double transmittance(const dvec3& p, bool onSurface, const dvec3& direction, double length,
+                       const Matters& matters, double* error) const {
     double begin, end;
     if (!clip(p, direction, length, &begin, &end)) return 1;
+    if (onSurface) begin += 1e-5 * stepOf(direction, 1);
+    const auto surfaceAt = [&](std::size_t k, double) {
+      return Stretch{1 - surface(matters, k).second->opacity, dvec3(0)};
+    };
     const auto sampleAt = [&](double t) {
       Decisions decisions;
       const double extinction = mixtureAt(p + t * direction, matters, &decisions).extinction;
-      return PointSample{extinction, dvec3(0), decisions.hash()};
+      std::vector<Side> sides = sidesAt(p + t * direction, matters, &decisions);
+      return PointSample{extinction, dvec3(0), decisions.hash(), std::move(sides)};
     };
     const auto decisionsAt = [&](double t) { return sampleAt(t).decisions; };
-    SteppedMarch march(sampleAt, decisionsAt, {stepOf(direction, 12), 1e-7, density_, 1, kMostShadowSamples});
+    SteppedMarch march(sampleAt, decisionsAt, surfaceAt,
+                       {stepOf(direction, 12), 1e-7, density_, 1, kMostShadowSamples});
     marchCells(p, direction, begin, end, march);
     *error = std::fmax(*error, march.error());
     return march.result().transmittance;
@@ -193,8 +224,8 @@ class Marcher {
     dvec3 direction, intensity;  // towards the light
     double visible = 1;
   };
-  std::vector<Arriving> lightsAt(const dvec3& p, const dvec3& eye, const Matters& matters, bool look,
-                                 double* error) const {
+  std::vector<Arriving> lightsAt(const dvec3& p, bool onSurface, const dvec3& eye, const Matters& matters,
+                                 bool look, double* error) const {
     std::vector<Arriving> arriving;
     const dvec3 world(grid_.worldFromVoxel * glm::dvec4(p, 1));
     for (const Light& light : lights_) {
@@ -206,13 +237,13 @@ class Marcher {
         a.direction = unit(way);
       }
       if (scene_.shadows && look && distance > 0 && a.intensity != dvec3(0))
-        a.visible = transmittance(p, voxelFromWorld_ * a.direction, distance, matters, error);
+        a.visible = transmittance(p, onSurface, voxelFromWorld_ * a.direction, distance, matters, error);
       arriving.push_back(a);
     }
     return arriving;
   }
 
-  dvec3 shown(const Matter& m, const Classified& c, const dvec3& p, const dvec3& viewer,
+  dvec3 shown(const Matter& m, const dvec3& color, bool onSurface, const dvec3& p, const dvec3& viewer,
               const std::vector<Arriving>& lights, Decisions* decisions) const {
     const Material& k = m.look->material;
     dvec3 all(0), seen(0), a(1);
@@ -223,12 +254,12 @@ class Marcher {
     if (scene_.shadows)
       for (int i = 0; i < 3; ++i)
         if (all[i] > 0) a[i] = k.ambient + (1 - k.ambient) * seen[i] / all[i];
-    if (!scene_.shading) return c.color * a;
+    if (!scene_.shading) return color * a;
     const dvec3 gradient = glm::transpose(voxelFromWorld_) * m.gradient(p).value_or(dvec3(0));
     const double steepness = glm::length(gradient) * smallest_;
     decisions->note(steepness > 0);
-    if (!(steepness > 0)) return c.color * a;
-    const double g = std::fmin(1, steepness / std::abs(m.look->rangeHi - m.look->rangeLo));
+    if (!(steepness > 0)) return color * a;
+    const double g = onSurface ? 1 : std::fmin(1, steepness / std::abs(m.look->rangeHi - m.look->rangeLo));
     const double s = 1 - (1 - g) * (1 - g);
     decisions->note(g < 1);
     dvec3 n = unit(gradient);
@@ -242,7 +273,7 @@ class Marcher {
       diffuse += l.visible * l.intensity * std::fmax(nl, 0);
       specular += l.visible * l.intensity * std::pow(std::fmax(nh, 0), k.shininess);
     }
-    return c.color * ((1 - s) * a + s * (k.ambient + k.diffuse * diffuse)) + s * k.specular * specular;
+    return color * ((1 - s) * a + s * (k.ambient + k.diffuse * diffuse)) + s * k.specular * specular;
   }
 
   /// Length of a step of 1/n of a voxel.
@@ -274,13 +305,14 @@ class Marcher {
       PointSample result{mixture.extinction, dvec3(0), 0};
       if (mixture.extinction > 0) {
         std::vector<Arriving> lights;
-        if (lit) lights = lightsAt(p, eye, matters, look, &shadowError);
+        if (lit) lights = lightsAt(p, false, eye, matters, look, &shadowError);
         for (std::size_t n = 0; n < matters.size(); ++n)
           if (mixture.share[n] > 0)
-            result.radiance += mixture.share[n] *
-                               (lit ? shown(matters[n], mixture.parts[n], p, -direction, lights, &decisions)
-                                    : mixture.parts[n].color);
+            result.radiance += mixture.share[n] * (lit ? shown(matters[n], mixture.parts[n].color, false, p,
+                                                               -direction, lights, &decisions)
+                                                       : mixture.parts[n].color);
       }
+      result.sides = sidesAt(p, matters, &decisions);
       result.decisions = decisions.hash();
       return result;
     };
@@ -289,7 +321,17 @@ class Marcher {
     const int perVoxel = scene_.shadows ? 16 : lit ? 64 : 300;
     const StepRules rules{stepOf(way, perVoxel), lit ? 1e-6 : 1e-9, density_, radiance_,
                           scene_.shadows ? kMostLitSamples : kMostSamples};
-    SteppedMarch march(sampleAt, decisionsAt, rules);
+    const auto surfaceAt = [&](std::size_t k, double t) {
+      const auto [matter, met] = surface(matters, k);
+      const dvec3 p = origin + t * way;
+      Decisions decisions;
+      dvec3 color = met->color;
+      if (lit)
+        color = shown(*matter, color, true, p, -direction,
+                      lightsAt(p, true, eye, matters, true, &shadowError), &decisions);
+      return Stretch{1 - met->opacity, met->opacity * color};
+    };
+    SteppedMarch march(sampleAt, decisionsAt, surfaceAt, rules);
     marchCells(origin, way, begin, end, march);
     const Stretch& result = march.result();
     return {glm::dvec4(result.light, 1 - result.transmittance),

@@ -96,6 +96,36 @@ TEST(DirectMarch, CastsShadowsOfTheMatterBeforeIt) {
   EXPECT_LT(found.error, 1e-3);
 }
 
+// A plane of opacity 0.4 in the middle of matter, and one of opacity 0.5 at the same place.
+TEST(DirectMarch, MeetsSurfacesInMatter) {
+  const glm::ivec3 dims(1, 1, 5);
+  Drawing d = drawing(channelOf<float>(dims, [](int, int, int z) { return z; }), dims);
+  d.scene.channels[0] = solid(0.3, {0, 1, 0});
+  d.scene.channels[0].isovalues = {{1.75, 0.4, glm::dvec3(1, 0, 0)}, {1.75, 0.5, glm::dvec3(0, 0, 1)}};
+  const Marched found = directMarch(d.source, d.scene, 0, 0);
+  const double before = std::exp(-0.3 * 2.25), all = std::exp(-0.3 * 5);
+  EXPECT_NEAR(found.rgba.r, before * 0.4, found.error + 1e-9);
+  EXPECT_NEAR(found.rgba.g, 1 - before + 0.3 * (before - all), found.error + 1e-9);
+  EXPECT_NEAR(found.rgba.b, before * 0.6 * 0.5, found.error + 1e-9);
+  EXPECT_NEAR(found.rgba.a, 1 - 0.3 * all, found.error + 1e-9);
+  EXPECT_LT(found.error, 1e-6);
+}
+
+// The light comes from behind through the second surface, which takes half of it; n.l is 1 on the other side.
+TEST(DirectMarch, ShadowsSurfacesButNotByThemselves) {
+  const glm::ivec3 dims(1, 1, 7);
+  Drawing d = drawing(channelOf<float>(dims, [](int, int, int z) { return z; }), dims);
+  d.scene.channels[0].opacity = {{0, 0}};
+  d.scene.channels[0].material = {0, 1, 0, 1};
+  d.scene.channels[0].isovalues = {{2, 0.25, glm::dvec3(1, 0, 0)}, {4, 0.5, glm::dvec3(0, 1, 0)}};
+  d.scene.shadows = true;
+  d.scene.lights = {{LightType::directional, {0, 0, -1}}};
+  const Marched found = directMarch(d.source, d.scene, 0, 0);
+  EXPECT_NEAR(found.rgba.r, 0.25 * 0.5, 1e-6);
+  EXPECT_NEAR(found.rgba.g, 0.75 * 0.5, 1e-6);
+  EXPECT_LT(found.error, 1e-6);
+}
+
 // Shaded matter with a rotating normal: a march of 20,000 equal steps gives .22801.
 TEST(DirectMarch, ShadesNormalsThatTurnAlongTheRay) {
   const glm::ivec3 dims(2, 2, 2);

@@ -106,11 +106,14 @@ double largestSample(const Scene& scene) {
     if (!a.visible) continue;
     glm::dvec3 color(0);
     for (const ColorKnot& knot : a.color) color = glm::max(color, knot.color);
+    for (const Isovalue& isovalue : a.isovalues) color = glm::max(color, isovalue.color.value_or(color));
     const Material& m = a.material;
     glm::dvec3 shown = color;
     if (scene.shadows) shown = color * std::max(1.0, m.ambient);
     if (scene.shading) shown = glm::max(shown, color * (m.ambient + m.diffuse * light)) + m.specular * light;
-    if (scene.blend == BlendMode::mix) shown *= a.weight;
+    // Surfaces are not weighted.
+    if (scene.blend == BlendMode::mix)
+      shown *= a.isovalues.empty() && a.peaks == Peaks::off ? a.weight : std::max(1.0, a.weight);
     const double most = std::max({shown.x, shown.y, shown.z});
     largest = std::max(largest, most);
     sum += most;

@@ -10,11 +10,15 @@
 
 namespace scolopax::random_scenes {
 
+/// Where a point is as to a surface. At `neither` the field has no value.
+enum class Side : std::uint8_t { below, above, neither };
+
 /// The field at a point of a ray, and a hash of all decisions in its computation.
 struct PointSample {
   double extinction = 0;   ///< per world unit
   glm::dvec3 radiance{0};  ///< of a collision there
   std::uint64_t decisions = 0;
+  std::vector<Side> sides{};  ///< on which the point is of every surface
 };
 
 /// A stretch of the ray, seen from its start.
@@ -37,12 +41,14 @@ struct StepRules {
   int most;                ///< number of samples after which no step is halved any more
 };
 
-/// sampleAt(t) gives the PointSample, decisionsAt(t) only its hash.
-template <class SampleAt, class DecisionsAt>
+/// sampleAt(t) gives the PointSample, decisionsAt(t) only its hash, surfaceAt(k, t) what surface number k
+/// does where it is crossed at t.
+template <class SampleAt, class DecisionsAt, class SurfaceAt>
 class SteppedMarch {
  public:
-  SteppedMarch(const SampleAt& sampleAt, const DecisionsAt& decisionsAt, const StepRules& rules)
-      : sampleAt_(sampleAt), decisionsAt_(decisionsAt), rules_(rules) {}
+  SteppedMarch(const SampleAt& sampleAt, const DecisionsAt& decisionsAt, const SurfaceAt& surfaceAt,
+               const StepRules& rules)
+      : sampleAt_(sampleAt), decisionsAt_(decisionsAt), surfaceAt_(surfaceAt), rules_(rules) {}
 
   /// Marches the next stretch of the ray. Stretches must follow each other and end where the field has a
   /// kink.
@@ -73,6 +79,15 @@ class SteppedMarch {
     return {front.transmittance * back.transmittance, front.light + front.transmittance * back.light};
   }
 
+  /// Adds the surfaces between the last sample and this one, at t. Samples lie inside cells, so that a value
+  /// that is only touched at a face is not seen.
+  void cross(const PointSample& sample, double t) {
+    for (std::size_t k = 0; k < sample.sides.size() && k < sides_.size(); ++k)
+      if (sides_[k] != sample.sides[k] && sides_[k] != Side::neither && sample.sides[k] != Side::neither)
+        all_ = joined(all_, surfaceAt_(k, t));
+    sides_ = sample.sides;
+  }
+
   void extend(const PointSample& sample, double length) {
     if (runs_.empty() || runs_.back().decisions != sample.decisions)
       runs_.push_back({sample.decisions, 0, 0});
@@ -97,10 +112,15 @@ class SteppedMarch {
     const bool thin = std::max({left.extinction, middle.extinction, right.extinction}) * 2 * half <= kThin;
     const bool enough = change <= rules_.tolerance && most <= rules_.tolerance && thin;
     samples_ += 2;
-    if (enough || samples_ > rules_.most || depth == kMaxDepth || !(a < m && m < b)) {
-      all_ = joined(all_, fine);
-      extend(middle, 2 * half);
+    const bool crosses = !alike && !middle.sides.empty();  // perhaps: surfaces are found to the last bit
+    if ((enough && !crosses) || samples_ > rules_.most || depth == kMaxDepth || !(a < m && m < b)) {
       error_ += enough ? change : std::max(change, most);
+      if (crosses && a < m && m < b && depth < kMaxDepth) error_ += all_.transmittance;  // it may be anywhere
+      cross(left, 0.5 * (a + m));
+      all_ = joined(all_, slab(left, half));
+      cross(right, 0.5 * (m + b));
+      all_ = joined(all_, slab(right, half));
+      extend(middle, 2 * half);
       return;
     }
     step(a, m, before, middle.decisions, left, depth + 1);
@@ -110,7 +130,9 @@ class SteppedMarch {
 
   const SampleAt& sampleAt_;
   const DecisionsAt& decisionsAt_;
+  const SurfaceAt& surfaceAt_;
   StepRules rules_;
+  std::vector<Side> sides_;  // of the last sample
   Stretch all_;
   std::vector<Run> runs_;
   double error_ = 0;

@@ -10,6 +10,7 @@
 #include <glm/vec3.hpp>
 #include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "renderer/data/scene.h"
@@ -33,6 +34,12 @@ struct Matter {
   glm::ivec3 dims;
   const ChannelAppearance* look;
 
+  /// A surface: where the value is, what share of the light it takes, and its colour.
+  struct Surface {
+    double value, opacity;
+    glm::dvec3 color;
+  };
+  std::vector<Surface> surfaces{};
   double voxel(int i, int j, int k) const { return values[std::size_t(i + dims.x * (j + dims.y * k))]; }
   static double mean(double a, double b, double w) { return w == 1 ? b : a + w * (b - a); }
 
@@ -112,6 +119,51 @@ struct Matter {
     const double position = share(glm::length(g), by.rangeLo, by.rangeHi);
     decisions->note(std::uint64_t((position > 0) + (position >= 1)));
     return curve(by.factor, position, decisions, [](const OpacityKnot& k) { return k.value; });
+  }
+
+  void findSurfaces(double smallestSpacing) {
+    const auto colorAt = [&](double p) {
+      Decisions decisions;
+      return curve(look->color, p, &decisions, [](const ColorKnot& k) { return k.color; });
+    };
+    for (const Isovalue& i : look->isovalues)
+      surfaces.push_back({i.value, i.opacity, i.color ? *i.color : colorAt(position(i.value))});
+    if (look->peaks == Peaks::off || look->rangeLo == look->rangeHi) return;
+    // A maximum is a value that the curve takes over an interval (or at a point) before and behind which it
+    // is smaller.
+    const auto& knots = look->opacity;
+    const auto before = [&](double p) {  // limit from the left
+      std::size_t next = 0;
+      while (next < knots.size() && knots[next].position < p) ++next;
+      if (next == knots.size()) return knots.back().value;
+      if (next == 0 || knots[next].position == p) return knots[next].value;
+      const auto &a = knots[next - 1], &b = knots[next];
+      return a.value + (b.value - a.value) * ((p - a.position) / (b.position - a.position));
+    };
+    const auto behind = [&](double p) {  // and from the right
+      Decisions decisions;
+      return curve(knots, p, &decisions, [](const OpacityKnot& k) { return k.value; });
+    };
+    std::vector<double> at;
+    for (const OpacityKnot& knot : knots)
+      if (at.empty() || at.back() != knot.position) at.push_back(knot.position);
+    std::vector<std::pair<double, double>> seen;  // positions and limits, from the left and from the right
+    for (const double p : at) {
+      seen.emplace_back(p, before(p));
+      seen.emplace_back(p, behind(p));
+    }
+    for (std::size_t i = 0; i < seen.size();) {
+      std::size_t j = i;
+      while (j + 1 < seen.size() && seen[j + 1].second == seen[i].second) ++j;
+      const bool rises = i > 0 && seen[i - 1].second < seen[i].second;
+      const bool falls = j + 1 < seen.size() && seen[j + 1].second < seen[i].second;
+      const double middle = 0.5 * (seen[i].first + seen[j].first), size = look->rangeHi - look->rangeLo;
+      if (rises && falls && middle > 0 && middle < 1)
+        surfaces.push_back({look->rangeLo + std::pow(middle, 1 / look->gamma) * size,
+                            1 - std::exp(-seen[i].second * look->density * smallestSpacing),
+                            colorAt(middle)});
+      i = j + 1;
+    }
   }
 };
 

@@ -91,6 +91,34 @@ json drawGradientOpacity(Draw& draw, const Surroundings& around) {
   return {{"gradientOpacity", opacity}};
 }
 
+/// Data values of the channel's finite voxels.
+std::vector<double> valuesOf(const ChannelSource& channel) {
+  std::vector<double> values;
+  visitScalarType(channel.voxels.type(), [&](auto zero) {
+    for (const auto voxel : channel.voxels.as<decltype(zero)>())
+      if (std::isfinite(double(voxel))) values.push_back(channel.slope * double(voxel) + channel.intercept);
+  });
+  return values;
+}
+
+/// Values between the voxels' and exactly at them, and some beyond.
+json drawIsovalues(Draw& draw, const Surroundings& around) {
+  const std::vector<double> values = valuesOf(*around.channel);
+  if (values.empty() || draw.chance(0.75)) return json::object();
+  const auto [lo, hi] = std::minmax_element(values.begin(), values.end());
+  json list = json::array();
+  for (int left = draw.integer(1, 3); left > 0; --left) {
+    json one = json::object();
+    if (!draw.chance(0.05))
+      one["value"] = draw.chance(0.3) ? draw.oneOf(values) : draw.between(1.05 * *lo - 0.05 * *hi, *hi);
+    if (!draw.chance(0.2)) one["opacity"] = draw.chance(0.2) ? double(draw.integer(0, 1)) : draw.uniform();
+    if (draw.chance(0.5)) one["color"] = draw.hexColor();
+    if (!list.empty() && draw.chance(0.1)) one = list[0];
+    list.push_back(one);
+  }
+  return {{"isovalues", list}};
+}
+
 json drawColor(Draw& draw, const Surroundings&) {
   if (draw.chance(0.05)) return json::object();
   if (draw.chance(0.4)) return {{"color", draw.hexColor()}};
@@ -102,12 +130,7 @@ json drawColor(Draw& draw, const Surroundings&) {
 
 json drawRange(Draw& draw, const Surroundings& around) {
   double lo = std::numeric_limits<double>::infinity(), hi = -lo;
-  std::vector<double> values;
-  visitScalarType(around.channel->voxels.type(), [&](auto zero) {
-    for (const auto voxel : around.channel->voxels.as<decltype(zero)>())
-      if (std::isfinite(double(voxel)))
-        values.push_back(around.channel->slope * double(voxel) + around.channel->intercept);
-  });
+  const std::vector<double> values = valuesOf(*around.channel);
   if (values.empty() || draw.chance(0.1)) return json::object();
   for (const double value : values) lo = std::min(lo, value), hi = std::max(hi, value);
   const int kind = draw.integer(0, 19);
@@ -162,6 +185,11 @@ const Field kChannelFields[] = {
                  {"shininess", d.decades(0.5, 200)}}}};
      }},
     {"gradientOpacity", drawGradientOpacity},
+    {"isovalues", drawIsovalues},
+    {"peaks",
+     [](Draw& d, const Surroundings&) -> json {
+       return d.chance(0.8) ? json::object() : json{{"peaks", nameFrom(d, kPeaks)}};
+     }},
 };
 
 const Field kLightFields[] = {
@@ -376,6 +404,11 @@ std::string describe(const RandomScene& drawn) {
   const auto graded = std::count_if(s.channels.begin(), s.channels.end(),
                                     [](const ChannelAppearance& c) { return c.gradientOpacity.has_value(); });
   if (graded > 0) text << ", opacity by the gradient of " << graded;
+  std::size_t surfaces = 0;
+  for (const ChannelAppearance& c : s.channels) surfaces += c.isovalues.size();
+  if (surfaces > 0) text << ", " << surfaces << " isovalues";
+  for (const ChannelAppearance& c : s.channels)
+    if (c.peaks != Peaks::off) text << ", peaks " << nameOf(c.peaks);
   text << (s.camera.orthoHeight ? ", orthographic" : ", perspective") << ", " << s.width << "x" << s.height
        << " " << nameOf(s.filter) << ", macrocell " << s.macrocell << ", step " << s.step << ", "
        << nameOf(s.sampling) << ", thickness";

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// Walks one ray per lane from voxel cell to voxel cell, and samples channels on the part of the rays in a
+// cell, where every scalar is a cubic.
+#pragma once
+#include "renderer/kernel/cubic.h"
+#include "renderer/kernel/point_walk.h"
+#include "renderer/kernel/segments.h"
+
+namespace scolopax::kernel {
+
+/// Visits the voxel cells along rays, front to back, except those in empty macrocells. Cells longer than a
+/// given length are visited in parts.
+template <class L>
+class VoxelWalk {
+ public:
+  using Float = typename L::Float;
+  using Int = typename L::Int;
+  using Word = typename L::Word;
+  using Mask = typename L::Mask;
+
+  /// `macrocells`: those of `channels` (bit n: visible channel n) tell which are empty. Parts are at most
+  /// `longest` long, in world units.
+  SCOLOPAX_LANES VoxelWalk(const SceneView& scene, const MajorantView& macrocells, const RayOf<L>& rays,
+                           const IntervalOf<L>& inside, Word channels, float longest, CostOf<L>* cost)
+      : scene_(scene),
+        rays_(rays),
+        inside_(inside),
+        longest_(longest),
+        cost_(cost),
+        walk_(rays, inside_, macrocells, channels) {
+    more_ = walk_.meets();
+    start_ = end_ = walk_.enter();
+    for (int axis = 0; axis < 3; ++axis)
+      inverse_[axis] = clamp(1.0f / rays.direction[axis], -kLargestFinite, kLargestFinite);
+  }
+
+  /// Moves the rays in `which` to their next cells. Returns those of them that have one.
+  SCOLOPAX_LANES Mask next(Mask which) {
+    Mask seeking = which & more_;
+    start_ = select(seeking, end_, start_);
+    for (int idle = 0; any(seeking); ++idle) {
+      const Float nearest = minimum(minimum(faceAfter(start_), start_ + longest_), inside_.exit);
+      end_ = select(seeking, nearest, end_);
+      // At the cell's middle, as its faces may belong to either of two macrocells.
+      walk_.jump(where(seeking, 0.5f * (start_ + end_)));
+      cost_->cellSteps = cost_->cellSteps + Word(onesOf(seeking));
+      const Mask empty = without(seeking, walk_.full());
+      if (!any(empty)) break;
+      walk_.measure();
+      const Mask ends = without(empty, walk_.exit() < inside_.exit);
+      more_ = without(more_, ends);
+      seeking = without(empty, ends);
+      // All of the cell is empty, so that a ray moves on even where rounding has put the exit before it.
+      start_ = select(seeking, maximum(walk_.exit(), end_), start_);
+      if (idle > kMaxSegments) {
+        giveUp(seeking);
+        break;
+      }
+    }
+    const Mask found = which & more_;
+    more_ = without(more_, without(found, end_ < inside_.exit));
+    taken_ = taken_ + onesOf(found);
+    giveUp(found & more_ & (taken_ > kMaxSegments - 1));
+    return found;
+  }
+  /// Ends the rays that are not in `wants`. Returns whether there may be more cells for some ray.
+  SCOLOPAX_LANES bool keep(Mask wants) {
+    more_ = more_ & wants;
+    return any(more_);
+  }
+
+  /// The part of each ray in its cell.
+  SCOLOPAX_LANES Float start() const { return start_; }
+  SCOLOPAX_LANES Float end() const { return end_; }
+  /// Bits of the channels that the cell's macrocell has; only if it has MajorantView::active.
+  SCOLOPAX_LANES Word active() const { return walk_.active(); }
+
+ private:
+  SCOLOPAX_LANES void giveUp(Mask which) {
+    cost_->truncated = maximum(cost_->truncated, Word(onesOf(which)));
+    more_ = without(more_, which);
+  }
+
+  /// Where each ray meets the next plane through voxel centres after t.
+  SCOLOPAX_LANES Float faceAfter(Float t) const {
+    Float face(kInfinity);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Float o = rays_.origin[axis], d = rays_.direction[axis];
+      const Mask up = d > 0.0f;
+      const Float last = toFloat(Int(scene_.dims[axis] - 1)), way = select(up, Float(1.0f), Float(-1.0f));
+      const Float x = clamp(o + t * d, -1.0f, last + 1.0f);
+      const Float floor = toFloat(truncated(x + 1.0f)) - 1.0f;
+      const Float plane = select(up, floor + 1.0f, select(floor == x, floor - 1.0f, floor));
+      // Rounding may have put the point on the wrong side of the plane.
+      const Float first = crossingOf(axis, plane, last), second = crossingOf(axis, plane + way, last);
+      face = minimum(face, select(first > t, first, select(second > t, second, Float(kInfinity))));
+    }
+    return face;
+  }
+  /// Infinite if there is no such plane.
+  SCOLOPAX_LANES Float crossingOf(int axis, Float plane, Float last) const {
+    const Mask exists = (plane >= 0.0f) & (plane <= last);
+    return select(exists, (plane - rays_.origin[axis]) * inverse_[axis], Float(kInfinity));
+  }
+
+  const SceneView& scene_;
+  const RayOf<L>& rays_;
+  IntervalOf<L> inside_;
+  float longest_;
+  CostOf<L>* cost_;
+  PointWalk<L> walk_;
+  Mask more_;  // rays that have not ended, and go on beyond their cell
+  Float start_, end_;
+  Float inverse_[3];
+  Int taken_{0};
+};
+
+/// Samples `channels` at the nodes of a cubic on the parts of rays from `start` to `end`, each in a cell of
+/// eight voxels. Calls visit(n, points, values) for every channel: the nodes in voxel coordinates, and stored
+/// values less the channel's origin; NaN where a value is not finite.
+template <class L, class Visit>
+SCOLOPAX_LANES void sampleCubics(const SceneView& scene, const RayOf<L>& rays, std::uint32_t channels,
+                                 typename L::Float start, typename L::Float end, Visit&& visit) {
+  using Float = typename L::Float;
+  using Vec = typename L::Vec;
+  constexpr float kFarValue = 0x1p124f;  // as voxels; coefficients of a cubic are below 12 times that
+  Float corners[kMaxVisibleChannels][kCorners];
+  const Float middle = 0.5f * (start + end), half = 0.5f * (end - start);
+  const Vec centre = rays.origin + middle * rays.direction;
+  cellVoxels(scene, channels, centre, corners);
+  const CellPlaces<L> cell(scene.dims, centre);
+  Vec points[kCubicNodes], places[kCubicNodes];
+  for (int i = 0; i < kCubicNodes; ++i) {
+    points[i] = rays.origin + (middle + half * kCubicNode[i]) * rays.direction;
+    places[i] = cell.of(points[i]);
+  }
+  for (std::uint32_t left = channels; left != 0; left &= left - 1) {
+    const int n = std::countr_zero(left);
+    Float values[kCubicNodes];
+    for (int i = 0; i < kCubicNodes; ++i) {
+      const Float stored = interpolate<L>(corners[n], places[i]);
+      const Float value = clamp(stored - scene.channels[n].origin, -kFarValue, kFarValue);
+      values[i] = select(isFinite(stored), value, Float(kNaN));
+    }
+    visit(n, points, values);
+  }
+}
+
+}  // namespace scolopax::kernel
