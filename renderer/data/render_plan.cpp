@@ -133,7 +133,9 @@ namespace {
 /// Whether the bounds of a channel depend on its gradients. The same decision as factorOf() and visible()
 /// make, for any appearance.
 bool needsGradients(const Channel& channel, const ChannelAppearance& appearance) {
-  if (!appearance.visible || !(appearance.density > 0) || !appearance.gradientOpacity) return false;
+  if (!appearance.visible || !(appearance.density > 0) || !appearance.gradientOpacity ||
+      appearance.peaks == Peaks::only)
+    return false;
   const auto& factor = appearance.gradientOpacity->factor;
   const auto any = [](const std::vector<OpacityKnot>& knots, auto&& is) {
     return std::any_of(knots.begin(), knots.end(), [&](const OpacityKnot& knot) { return is(knot.value); });
@@ -183,7 +185,7 @@ void RenderPlan::planChannels(const RenderPlan* before, const std::shared_ptr<Me
     if (newCells || before->scene_.channels[i] != appearance) {
       TransferFunction transfer(channel, appearance);
       if (newCells || !sameExtinction(before->scene_.channels[i], appearance))
-        plan = {transfer, {}, factorOf(channel, appearance), {}, {}};
+        plan = {transfer, {}, transfer.invisible() ? std::nullopt : factorOf(channel, appearance), {}, {}};
       plan->surfaces = Surfaces(channel, appearance, transfer.origin(), volume_->grid().smallestSpacing());
       plan->transfer = std::move(transfer);
     }
@@ -283,6 +285,7 @@ void RenderPlan::fillView(const kernel::CameraRays& rays, const std::optional<ke
   view_.voxelwise = scene_.step == 0;
   view_.step =
       view_.voxelwise ? std::numeric_limits<float>::infinity() : view_.smallestSpacing * float(scene_.step);
+  view_.thickest = float(kThickestSegment);
   view_.opaque = opacityLimit(kOpaqueTransmittance);
   view_.stratum = stratumOf(scene_.method);
   view_.majorants = majorants_->view();

@@ -22,6 +22,14 @@ SCOLOPAX_LANES Cubic<L> select(typename L::Mask m, const Cubic<L>& a, const Cubi
   return {select(m, a.c0, b.c0), select(m, a.c1, b.c1), select(m, a.c2, b.c2), select(m, a.c3, b.c3)};
 }
 
+/// The part of a cubic from `middle` - `half` to `middle` + `half`, for y in [-1, 1].
+template <class L>
+SCOLOPAX_LANES Cubic<L> partOf(const Cubic<L>& f, typename L::Float middle, typename L::Float half) {
+  // Not slopeAt(), as three times the largest coefficient may overflow.
+  return {f.at(middle), half * (f.c1 + (2.0f * middle) * f.c2 + (3.0f * middle * middle) * f.c3),
+          half * half * (f.c2 + 3.0f * middle * f.c3), half * half * half * f.c3};
+}
+
 /// Where a cubic is sampled: inside the interval, as the voxels at its ends belong to two cells.
 inline constexpr int kCubicNodes = 4;
 inline constexpr float kCubicNode[kCubicNodes] = {-0.75f, -0.25f, 0.25f, 0.75f};

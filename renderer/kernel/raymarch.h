@@ -147,13 +147,21 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
                                                  scene.step, cost);
     for (bool more = true; more;) {
       more = along.next(segment);
-      const Float length = segment.length(), before = opacity;
       Vec emission(0.0f);
-      const Float extinction = visitParts<kDetail>(scene, blend, segment, scalars, hidden,
-                                                   [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
-                                                     if constexpr (Features::kAny) memory.parts[n] = part;
-                                                     emission = emission + part.emission;
-                                                   });
+      Float extinction;
+      for (;;) {
+        emission = Vec(0.0f);
+        extinction = visitParts<kDetail>(scene, blend, segment, scalars, hidden,
+                                         [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
+                                           if constexpr (Features::kAny) memory.parts[n] = part;
+                                           emission = emission + part.emission;
+                                         });
+        if constexpr (Steps::kDivides) {
+          if (along.shorten(segment, extinction * segment.length(), scene.thickest)) continue;
+        }
+        break;
+      }
+      const Float length = segment.length(), before = opacity;
       const Mask some = extinction > 0.0f;
       if (any(some)) {
         const Float alpha = absorbed(where(some, extinction * length)), absorbedHere = transmittance * alpha;

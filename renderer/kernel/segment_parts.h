@@ -11,6 +11,7 @@ namespace scolopax::kernel {
 /// How quadrature cuts rays into segments, and what it knows of the scalars on a segment: at equal steps,
 /// with scalars that are taken to be linear in between.
 struct EqualSteps {
+  static constexpr bool kDivides = false;  ///< segments of dense matter can be shortened
   template <class L, class View>
   using Cuts = Segments<L, View>;
   template <class L, class View>
@@ -18,6 +19,7 @@ struct EqualSteps {
 };
 /// At the faces of voxel cells, between which scalars are cubics.
 struct VoxelCells {
+  static constexpr bool kDivides = true;
   template <class L, class View>
   using Cuts = VoxelSegments<L, View>;
   template <class L, class View>
@@ -85,9 +87,9 @@ SCOLOPAX_LANES PartOf<L> partAlone(const View& scene, const SegmentEnds<L, View>
   return scaled(meansBetween<kDetail, L>(curve, from, to, seen), density);
 }
 
-/// Where channels hide each other, their extinctions are compared at kPlaces places of a segment, or at
-/// kPlacesAtKnots where the extinction of some channel may not be linear on it.
-inline constexpr int kPlaces = 2, kPlacesAtKnots = 8;
+/// Where channels hide each other and the extinction of some channel may not be linear on a segment, they are
+/// compared in this many parts of it.
+inline constexpr int kPartsAtKnots = 8;
 
 /// The parts of channels that hide each other.
 template <class L, bool kSums>
@@ -155,17 +157,9 @@ SCOLOPAX_LANES Optical<L> opticalOn(const View& scene, const SegmentEnds<L, View
   return optical;
 }
 
-/// Adds the visible part of a channel at one place of a segment.
-template <Detail kDetail, class L>
-SCOLOPAX_LANES void add(typename L::Float opacity, const typename L::Vec& color, typename L::Float place,
-                        typename L::Mask which, PartOf<L>* part) {
-  part->opacity = part->opacity + where(which, opacity);
-  for (int c = 0; c < 3; ++c) part->emission[c] = part->emission[c] + where(which, opacity * color[c]);
-  if constexpr (kDetail >= Detail::moment) part->moment = part->moment + where(which, opacity * place);
-}
-
 /// Compares the channels of a segment, for rays in `which`. Returns the mean of the largest extinction, and
-/// sets `hidden` to the visible part of each channel.
+/// sets `hidden` to the visible part of each channel. Between two places extinctions and colours are taken to
+/// be linear, and at most one channel takes over from another there: where their extinctions are equal.
 template <Detail kDetail, class L, class View, class Scalars>
 SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Segment<L>& segment,
                                          const Scalars& scalars, typename L::Mask which,
@@ -180,39 +174,65 @@ SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Se
     if constexpr (kDetail >= Detail::emission) hidden.of[n] = noPart<L>();
   }
   bent = bent & which;
-  const int most = any(bent) ? kPlacesAtKnots : kPlaces;
-  const Float share = select(bent, Float(1.0f / kPlacesAtKnots), Float(1.0f / kPlaces));
-  Float sum(0.0f);
-  for (int i = 0; i < most; ++i) {
-    const Mask on = i < kPlaces ? which : bent;
-    const Float place = (float(i) + 0.5f) * share;
-    Float largest(0.0f);
-    Int winner(0);
-    Optical<L> seen{};
+  const int parts = any(bent) ? kPartsAtKnots : 1;
+  const Float share = select(bent, Float(1.0f / kPartsAtKnots), Float(1.0f));
+  Optical<L> at[2][kMaxVisibleChannels];  // the channels at the ends of a part
+  const auto look = [&](int end, Float place) SCOLOPAX_LANES_LAMBDA {
     for (int n = 0; n < scene.channelCount; ++n) {
       if (!(segment.channels >> n & 1)) continue;
-      const Mask here = on & segment.of(n);
-      if (!any(here)) continue;
-      const Optical<L> optical = opticalOn<kDetail, L>(scene, scalars, n, place, here);
-      const Mask larger = here & (optical.opacity > largest);
-      largest = select(larger, optical.opacity, largest);
-      if constexpr (kDetail >= Detail::emission) {
-        winner = select(larger, Int(n), winner);
-        seen.color = select(larger, optical.color, seen.color);
-        if (mixes)
-          add<kDetail, L>(optical.opacity * share * scene.channels[n].weight, optical.color, place, here,
-                          &hidden.of[n]);
+      const Mask here = which & segment.of(n);
+      if (any(here)) at[end][n] = opticalOn<kDetail, L>(scene, scalars, n, place, here);
+      at[end][n].opacity = where(here, at[end][n].opacity);
+    }
+  };
+  look(0, Float(0.0f));
+  Float sum(0.0f);
+  for (int i = 0; i < parts; ++i) {
+    const Mask on = i == 0 ? which : bent;
+    const Float begin = float(i) * share, end = (float(i) + 1.0f) * share;
+    const auto& front = at[i & 1];
+    const auto& back = at[(i & 1) ^ 1];
+    look((i & 1) ^ 1, end);
+    // The largest at either end, and each of the two at the other end.
+    Float largest(0.0f), largestBehind(0.0f), before(0.0f), after(0.0f);
+    Int winner(-1), next(-1);
+    for (int n = 0; n < scene.channelCount; ++n) {
+      if (!(segment.channels >> n & 1)) continue;
+      const Mask larger = front[n].opacity > largest, largerBehind = back[n].opacity > largestBehind;
+      largest = select(larger, front[n].opacity, largest);
+      winner = select(larger, Int(n), winner);
+      after = select(larger, back[n].opacity, after);
+      largestBehind = select(largerBehind, back[n].opacity, largestBehind);
+      next = select(largerBehind, Int(n), next);
+      before = select(largerBehind, front[n].opacity, before);
+    }
+    const Mask same = winner == next;
+    const Float lead = largest - before, behind = largestBehind - after, both = lead + behind;
+    const Float turn = select(same, Float(1.0f), where(both > 0.0f, lead / both));
+    const Float handed = largest + turn * (after - largest);
+    sum = sum +
+          where(on, share * 0.5f * (turn * (largest + handed) + (1.0f - turn) * (handed + largestBehind)));
+    if constexpr (kDetail >= Detail::emission) {
+      const Float place = select(same, end, begin + turn * share);
+      for (int n = 0; n < scene.channelCount; ++n) {
+        if (!(segment.channels >> n & 1)) continue;
+        const Optical<L>&a = front[n], &b = back[n];
+        if (mixes) {
+          const float weight = scene.channels[n].weight;
+          detail::addLinear<kDetail, L>({a.opacity * weight, a.color}, {b.opacity * weight, b.color}, begin,
+                                        end, on & segment.of(n), &hidden.of[n]);
+          continue;
+        }
+        const Mask wins = on & (winner == Int(n)), follows = without(on & (next == Int(n)), same);
+        if (!any(wins | follows)) continue;
+        const Optical<L> there{a.opacity + turn * (b.opacity - a.opacity),
+                               a.color + turn * (b.color - a.color)};
+        detail::addLinear<kDetail, L>(a, there, begin, place, wins, &hidden.of[n]);
+        detail::addLinear<kDetail, L>(there, b, place, end, follows, &hidden.of[n]);
       }
     }
-    sum = sum + largest;
-    if constexpr (kDetail >= Detail::emission)
-      for (int n = 0; n < scene.channelCount && !mixes; ++n) {
-        if (!(segment.channels >> n & 1)) continue;
-        const Mask wins = on & (winner == Int(n));
-        if (any(wins)) add<kDetail, L>(largest * share, seen.color, place, wins, &hidden.of[n]);
-      }
   }
-  return sum * share;
+  return sum;
 }
 /// Calls visit(n, part of channel n) for all channels of the segment, and returns the mean of the visible
 /// extinction. Rays with a single channel need no comparisons.

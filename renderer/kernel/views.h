@@ -139,6 +139,7 @@ struct SceneView {
   float step;                 ///< step of quadrature, world units
   bool voxelwise;       ///< quadrature also cuts rays at the faces of voxel cells, and integrates exactly in
                         ///< between
+  float thickest;       ///< optical depth above which voxelwise segments are shortened
   OpacityLimit opaque;  ///< where marched rays end
   float stratum;        ///< share of a ray's light per lighting computation of quadrature (strata.h)
   int lightCount;       ///< 0 unless shading or shadows are on

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cuts one ray per lane at the faces of voxel cells, and skips the cells in empty macrocells. On such a
-// segment, every scalar is a cubic.
+// segment, every scalar is a cubic. Segments of dense matter are divided further.
 #pragma once
 #include "renderer/kernel/segment_cubics.h"
 #include "renderer/kernel/segments.h"
@@ -31,41 +31,83 @@ class VoxelSegments {
   /// Advances to the next segment that may have extinction for some ray. If there is none, returns false and
   /// an empty segment.
   SCOLOPAX_LANES bool next(Segment<L>& segment) {
-    const Mask live = walk_.next(L::everywhere());
-    if (!any(live)) {
-      segment = {exit_, exit_, 0, live, false, Word(0u)};
+    const Mask within = wants_ & (to_ < 1.0f), enters = walk_.next(without(wants_, within));
+    live_ = within | enters;
+    if (!any(live_)) {
+      segment = {exit_, exit_, 0, live_, false, Word(0u)};
       return false;
     }
     const bool apart = scene_.majorants.active != nullptr;
-    const Word met = apart ? where(live, walk_.active()) : Word(0u);
-    const std::uint32_t wanted = apart ? unionOf(met) : channels_;
-    segment = {walk_.start(), walk_.end(), wanted, live, apart, met};
-    sample(segment);
+    if (any(enters)) {
+      if (apart) met_ = select(enters, walk_.active(), met_);
+      sample(enters, apart ? unionOf(where(enters, met_)) : channels_);
+    }
+    // After a part, one of twice its length.
+    from_ = select(enters, Float(-1.0f), to_);
+    to_ = select(enters, Float(1.0f), minimum(from_ + 2.0f * way_, 1.0f));
+    const Word met = apart ? where(live_, met_) : Word(0u);
+    segment = {exit_, exit_, apart ? unionOf(met) : channels_, live_, apart, met};
+    place(segment);
     return true;
   }
 
   /// Ends the rays that are not in `wants`. Returns whether there may be more segments for some ray.
-  SCOLOPAX_LANES bool keep(Mask wants) { return walk_.keep(wants); }
+  SCOLOPAX_LANES bool keep(Mask wants) {
+    wants_ = wants_ & wants;
+    walk_.keep(wants_);
+    return mayGoOn();
+  }
+  SCOLOPAX_LANES bool mayGoOn() const { return any(wants_ & (walk_.more() | (to_ < 1.0f))); }
+
+  /// Shortens segments of an optical depth above `most`, in which matter hides much of what is behind it in
+  /// the same segment. Returns false, and changes nothing, if there are none.
+  SCOLOPAX_LANES bool shorten(Segment<L>& segment, Float depth, float most) {
+    const Mask thick = live_ & (depth > most) & (way_ > kShortest);
+    if (!any(thick)) return false;
+    to_ = select(thick, from_ + way_ * maximum(0.9f * most / depth, kMostDivision), to_);
+    place(segment);
+    return true;
+  }
 
  private:
-  SCOLOPAX_LANES void sample(const Segment<L>& segment) {
+  static constexpr float kShortest = 0x1p-18f, kMostDivision = 0x1p-6f;
+
+  /// Samples the cells of the rays in `which`.
+  SCOLOPAX_LANES void sample(Mask which, std::uint32_t channels) {
     unsigned fetches = 0;
-    sampleCubics<L>(scene_, rays_, segment.channels, segment.start, segment.end,
+    sampleCubics<L>(scene_, rays_, channels, walk_.start(), walk_.end(),
                     [&](int n, const Vec* points, const Float* values) SCOLOPAX_LANES_LAMBDA {
                       const ChannelView& channel = scene_.channels[n];
                       Float own[kCubicNodes];
                       for (int i = 0; i < kCubicNodes; ++i)
                         own[i] = channel.scale < 0.0f ? -values[i] : values[i];
-                      scalars_.place[n] = cubicThrough<L>(own);
+                      cell_.place[n] = select<L>(which, cubicThrough<L>(own), cell_.place[n]);
                       ++fetches;
                       if (scene_.hasFactor(n)) [[unlikely]] {
                         for (int i = 0; i < kCubicNodes; ++i)
                           findFactorPosition<L>(channel, scene_.dims, points[i], &own[i]);
-                        scalars_.factorPosition[n] = cubicThrough<L>(own);
+                        cell_.factorPosition[n] =
+                            select<L>(which, cubicThrough<L>(own), cell_.factorPosition[n]);
                         fetches += kCubicNodes * gradientFetches(scene_.dims);
                       }
                     });
-    cost_->fetches = cost_->fetches + Word(onesOf(segment.live)) * Word(fetches);
+    cost_->fetches = cost_->fetches + Word(onesOf(which)) * Word(fetches);
+  }
+
+  /// Sets the segment and its scalars to the parts of the cells from from_ to to_.
+  SCOLOPAX_LANES void place(Segment<L>& segment) {
+    const Float begin = walk_.start(), end = walk_.end();
+    const Float centre = 0.5f * (begin + end), reach = 0.5f * (end - begin);
+    way_ = to_ - from_;
+    segment.start = select(from_ > -1.0f, centre + reach * from_, begin);
+    segment.end = select(to_ < 1.0f, centre + reach * to_, end);
+    const Float middle = 0.5f * (from_ + to_), half = 0.5f * way_;
+    for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
+      const int n = std::countr_zero(left);
+      scalars_.place[n] = partOf<L>(cell_.place[n], middle, half);
+      if (scene_.hasFactor(n)) [[unlikely]]
+        scalars_.factorPosition[n] = partOf<L>(cell_.factorPosition[n], middle, half);
+    }
   }
 
   SegmentCubics<L, View>& scalars_;
@@ -75,6 +117,10 @@ class VoxelSegments {
   std::uint32_t channels_;
   CostOf<L>* cost_;
   VoxelWalk<L> walk_;
+  SegmentCubics<L, View> cell_;  // of whole cells
+  Mask wants_ = L::everywhere(), live_;
+  Float from_{-1.0f}, to_{1.0f}, way_{2.0f};  // the segments, as parts of the cells from -1 to 1
+  Word met_{0u};
 };
 
 }  // namespace scolopax::kernel

@@ -69,6 +69,9 @@ class VoxelWalk {
     return any(more_);
   }
 
+  /// Rays that go on beyond their cell.
+  SCOLOPAX_LANES Mask more() const { return more_; }
+
   /// The part of each ray in its cell.
   SCOLOPAX_LANES Float start() const { return start_; }
   SCOLOPAX_LANES Float end() const { return end_; }

@@ -63,6 +63,28 @@ TEST(RayMarch, OfASpikeNarrowerThanAStepHidesWhatIsInIt) {
         }
 }
 
+TEST(RayMarch, PassesFromOneChannelToAnotherWhereTheirExtinctionsAreEqual) {
+  // One rises and the other falls: both are linear, and so is what is seen on either side of the middle.
+  const glm::ivec3 dims(3, 3, 8);
+  const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, [](int, int, int z) { return z; }),
+                               channelOf<float>(dims, [](int, int, int z) { return 7 - z; }));
+  for (const double step : {0.0, 0.3, 1.0, 3.0, 20.0})
+    for (const BlendMode blend : {BlendMode::max, BlendMode::mix}) {
+      Scene scene = frontScene(*volume, 8, 8);
+      scene.blend = blend;
+      scene.step = step;
+      scene.crop = Crop{{-0.5, -0.5, 0}, {2.5, 2.5, 7}};
+      constexpr double kDensity = 1e-4;
+      scene.channels = {ramp(0, 7, kDensity, kRed), ramp(0, 7, kDensity, kBlue)};
+      const double largest = 7 * 0.75 * kDensity, own = 7 * 0.5 * kDensity;
+      for (const glm::vec4& pixel : march(volume, scene, 4).pixels) {
+        ASSERT_NEAR(double(pixel.a) / largest, 1, 1e-3) << nameOf(blend) << ' ' << step;
+        const double red = blend == BlendMode::max ? largest / 2 : own;
+        ASSERT_NEAR(double(pixel.r) / red, 1, 1e-3) << nameOf(blend) << ' ' << step;
+      }
+    }
+}
+
 TEST(RayMarch, OfMoreStepsThanAFloatCanCountEnds) {
   // 1:1:100 and the finest step: 2e7 steps along the box, which is empty except at its far end.
   const glm::ivec3 dims(2, 2, 2000);
