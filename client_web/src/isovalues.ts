@@ -12,11 +12,12 @@ export function positionOf(value: number, [lo, hi]: Range, gamma: number): numbe
   return share > 0 && share < 1 ? share ** gamma : share;
 }
 
-/** The value at a position in [0, 1], to four digits of the range: finer than a pixel of the plot. */
+/** The value at a position in [0, 1], to four digits of the range (finer than a pixel of the plot), and in the range. */
 export function valueAtPosition(position: number, [lo, hi]: Range, gamma: number): number {
   const step = 10 ** Math.floor(Math.log10(Math.abs(hi - lo) || 1) - 4);
   const value = lo + position ** (1 / gamma) * (hi - lo);
-  return Number((Math.round(value / step) * step).toPrecision(12));
+  const rounded = Number((Math.round(value / step) * step).toPrecision(12));
+  return Math.max(Math.min(lo, hi), Math.min(Math.max(lo, hi), rounded));
 }
 
 export function linesOf(channel: Channel, range: Range, shortNumber: (value: number) => string): CurveLine[] {

@@ -19,6 +19,9 @@ describe('an isovalue in the plot', () => {
         expect(Math.abs(positionOf(value, range, gamma) - position)).toBeLessThan(2e-4 * (gamma + 1));
       }
     expect(valueAtPosition(1 / 3, [0, 100], 1)).toBe(33.33);
+    // Rounding does not lead out of the range, where the line would vanish under the pointer.
+    expect(valueAtPosition(1, [0, 123456], 1)).toBe(123456);
+    expect(valueAtPosition(0, [1e-7, 1], 1)).toBe(1e-7);
   });
 
   it('is drawn as high as its opacity, in its colour', () => {

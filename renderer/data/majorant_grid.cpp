@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <glm/common.hpp>
 
 namespace scolopax {
@@ -102,8 +103,13 @@ BoundTable buildBounds(const ValueLevels& levels, const TransferFunction& transf
 }
 
 BoundTable buildPresence(const ValueLevels& levels, const Surfaces& surfaces, int column) {
+  // The last level may be NaN.
+  const std::vector<float>& values = levels.values;
+  const float last =
+      std::isnan(values.back()) && values.size() > 1 ? values[values.size() - 2] : values.back();
+  const float range = last - values.front();
   return tableOfLevels(levels, column, [&](kernel::LevelInterval interval) {
-    return surfaces.presence(levels.decode(interval));
+    return surfaces.presence(levels.decode(interval), std::isfinite(range) ? range : 0.0f);
   });
 }
 

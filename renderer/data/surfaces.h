@@ -19,8 +19,9 @@ class Surfaces {
   bool any() const { return !views_.empty(); }
   /// Adds them to a view of the channel. Valid while this object lives.
   void addTo(kernel::ChannelView& view) const;
-  /// Whether samples in the interval of stored values may have the value of a surface: 1, else 0.
-  float presence(ValueInterval interval) const;
+  /// Whether samples in the interval of stored values may have the value of a surface: 1, else 0. `range`:
+  /// between all samples of the channel.
+  float presence(ValueInterval interval, float range) const;
 
  private:
   std::vector<kernel::SurfaceView> views_;

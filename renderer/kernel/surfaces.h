@@ -16,6 +16,10 @@ struct SurfaceStart {
   typename L::Float value{0.0f};
 };
 
+/// Maximum number of surfaces that a ray meets. A ray with more ends there and counts as truncated. Each may
+/// be lit by shadow rays to all lights, and behind so many there is only noise.
+inline constexpr int kMaxSurfaceHits = 512;
+
 /// A surface that a ray meets.
 template <class L>
 struct SurfaceHit {
@@ -68,11 +72,16 @@ class SurfaceWalk {
       hit_.t = select(without(crosses, kept), Float(kInfinity), hit_.t);
       seeking = without(seeking, kept);
     }
+    taken_ = taken_ + onesOf(which);
+    const Mask many = which & (taken_ > kMaxSurfaceHits) & (hit_.t < kInfinity);
+    cost_->truncated = maximum(cost_->truncated, Word(onesOf(many)));
+    hit_.t = select(many, Float(kInfinity), hit_.t);
   }
   SCOLOPAX_LANES const SurfaceHit<L>& hit() const { return hit_; }
 
  private:
-  // Distances, in smallest spacings. A ray that begins at a value is on the side on which it is after kSoon.
+  // Distances, in smallest spacings. Where a ray begins within rounding of a value, its side is the one on
+  // which it is kSoon further along.
   // Where it begins at a surface, others within kSamePlace along the ray are taken to be at the same place.
   // Parts of a ray that are shorter than kLevel are not level. Each is a few times the next, and the last one
   // is above the rounding of points.
@@ -201,7 +210,7 @@ class SurfaceWalk {
     const Float half = 0.5f * (walk_.end() - walk_.start());
     const float least = scene_.smallestSpacing * kLevel;
     Float begin = from_, atBegin = f.at(begin), low = begin, high = begin;
-    Mask open = which, found = without(which, which);
+    Mask open = which, found = without(which, which), flat = found;
     for (const Float& end : ends) {
       const Mask further = open & (end > begin);
       const Float atEnd = f.at(end);
@@ -212,13 +221,14 @@ class SurfaceWalk {
       low = select(crosses, begin, low);
       high = select(crosses, end, high);
       found = found | crosses;
+      flat = flat | (rises & (atEnd <= value + slack));
       open = without(open, crosses);
       begin = select(further, end, begin);
       atBegin = select(further, atEnd, atBegin);
     }
     if (!any(found)) return none;
-    const Float y = crossing(f, low, high, f.at(low), f.at(high), value, found);
-    return select(found, y, none);
+    const Float y = crossing(f, low, high, f.at(low), f.at(high), value, without(found, flat));
+    return select(found, select(flat, low, y), none);
   }
 
   /// Whether the channels of hits, in lanes of `which`, are not clipped there.
@@ -241,7 +251,8 @@ class SurfaceWalk {
   CostOf<L>* cost_;
   VoxelWalk<L> walk_;
   SurfaceHit<L> hit_;
-  Mask inCell_, begun_;  // rays whose cell has been entered, and may have further crossings; any cell ever
+  Int taken_{0};
+  Mask inCell_, begun_;  // rays in a cell that may have further crossings; rays that have entered a cell
   Float from_{-1.0f};    // crossings up to there are behind
   Word known_{0u};       // bit n: channel n has a value where the ray is, and above_[n] tells its sides
   Cubic<L> value_[kMaxVisibleChannels];

@@ -113,8 +113,8 @@ Integrator::Integrator(const Volume& volume, const Scene& scene, double toleranc
     }
     if (!curves.visible() && surfaces.empty()) continue;
     const double radiance = lighting_.brightest(appearance.material, brightest);
-    brightest_ =
-        blend_ == BlendMode::mix ? brightest_ + appearance.weight * radiance : std::max(brightest_, radiance);
+    brightest_ = blend_ == BlendMode::mix ? brightest_ + std::max(1.0, appearance.weight) * radiance
+                                          : std::max(brightest_, radiance);
     channels_.push_back({int(n), ScalarField(volume.channels()[n], dims_), std::move(curves),
                          appearance.weight, appearance.gamma != 1 || factor, appearance.material,
                          std::abs(appearance.rangeHi - appearance.rangeLo), std::move(factor), surfaces});

@@ -199,6 +199,34 @@ TEST(Surfaces, OutsideTheValuesCostNothing) {
     EXPECT_EQ(statsOf(volume, scene, method, 1).fetches, 0u) << nameOf(method);
 }
 
+TEST(Surfaces, BesideEmptyMacrocellsSeenFromAfar) {
+  // The value is all but that of the empty space around a block, whose faces are those of macrocells.
+  const glm::ivec3 dims(24, 24, 24);
+  const auto block = [](int x, int y, int z) {
+    return std::min({x, y, z}) >= 8 && std::max({x, y, z}) <= 16 ? 255 : 0;
+  };
+  const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, block));
+  for (const double away : {1.0, 30.0, 1000.0}) {
+    SCOPED_TRACE(away);
+    Scene scene =
+        viewFrom(*volume, glm::dvec3(12) + away * glm::dvec3(-15, -21, -33), {12, 12, 12}, 40 / away, 32);
+    for (const double value : {0.01, 0.1, 254.9}) {
+      scene.channels = {surfaces({{value, 0.4, kRed}})};
+      expectSame(volume, scene, 3);
+    }
+  }
+}
+
+TEST(Surfaces, AreSoManyThatARayEnds) {
+  const glm::ivec3 dims(3, 3, 1200);
+  const auto volume =
+      volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int z) { return z % 2 ? 200 : 0; }));
+  Scene scene = frontScene(*volume, 8, 8);
+  scene.channels = {surfaces({{100, 1e-4, kRed}})};
+  EXPECT_EQ(statsOf(volume, scene, Method::raymarch, 1).truncatedRays, 64u);
+  EXPECT_GT(statsOf(volume, scene, Method::superposed, 1).truncatedRays, 50u);  // 5 % end at a surface
+}
+
 TEST(Surfaces, HideWhatIsBehindThemInMatter) {
   // Homogeneous matter of one colour, in front of and behind a plane.
   const glm::ivec3 dims(6, 6, 12);
