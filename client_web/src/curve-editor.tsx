@@ -2,7 +2,7 @@
 // Editor of a curve, such as opacity, drawn over the histogram within the range. Points are moved by dragging or
 // the arrow keys, added by a double click, Enter or Insert, and removed by a double click, Delete or Backspace.
 import { useEffect, useRef } from 'preact/hooks';
-import { addPoint, evaluate, kSteps, movePoint, pointAfter, removePoint, type Curve, type Point } from './curve';
+import { addPoint, evaluate, kSteps, movePoint, pointAfter, removePoint, stepSize, type Curve, type Point } from './curve';
 import { CurveLines, type CurveLine } from './curve-lines';
 import { fractionIn, followPointer } from './drag';
 import { histogramPath, type Histogram } from './histogram';
@@ -43,7 +43,7 @@ export function CurveEditor({ label, curve, range, histogram, paint, onChange, l
     const point = curve[index];
     if (!point) return;
     if (step) {
-      const size = event.shiftKey ? 0.1 : 0.01;
+      const size = stepSize(event);
       change(movePoint(curve, index, [point[0] + step[0] * size, point[1] + step[1] * size]));
     } else if (event.key === 'Delete' || event.key === 'Backspace') {
       focusNext.current = Math.max(0, index - 1);

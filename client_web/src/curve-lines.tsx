@@ -4,7 +4,7 @@
 import type { RefObject } from 'preact';
 import { useRef } from 'preact/hooks';
 import { fractionIn, followPointer } from './drag';
-import { kSteps, type Point } from './curve';
+import { clamp, kSteps, stepSize, type Point } from './curve';
 
 export interface CurveLine {
   /** Position and opacity, both in [0, 1]. */
@@ -21,8 +21,6 @@ interface Props {
   onMove(index: number, to: Point): void;
 }
 
-const clamp = (x: number) => Math.max(0, Math.min(1, x));
-
 export function CurveLines({ plot, lines, onMove }: Props) {
   const latest = useRef(onMove); // a drag outlives the render it began in
   latest.current = onMove;
@@ -30,7 +28,7 @@ export function CurveLines({ plot, lines, onMove }: Props) {
   const onKey = (event: KeyboardEvent, index: number, at: Point) => {
     const step = kSteps[event.key];
     if (!step) return;
-    const size = event.shiftKey ? 0.1 : 0.01;
+    const size = stepSize(event);
     move(index, at[0] + step[0] * size, at[1] + step[1] * size);
     event.preventDefault();
   };

@@ -4,7 +4,7 @@
 export type Point = readonly [number, number];
 export type Curve = readonly Point[];
 
-/** How far each arrow key moves a point, in steps. */
+/** Where each arrow key moves a point, in steps. */
 export const kSteps: Record<string, Point> = {
   ArrowLeft: [-1, 0],
   ArrowRight: [1, 0],
@@ -12,7 +12,10 @@ export const kSteps: Record<string, Point> = {
   ArrowDown: [0, -1],
 };
 
-const clamp = (x: number) => Math.max(0, Math.min(1, x));
+/** How far a press of an arrow key moves something by one step, in the plot's width or height. */
+export const stepSize = (event: KeyboardEvent) => (event.shiftKey ? 0.1 : 0.01);
+
+export const clamp = (x: number) => Math.max(0, Math.min(1, x));
 /** Four decimals: finer than a pixel of any editor, and short on the wire. */
 const round = (x: number) => Math.round(x * 1e4) / 1e4;
 

@@ -75,11 +75,10 @@ TEST(Surfaces, OfWholeNumbersAtAndBetweenStoredValues) {
   const glm::ivec3 dims(12, 12, 12);
   const auto steps = [](int x, int y, int z) { return std::floor(4 * lumps()(x, y, z)); };
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, steps));
-  for (const double value : {0.5, 1.0, 1.5, 2.0, 3.0, 4.0}) {
+  for (const double value : {0.5, 1.0, 1.5, 2.0, 3.0}) {
     SCOPED_TRACE(value);
     Scene scene = viewFrom(*volume, {-9, -12, -20}, {5.5, 5, 5.5}, 40, 48);
     scene.channels = {surfaces({{value, 0.4, kRed}})};
-    if (value == 4) continue;  // no voxel has it
     expectSame(volume, scene, 8);
   }
 }
@@ -111,7 +110,7 @@ TEST(Surfaces, ThatCoincideAreMetInOrder) {
       scene.channels = {surfaces({{0.5, 0.5, kRed}, {0.5 + apart, 0.25, kGreen}}),
                         surfaces({{0.5, 0.75, kBlue}})};
       // Rays end at a transmittance of 1e-4. Roots that are closer than floats tell are met in either order.
-      expectSame(volume, scene, apart == 1e-5 ? 100 : 3, 1.2e-4);
+      expectSame(volume, scene, apart == 1e-5 ? 10 : 3, 1.2e-4);
     }
   }
 }
