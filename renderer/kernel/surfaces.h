@@ -54,7 +54,7 @@ class SurfaceWalk {
         cost_(cost),
         walk_(scene, scene.surfaceCells, rays, inside, Word(channels), kInfinity, cost),
         hit_{Float(kInfinity), Float(0.0f), Vec(0.0f), {Int(-1), Float(0.0f)}} {
-    inCell_ = begun_ = without(L::everywhere(), L::everywhere());
+    inCell_ = without(L::everywhere(), L::everywhere());
   }
 
   /// Moves the rays in `which` to their next surfaces.
@@ -99,7 +99,7 @@ class SurfaceWalk {
   SCOLOPAX_LANES void enterCells(Mask which) {
     const Float before = walk_.end();
     const Mask has = walk_.next(which);
-    const Mask contiguous = has & begun_ & (walk_.start() == before);
+    const Mask contiguous = has & (walk_.start() == before);
     known_ = select(has, where(contiguous, known_), known_);
     from_ = select(has, Float(-1.0f), from_);
     inCell_ = inCell_ | has;
@@ -111,7 +111,6 @@ class SurfaceWalk {
                     });
     // Of channels that were not sampled, nothing is known at the next cell's face.
     known_ = select(has, known_ & wanted, known_);
-    begun_ = begun_ | has;
   }
 
   /// Takes channel n's values at the nodes of a cubic, for lanes in `which`.
@@ -252,9 +251,9 @@ class SurfaceWalk {
   VoxelWalk<L> walk_;
   SurfaceHit<L> hit_;
   Int taken_{0};
-  Mask inCell_, begun_;  // rays in a cell that may have further crossings; rays that have entered a cell
-  Float from_{-1.0f};    // crossings up to there are behind
-  Word known_{0u};       // bit n: channel n has a value where the ray is, and above_[n] tells its sides
+  Mask inCell_;        // rays in a cell that may have further crossings
+  Float from_{-1.0f};  // crossings up to there are behind
+  Word known_{0u};     // bit n: channel n has a value where the ray is, and above_[n] tells its sides
   Cubic<L> value_[kMaxVisibleChannels];
   Word above_[kMaxVisibleChannels];  // bit i: the value is at least that of surface i
 };

@@ -47,7 +47,7 @@ class VoxelSegments {
     to_ = select(enters, Float(1.0f), minimum(from_ + 2.0f * way_, 1.0f));
     const Word met = apart ? where(live_, met_) : Word(0u);
     segment = {exit_, exit_, apart ? unionOf(met) : channels_, live_, apart, met};
-    place(segment);
+    setPart(segment);
     return true;
   }
 
@@ -55,17 +55,16 @@ class VoxelSegments {
   SCOLOPAX_LANES bool keep(Mask wants) {
     wants_ = wants_ & wants;
     walk_.keep(wants_);
-    return mayGoOn();
+    return any(wants_ & (walk_.more() | (to_ < 1.0f)));
   }
-  SCOLOPAX_LANES bool mayGoOn() const { return any(wants_ & (walk_.more() | (to_ < 1.0f))); }
 
-  /// Shortens segments of an optical depth above `most`, in which matter hides much of what is behind it in
-  /// the same segment. Returns false, and changes nothing, if there are none.
+  /// Shortens segments whose optical depth is above `most`: they hide much of their own far end. Returns
+  /// false, and changes nothing, if there are none.
   SCOLOPAX_LANES bool shorten(Segment<L>& segment, Float depth, float most) {
     const Mask thick = live_ & (depth > most) & (way_ > kShortest);
     if (!any(thick)) return false;
     to_ = select(thick, from_ + way_ * maximum(0.9f * most / depth, kMostDivision), to_);
-    place(segment);
+    setPart(segment);
     return true;
   }
 
@@ -95,7 +94,7 @@ class VoxelSegments {
   }
 
   /// Sets the segment and its scalars to the parts of the cells from from_ to to_.
-  SCOLOPAX_LANES void place(Segment<L>& segment) {
+  SCOLOPAX_LANES void setPart(Segment<L>& segment) {
     const Float begin = walk_.start(), end = walk_.end();
     const Float centre = 0.5f * (begin + end), reach = 0.5f * (end - begin);
     way_ = to_ - from_;
