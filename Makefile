@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # make run     builds the program and the page and serves DATA, or generated demo data, on loopback
 # make test    builds and runs the tests
-# make check   does more: sanitizers, clang-tidy, fuzzing, hostile clients with large volumes, and make test with four
-#              times the samples in the statistical tests and ten times the random scenes
+# make check   does more: sanitizers, clang-tidy, fuzzing, hostile clients with large volumes, and make test with
+#              twice the samples and all combinations in the statistical tests, and 2000 random scenes
 # make fuzz    runs every fuzzer for another FUZZ_SECONDS, on the corpus of earlier runs
 # make soak    tests SCENES more random scenes, starting where the last run ended; keeps failing ones in build/soak
 DATA ?=
@@ -45,8 +45,8 @@ test: test-deps web
 	$(call run-tests,release,-j $(JOBS) -LE hostile)
 
 # A target's variables hold for what it needs, too, unless that has its own: these are for test.
-check: export SCOLOPAX_STATISTICS := 4
-check: export SCOLOPAX_RANDOM_SCENES := 3000
+check: export SCOLOPAX_STATISTICS := 2
+check: export SCOLOPAX_RANDOM_SCENES := 2000
 check-asan-ubsan: export SCOLOPAX_STATISTICS := 1
 check-asan-ubsan: export SCOLOPAX_RANDOM_SCENES := 20
 check: test check-hostile check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
@@ -62,15 +62,16 @@ check-asan-ubsan: test-deps
 	$(call run-tests,asan-ubsan,-j $(JOBS) -LE 'web|statistics|hostile')
 	$(call run-tests,asan-ubsan,-j $(JOBS) -L hard)
 
-# Checks the server's threads, with fake renderers: the real ones use TBB, which is not instrumented.
+# Checks the server's threads, with fake renderers: the real ones use TBB, which is not instrumented. All four parts
+# at once, because they mostly wait.
 check-tsan: test-deps
 	cmake --preset tsan > /dev/null
 	cmake --build --preset tsan -j $(JOBS)
 	TSAN_OPTIONS=suppressions=$(CURDIR)/tests/support/tsan.supp \
-	  $(call run-tests,tsan,-j $(JOBS) -L unit-server)
+	  $(call run-tests,tsan,-j 4 -L unit-server)
 
 check-fuzz: fuzzers
-	$(call run-tests,fuzz,-L fuzz)
+	$(call run-tests,fuzz,-j $(JOBS) -L fuzz)
 
 fuzzers: test-deps
 	cmake --preset fuzz > /dev/null
@@ -82,12 +83,12 @@ fuzz: fuzzers
 	    -artifact_prefix=build/fuzz/ $$corpus $$(ls -d tests/fuzz/seeds/$$(basename $$corpus _fuzz) 2> /dev/null) || exit 1; \
 	done
 
-# Runs in batches, so that stopping loses little. The first 3000 scenes are those of make check.
+# Runs in batches, so that stopping loses little. The first 2000 scenes are those of make check.
 soak: test-deps
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null
 	cmake --build --preset release --target tests_random_scenes -j $(JOBS)
 	mkdir -p build/soak
-	first=$$(cat build/soak/next 2> /dev/null || echo 3000); end=$$((first + $(SCENES))); failed=0; \
+	first=$$(cat build/soak/next 2> /dev/null || echo 2000); end=$$((first + $(SCENES))); failed=0; \
 	while [ $$first -lt $$end ]; do \
 	  SCOLOPAX_RANDOM_SCENES=500 SCOLOPAX_RANDOM_SCENES_FIRST=$$first SCOLOPAX_RANDOM_SCENES_FOLDER=build/soak \
 	    build/release/tests_random_scenes --gtest_brief=1 --gtest_filter='*RandomScenes*' || failed=1; \
