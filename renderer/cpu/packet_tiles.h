@@ -19,7 +19,7 @@ static_assert(kTile % kPacketWidth == 0 && kTile % kPacketHeight == 0);
 
 /// Does what kernel::RenderPixel does, for a packet of pixels whose top left one is (x, y). Skips pixels that
 /// are already done and those with a column >= endX or a row >= endY.
-template <class Steps, class Features, class Blend>
+template <class Steps, class Lighting, class Blend>
 SCOLOPAX_LANES_APART void renderPacket(const Pass& pass, const Blend& blend, int x, int y, int endX,
                                        int endY) {
   const kernel::SceneView& scene = pass.scene;
@@ -43,7 +43,7 @@ SCOLOPAX_LANES_APART void renderPacket(const Pass& pass, const Blend& blend, int
   kernel::FirstCollisionOf<Lanes> met{};
   kernel::Radiance<Lanes> radiance{Vec(0.0f), Float(0.0f)};
   if (scene.channelCount > 0 && any(from.inside.enter < from.inside.exit))
-    radiance = kernel::RayMarch<Steps>::template march<Features>(scene, blend, from.ray, from.inside, sampler,
+    radiance = kernel::RayMarch<Steps>::template march<Lighting>(scene, blend, from.ray, from.inside, sampler,
                                                                  &cost, pass.first ? &met : nullptr);
 
   if (pass.first) met.depth = scene.rays.depth(from.x, from.y, met.depth);
@@ -62,7 +62,7 @@ SCOLOPAX_LANES_APART void renderPacket(const Pass& pass, const Blend& blend, int
   }
 }
 
-template <class Steps, class Features, bool kSums, bool kSeparate, bool kMixes>
+template <class Steps, class Lighting, bool kSums, bool kSeparate, bool kMixes>
 void renderTilePackets(const Pass& pass, int tileX, int tileY) {
   const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
   const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
@@ -70,18 +70,18 @@ void renderTilePackets(const Pass& pass, int tileX, int tileY) {
     if (std::chrono::steady_clock::now() >= pass.deadline) return;
     for (int x = tileX * kTile; x < endX; x += kPacketWidth) {
       if (pass.cancel->load(std::memory_order_relaxed)) return;
-      renderPacket<Steps, Features>(pass, kernel::Blending<kSums>{kSeparate, kMixes}, x, y, endX, endY);
+      renderPacket<Steps, Lighting>(pass, kernel::Blending<kSums>{kSeparate, kMixes}, x, y, endX, endY);
     }
   }
 }
 
 inline TileFunction packetTiles(const Scene& scene, bool voxelwise) {
-  return visitBlendAndLight(scene, [voxelwise](auto blend, auto features) -> TileFunction {
+  return visitBlendAndLight(scene, [voxelwise](auto blend, auto lighting) -> TileFunction {
     using Blend = typename decltype(blend)::type;
-    using Features = typename decltype(features)::type;
-    return voxelwise ? renderTilePackets<kernel::VoxelCells, Features, Blend::kSums, Blend::kSeparate,
+    using Lighting = typename decltype(lighting)::type;
+    return voxelwise ? renderTilePackets<kernel::VoxelCells, Lighting, Blend::kSums, Blend::kSeparate,
                                          Blend::kMixes>
-                     : renderTilePackets<kernel::EqualSteps, Features, Blend::kSums, Blend::kSeparate,
+                     : renderTilePackets<kernel::EqualSteps, Lighting, Blend::kSums, Blend::kSeparate,
                                          Blend::kMixes>;
   });
 }

@@ -12,9 +12,9 @@
 
 namespace scolopax {
 
-template <class Integrator, class Blend, class Features>
+template <class Integrator, class Blend, class Lighting>
 void renderTile(const Pass& pass, int tileX, int tileY) {
-  const kernel::RenderPixel<Integrator, Blend, Features> render{pass.scene, pass.number, pass.pixels,
+  const kernel::RenderPixel<Integrator, Blend, Lighting> render{pass.scene, pass.number, pass.pixels,
                                                                 pass.cost, pass.first};
   const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
   const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
@@ -33,8 +33,8 @@ void renderTile(const Pass& pass, int tileX, int tileY) {
 
 template <class Integrator>
 TileFunction chooseTileFunction(const Scene& scene) {
-  return visitBlendAndLight(scene, [](auto blend, auto features) -> TileFunction {
-    return renderTile<Integrator, typename decltype(blend)::type, typename decltype(features)::type>;
+  return visitBlendAndLight(scene, [](auto blend, auto lighting) -> TileFunction {
+    return renderTile<Integrator, typename decltype(blend)::type, typename decltype(lighting)::type>;
   });
 }
 

@@ -21,8 +21,8 @@ struct BlendDensity;
 struct BlendMax;
 struct BlendMix;
 struct BlendComposite;
-template <bool kShadingOn, bool kShadowsOn>
-struct LightFeatures;
+struct Unlit;
+struct Lit;
 }  // namespace scolopax::kernel
 
 namespace scolopax {
@@ -48,22 +48,18 @@ auto visitIntegrator(const Scene& scene, F&& f) {
   return f(std::type_identity<kernel::RayMarch<kernel::EqualSteps>>{});
 }
 
-/// Returns f(std::type_identity<LightFeatures<...>>{}).
+/// Returns f(std::type_identity<Lighting>{}).
 template <class F>
 auto visitLight(const Scene& scene, F&& f) {
-  const auto with = [&]<bool kShading, bool kShadows>() {
-    return f(std::type_identity<kernel::LightFeatures<kShading, kShadows>>{});
-  };
-  if (scene.shading)
-    return scene.shadows ? with.template operator()<true, true>() : with.template operator()<true, false>();
-  return scene.shadows ? with.template operator()<false, true>() : with.template operator()<false, false>();
+  return scene.shading || scene.shadows ? f(std::type_identity<kernel::Lit>{})
+                                        : f(std::type_identity<kernel::Unlit>{});
 }
 
-/// Returns f(std::type_identity<Blend>{}, std::type_identity<LightFeatures<...>>{}).
+/// Returns f(std::type_identity<Blend>{}, std::type_identity<Lighting>{}).
 template <class F>
 auto visitBlendAndLight(const Scene& scene, F&& f) {
   const auto with = [&](auto blend) {
-    return visitLight(scene, [&](auto features) { return f(blend, features); });
+    return visitLight(scene, [&](auto lighting) { return f(blend, lighting); });
   };
   switch (scene.blend) {
     case BlendMode::density:

@@ -96,6 +96,8 @@ void placeLights(const Scene& scene, const Grid& grid, kernel::SceneView* view) 
   view->worldFromVoxel = glm::mat3(glm::dmat3(grid.worldFromVoxel) / smallest);
   view->gradientFromVoxel = glm::mat3(grid.gradientFromVoxel());
   view->smallestSpacing = float(smallest);
+  view->shading = scene.shading;
+  view->shadows = scene.shadows;
   view->lightCount = 0;
   if (std::none_of(scene.channels.begin(), scene.channels.end(),
                    [&](const ChannelAppearance& channel) { return respondsToLight(scene, channel); }))

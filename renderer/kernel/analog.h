@@ -66,22 +66,21 @@ SCOLOPAX_HD bool isBlocked(const View& scene, const Ray& ray, Interval inside, i
 /// The lit colour at a collision: that of its channel or, in mix, of all channels, each lit with its own
 /// material before it is weighted (Eq. 10). If the ray ends at `surface` instead, which may be null, the lit
 /// colour of that.
-template <class Tracker, class Blend, class Features, class View>
+template <class Tracker, class Blend, class Lighting, class View>
 SCOLOPAX_HD glm::vec3 radiance(const View& scene, const Ray& ray, const Collision& hit,
                                const SurfaceHit<One>* surface, Sampler& sampler, SampleCost* cost) {
   const bool onSurface = surface != nullptr;
   const LitPoint<One> at{ray, hit.place.t(), insideOf<One>(scene.clip, hit.point)};
   Visibility<One> visibility;
-  if constexpr (Features::kAny)
-    visibility = visibilityAt<Features>(scene, at, true, [&](const Ray& shadowRay, Interval part) {
+  if constexpr (Lighting::kAny)
+    visibility = visibilityAt(scene, at, true, [&](const Ray& shadowRay, Interval part) {
       const SurfaceStart<One> start = onSurface ? surface->surface : SurfaceStart<One>{};
       return isBlocked<Tracker, Blend>(scene, shadowRay, part, hit.channel, start, sampler, cost) ? 0.0f
                                                                                                   : 1.0f;
     });
   const auto show = [&](const ChannelView& channel, float position) {
     const glm::vec3 color = onSurface ? surface->color : evaluate(channel.color, position);
-    if constexpr (Features::kAny)
-      return lit<Features>(scene, channel, color, at, visibility, true, onSurface, cost);
+    if constexpr (Lighting::kAny) return lit(scene, channel, color, at, visibility, true, onSurface, cost);
     return color;
   };
   if (Blend::kMixes && !onSurface) {
@@ -106,7 +105,7 @@ template <class Tracker>
 struct Analog {
   /// Linear premultiplied RGBA of one sample along a ray. If it ends at a collision or surface and `first` is
   /// not null, sets `first` to it.
-  template <class Blend, class Features, class View>
+  template <class Blend, class Lighting, class View>
   SCOLOPAX_HD static glm::vec4 sample(const View& scene, const Ray& ray, Interval inside, Sampler& sampler,
                                       SampleCost* cost, FirstCollision* first) {
     const auto follow = [&](std::uint32_t channels, auto&& track, glm::vec4* sum) {
@@ -124,7 +123,7 @@ struct Analog {
             {surface->t, 0.0f}, ray.origin + surface->t * ray.direction, surface->surface.channel, 0.0f};
       }
       if (first) keepNearer(first, {hit->place.t(), hit->channel});
-      const glm::vec3 color = radiance<Tracker, Blend, Features>(scene, ray, *hit, ending, sampler, cost);
+      const glm::vec3 color = radiance<Tracker, Blend, Lighting>(scene, ray, *hit, ending, sampler, cost);
       *sum = glm::vec4(glm::vec3(*sum) + color, 1.0f);
     };
     glm::vec4 sum(0.0f);

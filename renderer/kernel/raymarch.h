@@ -68,7 +68,7 @@ struct Marched {
 
 /// Adds the surfaces that rays meet up to `reached`. A tracker's ray would end where the opacity of surfaces
 /// passes `end`; `offset` is the jitter of shadow rays.
-template <class Features, class Steps, class L, class Blend, class View>
+template <class Lighting, class Steps, class L, class Blend, class View>
 SCOLOPAX_LANES_RARE void meetSurfaces(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                       std::uint32_t channels, const typename L::Float& reached,
                                       const typename L::Float& end, const typename L::Float& offset,
@@ -85,7 +85,7 @@ SCOLOPAX_LANES_RARE void meetSurfaces(const View& scene, const Blend& blend, con
         (hit.t < kInfinity) & (hit.t <= reached) & (light.transmittance > scene.opaque.transmittance);
     if (!any(met)) return;
     Vec radiance = hit.color;
-    if constexpr (Features::kAny) {
+    if constexpr (Lighting::kAny) {
       places.t = hit.t;
       places.offset = offset;
       places.kept = Word(0u);
@@ -96,7 +96,7 @@ SCOLOPAX_LANES_RARE void meetSurfaces(const View& scene, const Blend& blend, con
         places.share[n] = Float(1.0f);
         places.color[n] = hit.color;
       }
-      findLight<Features, Steps, L>(scene, blend, ray, channels, places, hit.surface, met, cost, &radiance);
+      findLight<Steps, L>(scene, blend, ray, channels, places, hit.surface, met, cost, &radiance);
     }
     const Float absorbedHere = where(met, light.transmittance * hit.opacity);
     light.color = light.color + radiance * absorbedHere;
@@ -111,7 +111,7 @@ SCOLOPAX_LANES_RARE void meetSurfaces(const View& scene, const Blend& blend, con
 
 /// Marches rays through `channels` (bit n: visible channel n). `set` keeps the random numbers of several such
 /// marches apart.
-template <class Features, class Steps, class L, class Blend, class View>
+template <class Lighting, class Steps, class L, class Blend, class View>
 SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                     const IntervalOf<L>& inside, std::uint32_t channels, int set,
                                     SamplerOf<L>& sampler, const SamplerOf<L>& ofStrata, CostOf<L>* cost,
@@ -119,7 +119,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
   using Float = typename L::Float;
   using Mask = typename L::Mask;
   using Vec = typename L::Vec;
-  constexpr Detail kDetail = Features::kAny ? Detail::moment : Detail::emission;
+  constexpr Detail kDetail = Lighting::kAny ? Detail::moment : Detail::emission;
   Vec color(0.0f);
   Float transmittance(1.0f), opacity(0.0f);  // both: 1 - transmittance loses the digits of thin matter
   const Mask meets = inside.enter < inside.exit;
@@ -133,7 +133,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
   Vec ofSurfaces(0.0f);  // and so is what they add to the colour
   if (hasSurfaces) [[unlikely]]
     ahead.begin(scene, ray, inside, channels, cost);
-  using OfStrata = Strata<Features, Steps, L, Blend, View>;
+  using OfStrata = Strata<Steps, L, Blend, View>;
   [[maybe_unused]] typename OfStrata::Memory memory;
   [[maybe_unused]] OfStrata strata(memory, scene, blend, ray, channels, set, ofStrata, cost);
   typename Steps::template Scalars<L, View> scalars;
@@ -153,7 +153,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
         emission = Vec(0.0f);
         extinction = visitParts<kDetail>(scene, blend, segment, scalars, hidden,
                                          [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
-                                           if constexpr (Features::kAny) memory.parts[n] = part;
+                                           if constexpr (Lighting::kAny) memory.parts[n] = part;
                                            emission = emission + part.emission;
                                          });
         if constexpr (Steps::kDivides) {
@@ -169,7 +169,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
         transmittance = transmittance * (1.0f - alpha);
         more = more && along.keep(transmittance > scene.opaque.transmittance);
         emission = emission * where(some, absorbedHere / extinction);
-        if constexpr (!Features::kAny) color = color + emission;
+        if constexpr (!Lighting::kAny) color = color + emission;
         if (first) [[unlikely]]
           if (const Mask met = open & some & (opacity + solid > end); any(met)) {
             open = without(open, met);
@@ -181,13 +181,13 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
         continue;
       }
       last = !more && spans.done(transmittance > scene.opaque.transmittance);
-      if constexpr (Features::kAny)
+      if constexpr (Lighting::kAny)
         strata.absorb(before, opacity, last, segment, extinction, emission, color);
     }
     if (hasSurfaces) [[unlikely]] {
       // A copy, so that the ray's light itself need not be in memory.
       Marched<L> marched{transmittance, solid, ofSurfaces, open};
-      meetSurfaces<Features, Steps, L>(scene, blend, ray, channels, span.exit, end - opacity,
+      meetSurfaces<Lighting, Steps, L>(scene, blend, ray, channels, span.exit, end - opacity,
                                        uniformOf(random.z), ahead, marched, cost, first);
       transmittance = marched.transmittance;
       solid = marched.opacity;
@@ -200,15 +200,15 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
 
 template <class Steps>
 struct RayMarch {
-  template <class Blend, class Features, class View>
+  template <class Blend, class Lighting, class View>
   SCOLOPAX_HD static glm::vec4 sample(const View& scene, const Ray& ray, Interval inside, Sampler& sampler,
                                       SampleCost* cost, FirstCollision* first) {
     const Blending<Blend::kSums> blend{Blend::kSeparate, Blend::kMixes};
-    const Radiance<One> radiance = march<Features>(scene, blend, ray, inside, sampler, cost, first);
+    const Radiance<One> radiance = march<Lighting>(scene, blend, ray, inside, sampler, cost, first);
     return glm::vec4(radiance.color, radiance.opacity);
   }
 
-  template <class Features, class L, class Blend, class View>
+  template <class Lighting, class L, class Blend, class View>
   SCOLOPAX_LANES static Radiance<L> march(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                           const IntervalOf<L>& inside, SamplerOf<L>& sampler, CostOf<L>* cost,
                                           FirstCollisionOf<L>* first) {
@@ -218,7 +218,7 @@ struct RayMarch {
     for (int n = 0; n < (blend.separate ? scene.channelCount : 1); ++n) {
       const std::uint32_t channels =
           blend.separate ? 1u << n : ~0u >> (kMaxVisibleChannels - scene.channelCount);
-      const Radiance<L> alone = marchRay<Features, Steps>(
+      const Radiance<L> alone = marchRay<Lighting, Steps>(
           scene, blend, ray, inside, channels, blend.separate ? n : 0, sampler, ofStrata, cost, first);
       sum.color = sum.color + alone.color;
       sum.opacity = sum.opacity + (1.0f - sum.opacity) * alone.opacity;

@@ -27,7 +27,7 @@ SCOLOPAX_LANES PixelRay<L> rayThrough(const SceneView& scene, typename L::Int co
 }
 
 /// Integrator: Analog<Tracker> or RayMarch.
-template <class Integrator, class Blend, class Features, class View = SceneView>
+template <class Integrator, class Blend, class Lighting, class View = SceneView>
 struct RenderPixel {
   View scene;
   SampleNumber number;
@@ -45,7 +45,7 @@ struct RenderPixel {
     glm::vec4 result(0.0f);
     FirstCollision met;
     if (scene.channelCount > 0 && at.inside.enter < at.inside.exit)
-      result = Integrator::template sample<Blend, Features>(scene, at.ray, at.inside, sampler, &spent,
+      result = Integrator::template sample<Blend, Lighting>(scene, at.ray, at.inside, sampler, &spent,
                                                             first ? &met : nullptr);
     pass[pixel] = result;
     if (first) first[pixel] = {scene.rays.depth(at.x, at.y, met.depth), met.channel};

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lighting at a point of a ray: gradient shading and shadows (renderer section 4.6). Both are template
-// parameters of the kernel, so a scene's kernel contains no code for features that the scene does not use.
+// Lighting at a point of a ray: gradient shading and shadows (renderer section 4.6).
 #pragma once
 #include "renderer/kernel/trackers/process_per_channel.h"
 
 namespace scolopax::kernel {
 
-/// The lighting features that a scene uses. Kernels are instantiated for every combination.
-template <bool kShadingOn, bool kShadowsOn>
-struct LightFeatures {
-  static constexpr bool kShading = kShadingOn, kShadows = kShadowsOn;
-  static constexpr bool kAny = kShading || kShadows;
+/// Whether a scene has shading or shadows. The kernels of scenes that have neither contain no code for light.
+struct Lit {
+  static constexpr bool kAny = true;
+};
+struct Unlit {
+  static constexpr bool kAny = false;
 };
 
 /// Points on rays at which lighting is evaluated, inside the clipped volume.
@@ -55,7 +55,7 @@ struct Visibility {
 /// Visibility of the lights at points, for lanes in `which`. shadow(ray, interval) returns the ray's
 /// transmittance, in [0,1], over the interval, which is its part before the light and inside the clipped
 /// volume.
-template <class Features, class L, class Shadow>
+template <class L, class Shadow>
 SCOLOPAX_LANES Visibility<L> visibilityAt(const SceneView& scene, const LitPoint<L>& hit,
                                           typename L::Mask which, Shadow&& shadow) {
   using Float = typename L::Float;
@@ -66,7 +66,7 @@ SCOLOPAX_LANES Visibility<L> visibilityAt(const SceneView& scene, const LitPoint
   Vec seen(0.0f);
   for (int i = 0; i < scene.lightCount; ++i) {
     visibility.lights[i] = Float(1.0f);
-    if constexpr (Features::kShadows) {
+    if (scene.shadows) {
       const ToLight<L> way = toLight(scene, scene.lights[i], hit);
       const RayOf<L> shadowRay{hit.point, way.direction};
       IntervalOf<L> inside = clipToScene(scene, shadowRay);
@@ -85,7 +85,7 @@ SCOLOPAX_LANES Visibility<L> visibilityAt(const SceneView& scene, const LitPoint
 /// L = c [(1-s) A + s (ka + kd sum I V max(n.l, 0))] + s ks sum I V max(n.h, 0)^p. Shading fades with the
 /// magnitude g of the gradient, by s = 1 - (1-g)^2 (Kniss et al. 2002, 6.3). A dims unshaded matter in
 /// shadow. For rays in `onSurface`, s = 1 where there is a gradient.
-template <class Features, class L>
+template <class L>
 SCOLOPAX_LANES typename L::Vec lit(const SceneView& scene, const ChannelView& channel,
                                    const typename L::Vec& color, const LitPoint<L>& hit,
                                    const Visibility<L>& visibility, typename L::Mask which,
@@ -95,10 +95,9 @@ SCOLOPAX_LANES typename L::Vec lit(const SceneView& scene, const ChannelView& ch
   using Vec = typename L::Vec;
   const MaterialView& material = channel.material;
   Vec ambient(1.0f);
-  if constexpr (Features::kShadows)
-    ambient = Vec(material.ambient) + (1.0f - material.ambient) * visibility.share;
+  if (scene.shadows) ambient = Vec(material.ambient) + (1.0f - material.ambient) * visibility.share;
   const Vec unshaded = color * ambient;
-  if constexpr (!Features::kShading) return unshaded;
+  if (!scene.shading) return unshaded;
 
   // Scaled by its largest component: stored values may be as large or as small as floats allow, so squares of
   // the gradient may overflow or underflow.

@@ -71,7 +71,7 @@ struct StratumPlaces {
 
 /// Computes the lit radiance of a unit of absorbed light at such points, for lanes in `which`. `surface`: on
 /// which they lie, if they do.
-template <class Features, class Steps, class L, class Blend, class View>
+template <class Steps, class L, class Blend, class View>
 SCOLOPAX_LANES_APART void findLight(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                     std::uint32_t channels, const StratumPlaces<L>& places,
                                     const SurfaceStart<L>& surface, const typename L::Mask& which,
@@ -80,7 +80,7 @@ SCOLOPAX_LANES_APART void findLight(const View& scene, const Blend& blend, const
   using Vec = typename L::Vec;
   const LitPoint<L> hit{ray, places.t, insideOf<L>(scene.clip, ray.origin + places.t * ray.direction)};
 
-  const Visibility<L> visibility = visibilityAt<Features>(
+  const Visibility<L> visibility = visibilityAt(
       scene, hit, which, [&](const RayOf<L>& shadow, const IntervalOf<L>& part) SCOLOPAX_LANES_LAMBDA {
         return marchTransmittance<L, Steps>(scene, blend, shadow, part, channels, places.offset, surface,
                                             cost);
@@ -91,8 +91,8 @@ SCOLOPAX_LANES_APART void findLight(const View& scene, const Blend& blend, const
     const Word bit(1u << n);
     const typename L::Mask here = which & ((places.kept & bit) == bit);
     if (!any(here)) continue;
-    const Vec light = places.share[n] * lit<Features>(scene, scene.channels[n], places.color[n], hit,
-                                                      visibility, here, onSurface, cost);
+    const Vec light = places.share[n] *
+                      lit(scene, scene.channels[n], places.color[n], hit, visibility, here, onSurface, cost);
     sum = select(here, sum + light, sum);
   }
   *radiance = sum;
@@ -150,7 +150,7 @@ class StrataSum {
 /// absorption passes a record, the point moves on to that record's segment.
 ///
 /// With one lane, strata are lit as they end. With many, they wait until there is one for every lane.
-template <class Features, class Steps, class L, class Blend, class View>
+template <class Steps, class L, class Blend, class View>
 class Strata {
  public:
   using Float = typename L::Float;
@@ -287,7 +287,7 @@ class Strata {
     if constexpr (L::kLanes == 1) {
       if (which) {
         Vec lit;
-        findLight<Features, Steps, L>(scene_, blend_, ray_, channels_, places, {}, which, cost_, &lit);
+        findLight<Steps, L>(scene_, blend_, ray_, channels_, places, {}, which, cost_, &lit);
         sum_.add({lit, radiance_, emission_, mass}, color);
       }
     } else {
@@ -325,8 +325,8 @@ class Strata {
     }
     CostOf<L> spent{};
     Vec sum;
-    findLight<Features, Steps, L>(scene_, blend_, rays, channels_, waiting.places, {},
-                                  Int(count_) > L::laneNumbers(), &spent, &sum);
+    findLight<Steps, L>(scene_, blend_, rays, channels_, waiting.places, {}, Int(count_) > L::laneNumbers(),
+                        &spent, &sum);
     for (int i = 0; i < count_; ++i) {
       const int to = at(ray, i);
       const Mask lane = L::laneNumbers() == Int(to);

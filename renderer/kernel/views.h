@@ -142,7 +142,8 @@ struct SceneView {
   float thickest;       ///< optical depth above which voxelwise segments are shortened
   OpacityLimit opaque;  ///< where marched rays end
   float stratum;        ///< share of a ray's light per lighting computation of quadrature (strata.h)
-  int lightCount;       ///< 0 unless shading or shadows are on
+  bool shading, shadows;
+  int lightCount;  ///< 0 unless one of them is on
   LightView lights[kMaxLights];
   glm::mat3 worldFromVoxel;  ///< linear part, in units of the smallest spacing, so that lengths are near 1 at
                              ///< any scale

@@ -21,10 +21,16 @@ ALL = {"registers": 168, "spill": 304, "stack": 160}
 ALL_LIT = {"registers": 168, "spill": 1336, "stack": 600}
 
 
+def is_unlit(name):
+    return "5UnlitE" in name
+
+
 def limits_of(name):
-    lit, plain = "LightFeaturesILb0ELb0E" not in name, "PlainSceneView" in name
-    if lit or not plain:
-        return (PLAIN_LIT if plain else ALL_LIT) if lit else ALL
+    plain = "PlainSceneView" in name
+    if not is_unlit(name):
+        return PLAIN_LIT if plain else ALL_LIT
+    if not plain:
+        return ALL
     return PLAIN_APART if "RayMarch" not in name and re.search("NDda|SyncDda|BlendComposite", name) else PLAIN
 
 
@@ -36,9 +42,8 @@ def marching_arrays(name):
     factor = 0 if "PlainSceneView" in name else number
     sums = "BlendDensity" in name or "BlendComposite" in name
     segment = 32 * (2 * (point + factor) + (0 if sums else part))
-    shading, shadows = re.search(r"LightFeaturesILb(\d)ELb(\d)E", name).groups()
-    strata = 32 * (part + number + color) if "1" in shading + shadows else 0
-    return segment + strata + (segment if shadows == "1" else 0)  # shadow rays have a segment too
+    strata = 32 * (part + number + color)
+    return segment if is_unlit(name) else 2 * segment + strata  # shadow rays have a segment too
 
 
 KERNEL = re.compile(r"entry function '(\w+)'.*?(\d+) bytes stack frame, (\d+) bytes spill stores.*?Used (\d+) registers",

@@ -90,7 +90,7 @@ inline Replicates replicateLevels(const std::shared_ptr<const Volume>& volume, S
 /// The same pictures from one kernel of the test's choice, on a view to which `change` may have added a
 /// defect. `change(view)` is called for every replicate; objects that it makes the view point to must live
 /// until the next call.
-template <class Integrator, class Blend, class Features, class Change>
+template <class Integrator, class Blend, class Lighting, class Change>
 Replicates replicateKernel(const std::shared_ptr<const Volume>& volume, Scene scene, Change&& change) {
   Replicates result{{}, samplesPerReplicate()};
   std::shared_ptr<const RenderPlan> plan;
@@ -103,7 +103,7 @@ Replicates replicateKernel(const std::shared_ptr<const Volume>& volume, Scene sc
     std::vector<glm::vec4> pass(count);
     std::vector<glm::dvec4> sum(count, glm::dvec4(0));
     for (int s = 0; s < result.samples; ++s) {
-      const kernel::RenderPixel<Integrator, Blend, Features> pixel{
+      const kernel::RenderPixel<Integrator, Blend, Lighting> pixel{
           view, sampleNumber(scene.sampling, std::uint32_t(s)), pass.data(), nullptr};
       for (int i = 0; i < int(count); ++i) {
         pixel(i);

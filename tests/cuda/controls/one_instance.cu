@@ -9,8 +9,8 @@
 namespace scolopax::test {
 
 cuda::LaunchFunction oneInstance() {
-  return cuda::launch<kernel::Analog<kernel::SyncDda>, kernel::BlendDensity,
-                      kernel::LightFeatures<true, true>, kernel::PlainSceneView>;
+  return cuda::launch<kernel::Analog<kernel::SyncDda>, kernel::BlendDensity, kernel::Lit,
+                      kernel::PlainSceneView>;
 }
 
 }  // namespace scolopax::test

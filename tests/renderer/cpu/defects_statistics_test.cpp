@@ -21,8 +21,9 @@ namespace {
 
 using namespace test;
 using kernel::Analog;
-using kernel::LightFeatures;
+using kernel::Lit;
 using kernel::SceneView;
+using kernel::Unlit;
 
 /// Shadow rays are those that begin inside the box: the eyes of the test scenes are outside.
 bool isShadowRay(kernel::Interval inside) { return !(inside.enter > 0); }
@@ -93,14 +94,14 @@ class Defect : public testing::Test {
     expected_ = reference::renderReference(*made_.volume, made_.scene, 1);
   }
   /// Compares the scene rendered by this kernel, with a defect that `change` puts into the view.
-  template <class Tracker, class Blend, class Features = LightFeatures<false, false>, class Change>
+  template <class Tracker, class Blend, class Lighting = Unlit, class Change>
   ::testing::AssertionResult passes(Change&& change) {
-    const auto found = replicateKernel<Analog<Tracker>, Blend, Features>(made_.volume, made_.scene, change);
+    const auto found = replicateKernel<Analog<Tracker>, Blend, Lighting>(made_.volume, made_.scene, change);
     return haveMean(found, made_.scene, expected_);
   }
-  template <class Tracker, class Blend, class Features>
+  template <class Tracker, class Blend, class Lighting>
   ::testing::AssertionResult passes() {
-    return passes<Tracker, Blend, Features>([](SceneView&) {});
+    return passes<Tracker, Blend, Lighting>([](SceneView&) {});
   }
   /// Compares the backend's picture of a changed scene with the reference's of the original.
   ::testing::AssertionResult passesWith(const std::function<void(Scene&)>& change) {
@@ -144,15 +145,10 @@ class Defect : public testing::Test {
   Bounds majorants_;
 };
 
-using Unlit = LightFeatures<false, false>;
-using Shaded = LightFeatures<true, false>;
-using Shadowed = LightFeatures<false, true>;
-using Both = LightFeatures<true, true>;
-
 TEST_F(Defect, NoneIsFoundWhereThereIsNone) {
   use(TestScene::figure3, BlendMode::density, true, true);
-  EXPECT_TRUE((passes<kernel::Superposed, kernel::BlendDensity, Both>()));
-  EXPECT_TRUE((passes<kernel::NDda, kernel::BlendDensity, Both>([&](SceneView& view) {
+  EXPECT_TRUE((passes<kernel::Superposed, kernel::BlendDensity, Lit>()));
+  EXPECT_TRUE((passes<kernel::NDda, kernel::BlendDensity, Lit>([&](SceneView& view) {
     ownChannels(view);
     ownMajorants(view);
   })));
@@ -211,21 +207,21 @@ TEST_F(Defect, OfALightThatShinesTheOtherWayIsFound) {
 
 TEST_F(Defect, OfShadowRaysThatLookTheOtherWayIsFound) {
   use(TestScene::lumps, BlendMode::density, false, true);
-  EXPECT_FALSE((passes<FlippedShadows, kernel::BlendDensity, Shadowed>()));
+  EXPECT_FALSE((passes<FlippedShadows, kernel::BlendDensity, Lit>()));
   use(TestScene::lumps, BlendMode::max, true, true);
-  EXPECT_FALSE((passes<FlippedShadows, kernel::BlendMax, Both>()));
+  EXPECT_FALSE((passes<FlippedShadows, kernel::BlendMax, Lit>()));
 }
 
 TEST_F(Defect, OfShadowRaysThatMissOneChannelIsFound) {
   use(TestScene::lumps, BlendMode::density, false, true);
-  EXPECT_FALSE((passes<ShadowsWithoutTheLastChannel, kernel::BlendDensity, Shadowed>()));
+  EXPECT_FALSE((passes<ShadowsWithoutTheLastChannel, kernel::BlendDensity, Lit>()));
   use(TestScene::lumps, BlendMode::density, true, true);
-  EXPECT_FALSE((passes<ShadowsWithoutTheLastChannel, kernel::BlendDensity, Both>()));
+  EXPECT_FALSE((passes<ShadowsWithoutTheLastChannel, kernel::BlendDensity, Lit>()));
 }
 
 TEST_F(Defect, OfShadowRaysThatBeginLateIsFound) {
   use(TestScene::lumps, BlendMode::density, false, true);
-  EXPECT_FALSE((passes<ShadowsThatBeginLate, kernel::BlendDensity, Shadowed>()));
+  EXPECT_FALSE((passes<ShadowsThatBeginLate, kernel::BlendDensity, Lit>()));
 }
 
 TEST_F(Defect, OfTheFirstChannelsMaterialForAllIsFound) {
@@ -233,18 +229,18 @@ TEST_F(Defect, OfTheFirstChannelsMaterialForAllIsFound) {
     for (auto& channel : ownChannels(view)) channel.material = view.channels[0].material;
   };
   use(TestScene::lumps, BlendMode::density, true, false);
-  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendDensity, Shaded>(firstMaterial)));
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendDensity, Lit>(firstMaterial)));
   use(TestScene::lumps, BlendMode::max, true, false);
-  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendMax, Shaded>(firstMaterial)));
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendMax, Lit>(firstMaterial)));
   use(TestScene::lumps, BlendMode::mix, true, false);
-  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendMix, Shaded>(firstMaterial)));
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendMix, Lit>(firstMaterial)));
   use(TestScene::lumps, BlendMode::composite, true, false);
-  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendComposite, Shaded>(firstMaterial)));
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendComposite, Lit>(firstMaterial)));
 }
 
 TEST_F(Defect, OfGradientsInUnitsOfVoxelsIsFound) {
   use(TestScene::lumps, BlendMode::density, true, false);
-  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendDensity, Shaded>(
+  EXPECT_FALSE((passes<kernel::Superposed, kernel::BlendDensity, Lit>(
       [](SceneView& view) { view.gradientFromVoxel = glm::mat3(1.0f); })));
 }
 
@@ -298,8 +294,8 @@ TEST_F(Defect, OfShadowsOfWhatIsClippedIsFound) {
   made_.scene.shadows = true;
   clipOften(made_.scene, made_.volume->grid());
   expected_ = reference::renderReference(*made_.volume, made_.scene, 1);
-  EXPECT_TRUE((passes<kernel::Superposed, kernel::BlendDensity, Shadowed>()));
-  EXPECT_FALSE((passes<ShadowsOfWhatIsClipped, kernel::BlendDensity, Shadowed>()));
+  EXPECT_TRUE((passes<kernel::Superposed, kernel::BlendDensity, Lit>()));
+  EXPECT_FALSE((passes<ShadowsOfWhatIsClipped, kernel::BlendDensity, Lit>()));
 }
 
 TEST_F(Defect, OfWeightsThatAreForgottenIsFound) {

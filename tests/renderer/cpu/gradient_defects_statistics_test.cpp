@@ -16,9 +16,9 @@ namespace scolopax {
 namespace {
 
 using namespace test;
+using kernel::Lit;
 using kernel::SceneView;
-using Unlit = kernel::LightFeatures<false, false>;
-using Shadowed = kernel::LightFeatures<false, true>;
+using kernel::Unlit;
 
 /// Shadow rays, which begin inside the box, use the opacity without the factor.
 struct ShadowsWithoutFactors {
@@ -45,9 +45,9 @@ class GradientDefect : public testing::Test {
       made_.scene.channels[n].gradientOpacity = factorBetween(*made_.volume, n, 0.2, 0.9);
     expected_ = reference::renderReference(*made_.volume, made_.scene, 1);
   }
-  template <class Tracker = kernel::Superposed, class Features = Unlit, class Change>
+  template <class Tracker = kernel::Superposed, class Lighting = Unlit, class Change>
   ::testing::AssertionResult trackerPasses(Change&& change) {
-    return haveMean(replicateKernel<kernel::Analog<Tracker>, kernel::BlendDensity, Features>(
+    return haveMean(replicateKernel<kernel::Analog<Tracker>, kernel::BlendDensity, Lighting>(
                         made_.volume, made_.scene, change),
                     made_.scene, expected_);
   }
@@ -85,7 +85,7 @@ TEST_F(GradientDefect, NoneIsFoundWhereThereIsNone) {
   use(TestScene::lumps);
   EXPECT_LT(marcherError([](SceneView&) {}), kQuadratureError);
   use(TestScene::lumps, true);
-  EXPECT_TRUE((trackerPasses<kernel::Superposed, Shadowed>([](SceneView&) {})));
+  EXPECT_TRUE((trackerPasses<kernel::Superposed, Lit>([](SceneView&) {})));
 }
 
 TEST_F(GradientDefect, OfAFactorThatIsIgnoredIsFound) {
@@ -101,7 +101,7 @@ TEST_F(GradientDefect, OfAFactorThatIsIgnoredIsFound) {
 
 TEST_F(GradientDefect, OfShadowsThatIgnoreItIsFound) {
   use(TestScene::lumps, true);
-  EXPECT_FALSE((trackerPasses<ShadowsWithoutFactors, Shadowed>([](SceneView&) {})));
+  EXPECT_FALSE((trackerPasses<ShadowsWithoutFactors, Lit>([](SceneView&) {})));
 }
 
 TEST_F(GradientDefect, OfGradientsInUnitsOfVoxelsIsFound) {

@@ -80,7 +80,7 @@ constexpr double kBias = 5e-3;
 
 /// A defect: a collision is shaded at one place, but the light that reaches it is computed at another.
 struct LitAtPlacesApart {
-  template <class Blend, class Features>
+  template <class Blend, class Lighting>
   static glm::vec4 sample(const kernel::SceneView& scene, const kernel::Ray& ray, kernel::Interval inside,
                           kernel::Sampler& sampler, kernel::SampleCost* cost, kernel::FirstCollision*) {
     const auto track = [&](const kernel::Ray& way, kernel::Interval part) {
@@ -93,12 +93,12 @@ struct LitAtPlacesApart {
     const auto place = [&](const kernel::Collision& of) {
       return kernel::LitPoint<kernel::One>{ray, of.place.t(), of.point};
     };
-    const auto visibility = kernel::visibilityAt<Features>(
+    const auto visibility = kernel::visibilityAt(
         scene, place(*other), true,
         [&](const kernel::Ray& way, kernel::Interval part) { return track(way, part) ? 0.0f : 1.0f; });
     const kernel::ChannelView& channel = scene.channels[hit->channel];
-    return glm::vec4(kernel::lit<Features>(scene, channel, kernel::evaluate(channel.color, hit->position),
-                                           place(*hit), visibility, true, false, cost),
+    return glm::vec4(kernel::lit(scene, channel, kernel::evaluate(channel.color, hit->position), place(*hit),
+                                 visibility, true, false, cost),
                      1);
   }
 };
@@ -143,18 +143,18 @@ TEST_P(ThinLight, FollowsANormalThatTurnsAlongTheRay) {
 }
 
 TEST(ThinLightDefect, OfVisibilityAndShadingAtDifferentPlacesIsFound) {
-  using Features = kernel::LightFeatures<false, true>;
   for (const double density : {0.002, 0.06}) {
     const VolumeAndScene made = litAndShadowed(density);
     Scene scene = made.scene;
     scene.shadows = true;
     const auto expected = reference::renderReference(*made.volume, scene, 1);
     const auto unspoilt = [](kernel::SceneView&) {};
-    EXPECT_TRUE(haveMean(replicateKernel<kernel::Analog<kernel::Superposed>, kernel::BlendDensity, Features>(
-                             made.volume, scene, unspoilt),
-                         scene, expected));
+    EXPECT_TRUE(
+        haveMean(replicateKernel<kernel::Analog<kernel::Superposed>, kernel::BlendDensity, kernel::Lit>(
+                     made.volume, scene, unspoilt),
+                 scene, expected));
     EXPECT_FALSE(haveMean(
-        replicateKernel<LitAtPlacesApart, kernel::BlendDensity, Features>(made.volume, scene, unspoilt),
+        replicateKernel<LitAtPlacesApart, kernel::BlendDensity, kernel::Lit>(made.volume, scene, unspoilt),
         scene, expected));
   }
 }

@@ -108,9 +108,8 @@ class SurfaceDefect : public testing::Test {
   ::testing::AssertionResult passes(const std::function<void(std::vector<kernel::SurfaceView>&)>& change) {
     std::vector<kernel::ChannelView> channels;
     std::vector<std::vector<kernel::SurfaceView>> surfaces;
-    const auto found =
-        replicateKernel<kernel::Analog<kernel::Superposed>, kernel::BlendDensity,
-                        kernel::LightFeatures<true, true>>(volume_, scene_, [&](kernel::SceneView& view) {
+    const auto found = replicateKernel<kernel::Analog<kernel::Superposed>, kernel::BlendDensity, kernel::Lit>(
+        volume_, scene_, [&](kernel::SceneView& view) {
           channels.assign(view.channels, view.channels + view.channelCount);
           surfaces.clear();
           for (kernel::ChannelView& channel : channels) {
