@@ -13,6 +13,10 @@ struct Unlit {
   static constexpr bool kAny = false;
 };
 
+/// A normal is turned towards the viewer if the cosine of its angle to the view is below this. Where a field is
+/// constant along the view, the cosine is 0 but for rounding, which must not decide about the normal.
+inline constexpr float kFacesAway = -1e-6f;
+
 /// Points on rays at which lighting is evaluated, inside the clipped volume.
 template <class L>
 struct LitPoint {
@@ -115,7 +119,7 @@ SCOLOPAX_LANES typename L::Vec lit(const SceneView& scene, const ChannelView& ch
   if (!any(shaded)) return unshaded;
   const Vec toViewer = normalize(-toWorld<L>(scene, hit.ray.direction));
   Vec normal = scaled * (1.0f / length);
-  normal = select(dot(normal, toViewer) < 0.0f, -normal, normal);
+  normal = select(dot(normal, toViewer) < kFacesAway, -normal, normal);
   Vec diffuse(0.0f), specular(0.0f);
   for (int i = 0; i < scene.lightCount; ++i) {
     const LightView& light = scene.lights[i];

@@ -83,9 +83,8 @@ glm::dvec3 Lighting::radiance(const Material& material, const glm::dvec3& color,
   const double g = shading_ ? std::min(1.0, steepness) : 0.0;
   const double s = 1 - (1 - g) * (1 - g);
   glm::dvec3 normal = unit(gradient);
-  // A normal at right angles to the view, within rounding, has no side towards the viewer; it stays as it is,
-  // so that the choice is the same all along a ray.
-  if (glm::dot(normal, toViewer) < -1e-12) normal = -normal;
+  // A normal at right angles to the view, within rounding, has no side towards the viewer; it stays as it is.
+  if (glm::dot(normal, toViewer) < -1e-6) normal = -normal;
   glm::dvec3 diffuse(0), specular(0);
   for (const ArrivingLight& light : lights) {
     const glm::dvec3 reaching = light.intensity * light.visibility;

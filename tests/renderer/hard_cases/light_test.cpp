@@ -125,6 +125,47 @@ TEST(ExactLight, OnSpacingsOfOneToAHundredHasTheNormalOfTheWorld) {
   field.expectRadiance(field.shaded(s, nl, 1));
 }
 
+/// A field that rises along an axis at right angles to the view, but for `tilt`: a picture of a rotated grid,
+/// lit from where the field rises to.
+double litAtRightAngles(double turn, double tilt, Method method) {
+  const glm::dvec3 across = glm::normalize(glm::dvec3(std::cos(turn), std::sin(turn), 0.3)),
+                   view = glm::normalize(glm::cross(across, glm::dvec3(0.2, 0.1, 1))),
+                   up = glm::cross(view, across);
+  Grid grid = gridOf({5, 6, 7});
+  grid.worldFromVoxel = glm::dmat4(glm::dvec4(0.0105778 * across, 0), glm::dvec4(0.0344994 * up, 0),
+                                   glm::dvec4(0.0389877 * view, 0), glm::dvec4(0.3, -0.2, 0.1, 1));
+  const auto volume =
+      volumeOf(grid, channelOf<std::int16_t>(grid.dims, [](int x, int, int) { return 1000 * x; }));
+  Scene scene = frontScene(*volume, 8, 8);
+  scene.camera.eye = scene.camera.target - grid.diagonal() * glm::normalize(view + tilt * across);
+  scene.camera.up = up;
+  scene.camera.orthoHeight = 0.03;
+  scene.channels[0] = solid(1000, kColor);
+  scene.channels[0].rangeHi = 1000;
+  scene.channels[0].material = {0, 1, 0, 1};
+  scene.shading = true;
+  scene.lights = {{LightType::directional, -across, glm::dvec3(1), 1}};
+  double lit = 0;
+  int seen = 0;
+  for (const glm::vec4& pixel : renderAnalog(volume, scene, method, 2).pixels) {
+    if (!(pixel.a > 0.9f)) continue;
+    ++seen;
+    lit += double(pixel.r / pixel.a) / kColor.r;
+  }
+  EXPECT_GT(seen, 30);
+  return lit / seen;
+}
+
+TEST(ExactLight, OnAFieldThatIsConstantAlongTheViewIsNotDecidedByRounding) {
+  for (int i = 0; i < 20; ++i)
+    for (const Method method : {Method::superposed, Method::raymarch}) {
+      EXPECT_NEAR(litAtRightAngles(0.31 * i, 0, method), 1, 1e-4) << i << ' ' << nameOf(method);
+      // The normal turns to the viewer where it clearly points away from it.
+      EXPECT_NEAR(litAtRightAngles(0.31 * i, 1e-5, method), 0, 1e-4) << i << ' ' << nameOf(method);
+      EXPECT_NEAR(litAtRightAngles(0.31 * i, -1e-5, method), 1, 1e-4) << i << ' ' << nameOf(method);
+    }
+}
+
 TEST(ExactLight, FromExactlyBehindHasNoHighlight) {
   // Light and view direction cancel: rounding decides where the half vector points. Also with rotated grids.
   LinearField field;

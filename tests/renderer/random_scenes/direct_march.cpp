@@ -263,8 +263,9 @@ class Marcher {
     const double s = 1 - (1 - g) * (1 - g);
     decisions->note(g < 1);
     dvec3 n = unit(gradient);
-    decisions->note(dot(n, viewer) < 0);
-    if (dot(n, viewer) < 0) n = -n;
+    const bool away = dot(n, viewer) < -1e-6;
+    decisions->note(away);
+    if (away) n = -n;
     dvec3 diffuse(0), specular(0);
     for (const Arriving& l : lights) {
       const double nl = dot(n, l.direction), nh = dot(n, unit(l.direction + viewer));
