@@ -72,11 +72,16 @@ class Bench:
         """Files of a scene; None, with a message, if one is missing."""
         if isinstance(SCENES[name], int):
             return self.orbitals(SCENES[name])
-        files = [os.path.join(DATA, file) for file in SCENES[name]]
-        missing = [file for file in files if not os.path.exists(file)]
+        return self.present(name, SCENES[name])
+
+    @staticmethod
+    def present(name, files):
+        """Paths of files of the data folder; None, with a message, if one is missing."""
+        paths = [os.path.join(DATA, file) for file in files]
+        missing = [path for path in paths if not os.path.exists(path)]
         if missing:
             print(f"{name}: left out, there is no {missing[0]}", file=sys.stderr)
-        return None if missing else files
+        return None if missing else paths
 
     @staticmethod
     def scene(name):
@@ -86,13 +91,14 @@ class Bench:
     def run(*words):
         return subprocess.run([PROGRAM, *map(str, words)], check=True, stdout=subprocess.PIPE, text=True).stdout
 
-    def truth(self, name, data, settings):
-        with open(self.scene(name), encoding="utf-8") as file:
+    def truth(self, scene, data, settings):
+        """The reference's picture of a scene file with `settings`."""
+        with open(scene, encoding="utf-8") as file:
             key = [file.read(), [(os.path.basename(path), os.path.getsize(path)) for path in data], settings, self.truth_side]
         out = os.path.join(self.truths, hashlib.sha256(json.dumps(key).encode()).hexdigest()[:20] + ".exr")
         if not os.path.exists(out):
             size = {"image.width": self.truth_side, "image.height": self.truth_side, "image.filter": "point"}
-            self.run("reference", self.scene(name), "--data", *data, "-o", out, *assignments({**settings, **size}))
+            self.run("reference", scene, "--data", *data, "-o", out, *assignments({**settings, **size}))
         return out
 
     def bench(self, name, settings=None, data=None, truth=True, side=None, **options):
@@ -102,7 +108,7 @@ class Bench:
         if data is None:
             return None
         out, side = self.path("bench.json"), side or self.side
-        words = ["--truth", self.truth(name, data, settings)] if truth else ["--times-only"]
+        words = ["--truth", self.truth(self.scene(name), data, settings)] if truth else ["--times-only"]
         for option, value in {"repetitions": self.repetitions, **options}.items():
             words += [f"--{option}", ",".join(map(str, value)) if isinstance(value, (list, tuple)) else value]
         begin = time.monotonic()

@@ -6,6 +6,7 @@ import os
 import time
 
 from common import LIGHTS, MULTICHANNEL, PROGRAM, SCENES, light_settings, median, resources
+from surface_experiment import surfaces
 
 
 def speed(bench):
@@ -158,4 +159,4 @@ def loading(bench):
     return found
 
 
-EXPERIMENTS = {f.__name__: f for f in (speed, macrocells, channels, quality, blends, memory, sizes, threads, loading)}
+EXPERIMENTS = {f.__name__: f for f in (speed, macrocells, channels, quality, blends, memory, sizes, threads, loading, surfaces)}

@@ -38,6 +38,10 @@ def main():
     written = remarks()
 
     def plot(name, figure):
+        if isinstance(figure, bytes):  # a JPEG picture
+            with open(os.path.join(options.out, f"{name}.jpg"), "wb") as file:
+                file.write(figure)
+            return f"![{name}]({name}.jpg)"
         save(figure, os.path.join(options.out, f"{name}.svg"))
         return f"![{name}]({name}.svg)"
 

@@ -2,17 +2,10 @@
 """The report's sections: Markdown tables and plots of an experiment's results. One function each, and one list of them.
 Every function gets the experiment's entry of run.py's file, and a function that saves a plot and returns its link."""
 from plots import lines
+from surface_sections import surfaces
+from tables import number, table
 
 TARGETS = ("0.01", "0.001")
-
-
-def table(header, rows):
-    out = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    return "\n".join(out + ["| " + " | ".join(map(str, row)) + " |" for row in rows]) + "\n"
-
-
-def number(value, digits=3):
-    return "-" if value is None else f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
 
 
 def by_method(rows):
@@ -217,4 +210,5 @@ REPORT = {
     "memory": ("Memory and rebuild times (Table 1)", [memory, rebuild]),
     "layout": ("Layout of the voxels", [layout]),
     "scaling": ("Scaling", [sizes, threads, loading]),
+    "surfaces": ("Sharp transfer functions and surfaces (Knoll et al. 2009)", [surfaces]),
 }

@@ -4,7 +4,7 @@
 import json
 import sys
 
-from sections import table
+from tables import table
 
 BAR = 5  # the goal: this many times faster than VTK
 
