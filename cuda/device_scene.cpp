@@ -28,17 +28,17 @@ DeviceScene::DeviceScene(const kernel::SceneView& host) : view_(host) {
   for (int n = 0; n < host.channelCount; ++n) {
     kernel::ChannelView& channel = channels[std::size_t(n)];
     // Each channel is stored by itself: neighbouring threads read neighbouring voxels of one channel.
-    visitScalarType(channel.type, [&](auto zero) {
+    visitScalarType(channel.field.type, [&](auto zero) {
       using T = decltype(zero);
-      const T* mixed = static_cast<const T*>(channel.voxels) + channel.lane;
+      const T* mixed = static_cast<const T*>(channel.field.voxels) + channel.field.lane;
       std::vector<T> plane(voxels);
-      for (std::size_t i = 0; i < voxels; ++i) plane[i] = mixed[i * std::size_t(channel.stride)];
+      for (std::size_t i = 0; i < voxels; ++i) plane[i] = mixed[i * std::size_t(channel.field.stride)];
       const T* moved = plane.data();
       moveToDevice(&moved, voxels);
-      channel.voxels = moved;
+      channel.field.voxels = moved;
     });
-    channel.lane = 0;
-    channel.stride = 1;
+    channel.field.lane = 0;
+    channel.field.stride = 1;
     moveToDevice(&channel.opacity);
     moveToDevice(&channel.color);
     moveToDevice(&channel.optical);

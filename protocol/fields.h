@@ -133,6 +133,8 @@ struct Table<Channel> {
           "[lo, hi]: the data values at positions 0 and 1 of the curves; scalars outside clamp to the ends. "
           "lo > hi reverses, lo = hi is a step. null is chosen from the histogram.",
           {.unit = "data units"}),
+      field("interpolation", &Channel::interpolation,
+            "How values between voxel centres follow from the voxels.", {.names = &Lists::interpolations}),
       field("color", &Channel::color,
             "One colour for all values. Not together with colormap; null for both is chosen by the server.",
             {.color = true}),

@@ -20,6 +20,7 @@ struct Lists {
   std::vector<EnumEntry> colormaps;
   std::vector<EnumEntry> lightTypes;
   std::vector<EnumEntry> peaks;
+  std::vector<EnumEntry> interpolations;
 };
 
 }  // namespace scolopax::protocol

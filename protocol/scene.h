@@ -52,6 +52,7 @@ struct Channel {
   std::optional<std::string> name;
   bool visible = true;
   std::optional<std::array<double, 2>> range;
+  std::string interpolation = "trilinear";
   std::optional<std::string> color;  ///< "#rrggbb"; never together with colormap
   std::optional<Colormap> colormap;
   std::vector<ControlPoint> opacity{{0, 0}, {1, 1}};

@@ -68,6 +68,7 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
           {"aovs", std::move(aovs)},
           {"lightTypes", named(lists.lightTypes)},
           {"peaks", named(lists.peaks)},
+          {"interpolations", named(lists.interpolations)},
           {"colormaps", std::move(maps)},
           {"imageFormats", std::move(formats)},
           {"limits",

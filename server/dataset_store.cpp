@@ -11,6 +11,7 @@
 
 #include "protocol/problem.h"
 #include "renderer/core/error.h"
+#include "renderer/data/field_view.h"
 
 namespace scolopax::server {
 namespace {
@@ -35,8 +36,9 @@ double voxelValue(const Channel& channel, std::size_t index) {
   return channel.slope * stored + channel.intercept;
 }
 
-/// Interpolates trilinearly at a voxel position between the outer voxel centres.
-double interpolate(const Channel& channel, const glm::ivec3& dims, const glm::dvec3& voxel) {
+/// Interpolates trilinearly at a voxel position between the outer voxel centres. In double, as values of the
+/// data are told; the renderer does so in float.
+double interpolateTrilinearly(const Channel& channel, const glm::ivec3& dims, const glm::dvec3& voxel) {
   double sum = 0;
   for (int corner = 0; corner < 8; ++corner) {
     double weight = 1;
@@ -52,6 +54,12 @@ double interpolate(const Channel& channel, const glm::ivec3& dims, const glm::dv
     sum += weight * voxelValue(channel, index);
   }
   return sum;
+}
+
+double interpolate(const Channel& channel, const glm::ivec3& dims, const glm::dvec3& voxel,
+                   Interpolation interpolation) {
+  if (interpolation == Interpolation::trilinear) return interpolateTrilinearly(channel, dims, voxel);
+  return channel.slope * double(sampleStored(channel, dims, voxel, interpolation)) + channel.intercept;
 }
 
 }  // namespace
@@ -165,12 +173,15 @@ json gradientHistogramJson(const Dataset& dataset, int channel, const GradientHi
   return told;
 }
 
-json valuesJson(const Volume& volume, const glm::dvec3& voxel) {
-  const glm::dvec3 last(volume.grid().dims - 1);
+json valuesJson(const Volume& volume, const glm::dvec3& voxel,
+                std::span<const ChannelAppearance> appearances) {
+  const glm::ivec3 dims = volume.grid().dims;
+  const glm::dvec3 inside = glm::min(glm::max(voxel, glm::dvec3(0)), glm::dvec3(dims - 1));
   json values = json::array();
-  for (const Channel& channel : volume.channels()) {
-    const double value =
-        interpolate(channel, volume.grid().dims, glm::min(glm::max(voxel, glm::dvec3(0)), last));
+  for (std::size_t i = 0; i < volume.channels().size(); ++i) {
+    const auto interpolation =
+        i < appearances.size() ? appearances[i].interpolation : Interpolation::trilinear;
+    const double value = interpolate(volume.channels()[i], dims, inside, interpolation);
     values.push_back(std::isfinite(value) ? json(value) : json(nullptr));
   }
   return values;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -14,6 +15,7 @@
 
 #include "renderer/core/memory_budget.h"
 #include "renderer/data/gradient_histogram.h"
+#include "renderer/data/scene.h"
 #include "renderer/io/format.h"
 
 namespace scolopax::server {
@@ -70,10 +72,11 @@ nlohmann::json histogramJson(const Dataset& dataset, int channel);
 /// The same for |gradient|, from 0 up; with `joint`, additionally for every bin of values.
 nlohmann::json gradientHistogramJson(const Dataset& dataset, int channel, const GradientHistogram& gradients,
                                      bool joint);
-/// Data values of all channels at a voxel position inside the box, interpolated trilinearly between voxel
-/// centres as the renderer does; null where any of the eight voxels is not finite.
-nlohmann::json valuesJson(const Volume& volume, const glm::dvec3& voxel);
-/// The same at a world point; outside the box all values are null.
+/// Data values of all channels at a voxel position inside the box, interpolated as the renderer does for
+/// these appearances, one per channel, or trilinearly if there are none; null where a value is not finite.
+nlohmann::json valuesJson(const Volume& volume, const glm::dvec3& voxel,
+                          std::span<const ChannelAppearance> appearances = {});
+/// The same, trilinearly, at a world point; outside the box all values are null.
 nlohmann::json probeJson(const Dataset& dataset, double x, double y, double z);
 
 }  // namespace scolopax::server

@@ -45,7 +45,7 @@ json hitJson(const ResolvedScene& scene, const Picked& picked) {
           {"channel", picked.channel},
           {"name", scene.resolved["channels"][std::size_t(picked.channel)]["name"]},
           {"depth", picked.depth},
-          {"values", valuesJson(volume, picked.voxel)}};
+          {"values", valuesJson(volume, picked.voxel, scene.render.channels)}};
 }
 
 }  // namespace

@@ -101,6 +101,7 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
     look.visible = wire.visible;
     look.rangeLo = (*wire.range)[0];
     look.rangeHi = (*wire.range)[1];
+    look.interpolation = valueOf<Interpolation>(kInterpolations, wire.interpolation);
     look.gamma = wire.gamma;
     look.opacity.clear();
     for (const auto& point : wire.opacity) look.opacity.push_back({point.position, point.value});
@@ -236,6 +237,7 @@ protocol::Lists rendererLists() {
   lists.colormaps = entries(colormaps());
   lists.lightTypes = entries(kLightTypes);
   lists.peaks = entries(kPeaks);
+  lists.interpolations = entries(kInterpolations);
   return lists;
 }
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// kernel/sample_volume.h for one point per lane, with the same bits. Single channels are gathered;
-// neighbouring channels are read four at a time. Included after lanes_*.h.
+// kernel/sample_volume.h and kernel/filters.h for one point per lane, with the same bits. Single channels are
+// gathered; neighbouring channels are read four at a time. Included after lanes_*.h.
 #pragma once
 #include <bit>
 #include <cstring>
 
-#include "renderer/kernel/sample_volume.h"
+#include "renderer/kernel/filters.h"
 
 namespace scolopax::SCOLOPAX_SIMD_SPACE {
 
@@ -43,6 +43,12 @@ SCOLOPAX_LANES Points pointsAt(glm::ivec3 dims, const Vec& point) {
   const Int away = points.z.low - Int(int(points.first));
   points.slices = float(largestOf(maximum(away, Int(0) - away)) + 3);
   return points;
+}
+/// Lane i of points that are in memory.
+SCOLOPAX_LANES glm::vec3 pointIn(const Vec& point, int i) {
+  const auto lane = [&](int axis)
+                        SCOLOPAX_LANES_LAMBDA { return reinterpret_cast<const float*>(&point[axis])[i]; };
+  return {lane(0), lane(1), lane(2)};
 }
 /// Whether an axis has a single voxel. Lanes need a neighbour on every axis.
 SCOLOPAX_LANES bool isFlat(glm::ivec3 dims) { return dims.x < 2 || dims.y < 2 || dims.z < 2; }
@@ -90,9 +96,9 @@ SCOLOPAX_LANES Float alongX(const T* voxels, Int index, int stride, const Axis& 
 
 /// Samples one channel, whose voxels are of type T, by gathering.
 template <class T>
-SCOLOPAX_LANES Float sampleOne(const Points& at, const kernel::ChannelView& channel) {
-  const int stride = channel.stride;
-  const T* base = static_cast<const T*>(channel.voxels) + channel.lane +
+SCOLOPAX_LANES Float sampleOne(const Points& at, const kernel::FieldView& field) {
+  const int stride = field.stride;
+  const T* base = static_cast<const T*>(field.voxels) + field.lane +
                   at.first * std::size_t(at.dims.x) * std::size_t(at.dims.y) * std::size_t(stride);
   const Int row = Int(at.dims.x * stride), slice = Int(at.dims.x * at.dims.y * stride);
   const Int start = Int(int(at.first));
@@ -108,28 +114,24 @@ SCOLOPAX_LANES Float sampleOne(const Points& at, const kernel::ChannelView& chan
 
 /// Samples one channel of any type: by gathering if every axis has neighbours and 32-bit indices suffice,
 /// else lane by lane.
-SCOLOPAX_LANES Float sampleChannel(const Points& at, const kernel::ChannelView& channel) {
-  if (isFlat(at.dims) ||
-      !(at.slices * float(at.dims.x) * float(at.dims.y) * float(channel.stride) < 0x1p29f)) {
+SCOLOPAX_LANES Float sampleChannel(const Points& at, const kernel::FieldView& field) {
+  if (isFlat(at.dims) || !(at.slices * float(at.dims.x) * float(at.dims.y) * float(field.stride) < 0x1p29f)) {
     Float values;
-    const float* place[] = {reinterpret_cast<const float*>(&at.place[0]),
-                            reinterpret_cast<const float*>(&at.place[1]),
-                            reinterpret_cast<const float*>(&at.place[2])};
     for (int i = 0; i < kLanes; ++i)
-      put(kernel::sampleStored(channel, at.dims, {place[0][i], place[1][i], place[2][i]}), i, &values);
+      put(kernel::sampleTrilinear(field, at.dims, pointIn(at.place, i)), i, &values);
     return values;
   }
-  switch (channel.type) {
+  switch (field.type) {
     case ScalarType::u8:
-      return sampleOne<std::uint8_t>(at, channel);
+      return sampleOne<std::uint8_t>(at, field);
     case ScalarType::u16:
-      return sampleOne<std::uint16_t>(at, channel);
+      return sampleOne<std::uint16_t>(at, field);
     case ScalarType::i16:
-      return sampleOne<std::int16_t>(at, channel);
+      return sampleOne<std::int16_t>(at, field);
     case ScalarType::f32:
       break;
   }
-  return sampleOne<float>(at, channel);
+  return sampleOne<float>(at, field);
 }
 
 /// Reads four channels of a voxel.
@@ -153,27 +155,29 @@ struct FourChannels {
   std::uint32_t found;  ///< their bits
   bool several() const { return (found & (found - 1)) != 0; }
 };
-/// Those of `channels` (bit n: visible channel n) that are read together with channel n.
+/// Those of `channels` (bit n: visible channel n) that are read together with channel n, of the same filter.
 SCOLOPAX_SIMD inline FourChannels fourWith(const kernel::SceneView& scene, int n, std::uint32_t channels) {
-  const kernel::ChannelView& channel = scene.channels[n];
-  FourChannels four{channel.lane & ~3, {-1, -1, -1, -1}, 0};
-  for (int m = n; m < scene.channelCount; ++m)
-    if ((channels >> m & 1) && scene.channels[m].voxels == channel.voxels &&
-        (scene.channels[m].lane & ~3) == four.lane) {
-      four.channel[scene.channels[m].lane - four.lane] = m;
-      four.found |= 1u << m;
-    }
+  const kernel::FieldView& field = scene.channels[n].field;
+  FourChannels four{field.lane & ~3, {-1, -1, -1, -1}, 0};
+  for (int m = n; m < scene.channelCount; ++m) {
+    const kernel::FieldView& other = scene.channels[m].field;
+    if (!(channels >> m & 1) || other.voxels != field.voxels || (other.lane & ~3) != four.lane ||
+        other.filter != field.filter)
+      continue;
+    four.channel[other.lane - four.lane] = m;
+    four.found |= 1u << m;
+  }
   return four;
 }
 
 /// Samples four neighbouring channels, the first of which is at `lane`. The values of the channel at lane + i
 /// go to members[i], unless that is null.
 template <class T>
-SCOLOPAX_SIMD void sampleFour(const Points& at, const kernel::ChannelView& channel, int lane,
+SCOLOPAX_SIMD void sampleFour(const Points& at, const kernel::FieldView& field, int lane,
                               float* const* members) {
-  const auto stride = std::size_t(channel.stride), row = stride * std::size_t(at.dims.x),
+  const auto stride = std::size_t(field.stride), row = stride * std::size_t(at.dims.x),
              slice = row * std::size_t(at.dims.y);
-  const T* base = static_cast<const T*>(channel.voxels) + lane;
+  const T* base = static_cast<const T*>(field.voxels) + lane;
   alignas(4 * kLanes) std::int32_t low[3][kLanes], high[3][kLanes];
   alignas(4 * kLanes) float t[3][kLanes];
   const Axis* axes[] = {&at.x, &at.y, &at.z};
@@ -198,8 +202,26 @@ SCOLOPAX_SIMD void sampleFour(const Points& at, const kernel::ChannelView& chann
   }
 }
 
-SCOLOPAX_LANES Float sampleStored(const kernel::ChannelView& channel, glm::ivec3 dims, const Vec& point) {
-  return sampleChannel(pointsAt(dims, point), channel);
+SCOLOPAX_LANES Float sampleTrilinear(const kernel::FieldView& field, glm::ivec3 dims, const Vec& point) {
+  return sampleChannel(pointsAt(dims, point), field);
+}
+
+/// As kernel::sampleFiltered and kernel::findSplineGradient, lane by lane.
+SCOLOPAX_LANES_APART inline void sampleFiltered(const kernel::FieldView& field, glm::ivec3 dims,
+                                                const Vec& point, Float* stored) {
+  for (int i = 0; i < kLanes; ++i) {
+    float one;
+    kernel::sampleFiltered(field, dims, pointIn(point, i), &one);
+    put(one, i, stored);
+  }
+}
+SCOLOPAX_LANES_APART inline void findSplineGradient(const kernel::FieldView& field, glm::ivec3 dims,
+                                                    const Vec& point, Vec* perVoxel) {
+  for (int i = 0; i < kLanes; ++i) {
+    glm::vec3 one;
+    kernel::findSplineGradient(field, dims, pointIn(point, i), &one);
+    for (int axis = 0; axis < 3; ++axis) put(one[axis], i, &(*perVoxel)[axis]);
+  }
 }
 
 /// Samples `channels` (bit n: visible channel n). The values of channel n go to values[n].
@@ -208,29 +230,33 @@ SCOLOPAX_LANES void sampleChannels(const kernel::SceneView& scene, std::uint32_t
   const Points at = pointsAt(scene.dims, point);
   for (int n = 0; n < scene.channelCount; ++n) {
     if (!(channels >> n & 1)) continue;
-    const kernel::ChannelView& channel = scene.channels[n];
+    const kernel::FieldView& field = scene.channels[n].field;
+    if (!field.has(kernel::Filter::trilinear)) [[unlikely]] {
+      sampleFiltered(field, scene.dims, point, &values[n]);
+      continue;
+    }
     const FourChannels four = fourWith(scene, n, channels);
     channels &= ~four.found;
     if (!four.several() || isFlat(scene.dims)) {
       for (std::uint32_t left = four.found; left != 0; left &= left - 1) {
         const int m = std::countr_zero(left);
-        values[m] = sampleChannel(at, scene.channels[m]);
+        values[m] = sampleChannel(at, scene.channels[m].field);
       }
       continue;
     }
     float* members[4] = {};
     for (int k = 0; k < 4; ++k)
       if (four.channel[k] >= 0) members[k] = reinterpret_cast<float*>(&values[four.channel[k]]);
-    visitScalarType(channel.type,
-                    [&](auto zero) { sampleFour<decltype(zero)>(at, channel, four.lane, members); });
+    visitScalarType(field.type,
+                    [&](auto zero) { sampleFour<decltype(zero)>(at, field, four.lane, members); });
   }
 }
 
 /// Reads a cell's voxels of one channel, which are of type T, by gathering.
 template <class T>
-SCOLOPAX_LANES void cellVoxelsOfOne(const Points& at, const kernel::ChannelView& channel, Float* corners) {
-  const int stride = channel.stride;
-  const T* base = static_cast<const T*>(channel.voxels) + channel.lane +
+SCOLOPAX_LANES void cellVoxelsOfOne(const Points& at, const kernel::FieldView& field, Float* corners) {
+  const int stride = field.stride;
+  const T* base = static_cast<const T*>(field.voxels) + field.lane +
                   at.first * std::size_t(at.dims.x) * std::size_t(at.dims.y) * std::size_t(stride);
   const Int row = Int(at.dims.x * stride), slice = Int(at.dims.x * at.dims.y * stride);
   // The last voxel on an axis is the upper one of its cell.
@@ -246,11 +272,11 @@ SCOLOPAX_LANES void cellVoxelsOfOne(const Points& at, const kernel::ChannelView&
 /// The same for four neighbouring channels, the first of which is at `lane`. The voxels of the channel at
 /// lane + i go to members[i], unless that is null.
 template <class T>
-SCOLOPAX_SIMD void cellVoxelsOfFour(const Points& at, const kernel::ChannelView& channel, int lane,
+SCOLOPAX_SIMD void cellVoxelsOfFour(const Points& at, const kernel::FieldView& field, int lane,
                                     float* const* members) {
-  const auto stride = std::size_t(channel.stride), row = stride * std::size_t(at.dims.x),
+  const auto stride = std::size_t(field.stride), row = stride * std::size_t(at.dims.x),
              slice = row * std::size_t(at.dims.y);
-  const T* base = static_cast<const T*>(channel.voxels) + lane;
+  const T* base = static_cast<const T*>(field.voxels) + lane;
   alignas(4 * kLanes) std::int32_t low[3][kLanes];
   store(minimum(at.x.low, Int(at.dims.x - 2)), low[0]);
   store(minimum(at.y.low, Int(at.dims.y - 2)), low[1]);
@@ -270,25 +296,22 @@ SCOLOPAX_SIMD void cellVoxelsOfFour(const Points& at, const kernel::ChannelView&
 /// The same for one channel of any type.
 SCOLOPAX_LANES void cellVoxelsOfChannel(const kernel::SceneView& scene, const Points& at, int n,
                                         Float* corners) {
-  const kernel::ChannelView& channel = scene.channels[n];
-  if (!isFlat(at.dims) && at.slices * float(at.dims.x) * float(at.dims.y) * float(channel.stride) < 0x1p29f) {
-    switch (channel.type) {
+  const kernel::FieldView& field = scene.channels[n].field;
+  if (!isFlat(at.dims) && at.slices * float(at.dims.x) * float(at.dims.y) * float(field.stride) < 0x1p29f) {
+    switch (field.type) {
       case ScalarType::u8:
-        return cellVoxelsOfOne<std::uint8_t>(at, channel, corners);
+        return cellVoxelsOfOne<std::uint8_t>(at, field, corners);
       case ScalarType::u16:
-        return cellVoxelsOfOne<std::uint16_t>(at, channel, corners);
+        return cellVoxelsOfOne<std::uint16_t>(at, field, corners);
       case ScalarType::i16:
-        return cellVoxelsOfOne<std::int16_t>(at, channel, corners);
+        return cellVoxelsOfOne<std::int16_t>(at, field, corners);
       case ScalarType::f32:
-        return cellVoxelsOfOne<float>(at, channel, corners);
+        return cellVoxelsOfOne<float>(at, field, corners);
     }
   }
-  const float* place[] = {reinterpret_cast<const float*>(&at.place[0]),
-                          reinterpret_cast<const float*>(&at.place[1]),
-                          reinterpret_cast<const float*>(&at.place[2])};
   for (int i = 0; i < kLanes; ++i) {
     float own[kernel::kCorners];
-    kernel::cellVoxels(channel, scene.dims, {place[0][i], place[1][i], place[2][i]}, own);
+    kernel::cellVoxels(field, scene.dims, pointIn(at.place, i), own);
     for (int c = 0; c < kernel::kCorners; ++c) put(own[c], i, &corners[c]);
   }
 }
@@ -309,8 +332,8 @@ SCOLOPAX_LANES void cellVoxels(const kernel::SceneView& scene, std::uint32_t cha
     float* members[4] = {};
     for (int k = 0; k < 4; ++k)
       if (four.channel[k] >= 0) members[k] = reinterpret_cast<float*>(corners[four.channel[k]]);
-    visitScalarType(scene.channels[n].type, [&](auto zero) {
-      cellVoxelsOfFour<decltype(zero)>(at, scene.channels[n], four.lane, members);
+    visitScalarType(scene.channels[n].field.type, [&](auto zero) {
+      cellVoxelsOfFour<decltype(zero)>(at, scene.channels[n].field, four.lane, members);
     });
   }
 }

@@ -10,12 +10,12 @@
 
 namespace scolopax {
 
-std::shared_ptr<const BoundColumn> buildBoundColumn(const MacrocellGrid& macrocells, int channel,
-                                                    const kernel::BoundTable& ofValues,
-                                                    const GradientCells& gradients,
-                                                    const GradientFactor& factor,
-                                                    const std::shared_ptr<MemoryBudget>& memory) {
-  const std::size_t cells = macrocells.cellCount(), columnBytes = cells * sizeof(std::uint8_t);
+std::shared_ptr<const CellColumn> buildBoundColumn(const MacrocellGrid& macrocells, int column,
+                                                   const kernel::BoundTable& ofValues,
+                                                   const GradientCells& gradients,
+                                                   const GradientFactor& factor,
+                                                   const std::shared_ptr<MemoryBudget>& memory) {
+  const std::size_t cells = macrocells.cellCount(), columnBytes = cells * sizeof(kernel::LevelInterval);
   auto share = MemoryBudget::take(memory, MemoryUse::grids, columnBytes + cells * sizeof(ValueInterval));
   std::vector<float> factors;
   for (const float level : gradients.levels.values) factors.push_back(factor.largest(level));
@@ -28,20 +28,23 @@ std::shared_ptr<const BoundColumn> buildBoundColumn(const MacrocellGrid& macroce
   };
   forCells([&](std::size_t cell) {
     // Both factors are bounds and rounding is monotone, so their product in float is a bound too.
-    const float bound = ofValues.over(macrocells.intervals[cell * columns + std::size_t(channel)]) *
+    const float bound = ofValues.over(macrocells.intervals[cell * columns + std::size_t(column)]) *
                         factors[gradients.cells[cell]];
     bounds[cell] = {bound, bound};
   });
-  BoundColumn column;
-  column.levels.values = chooseLevels(bounds);
-  column.cells.resize(bounds.size());
-  forCells([&](std::size_t cell) { column.cells[cell] = encode(column.levels, bounds[cell]).hi; });
+  CellColumn result;
+  result.levels.values = chooseLevels(bounds);
+  result.cells.resize(bounds.size());
+  forCells([&](std::size_t cell) {
+    const std::uint8_t level = encode(result.levels, bounds[cell]).hi;
+    result.cells[cell] = {level, level};
+  });
   share.resize(columnBytes);
-  return withShare(std::move(share), std::move(column));
+  return withShare(std::move(share), std::move(result));
 }
 
 std::shared_ptr<const MacrocellGrid> withColumns(const std::shared_ptr<const MacrocellGrid>& macrocells,
-                                                 std::span<const std::shared_ptr<const BoundColumn>> columns,
+                                                 std::span<const std::shared_ptr<const CellColumn>> columns,
                                                  const std::shared_ptr<MemoryBudget>& memory) {
   if (columns.empty()) return macrocells;
   const std::size_t before = macrocells->levels.size(), after = before + columns.size();
@@ -63,10 +66,9 @@ std::shared_ptr<const MacrocellGrid> withColumns(const std::shared_ptr<const Mac
         kernel::LevelInterval* own = &result.intervals[cell * after];
         std::copy_n(&macrocells->intervals[cell * before], before, own);
         for (std::size_t i = 0; i < columns.size(); ++i) {
-          const std::uint8_t level = columns[i]->cells[cell];
-          own[before + i] = {level, level};
+          const kernel::LevelInterval one = own[before + i] = columns[i]->cells[cell];
           kernel::LevelInterval& any = all[before + i];
-          any = {std::min(any.lo, level), std::max(any.hi, level)};
+          any = {std::min(any.lo, one.lo), std::max(any.hi, one.hi)};
         }
       });
     }

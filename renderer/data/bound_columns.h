@@ -12,22 +12,18 @@
 
 namespace scolopax {
 
-struct BoundColumn {
-  ValueLevels levels;               ///< of the extinction, per world unit
-  std::vector<std::uint8_t> cells;  ///< per macrocell: the least level that is a bound
-};
-
-/// Bounds the extinction of `channel` in every macrocell: its bound by value (`ofValues`, for a factor of 1)
-/// times the largest factor in the cell. The memory is charged to `memory`, if given.
-std::shared_ptr<const BoundColumn> buildBoundColumn(const MacrocellGrid& macrocells, int channel,
-                                                    const kernel::BoundTable& ofValues,
-                                                    const GradientCells& gradients,
-                                                    const GradientFactor& factor,
-                                                    const std::shared_ptr<MemoryBudget>& memory = nullptr);
+/// Bounds the extinction of the channel in `column` of the macrocells: its bound by value (`ofValues`, for a
+/// factor of 1) times the largest factor in the cell. The levels of the result are of the extinction, per
+/// world unit; each interval is the least level that is a bound. The memory is charged to `memory`, if given.
+std::shared_ptr<const CellColumn> buildBoundColumn(const MacrocellGrid& macrocells, int column,
+                                                   const kernel::BoundTable& ofValues,
+                                                   const GradientCells& gradients,
+                                                   const GradientFactor& factor,
+                                                   const std::shared_ptr<MemoryBudget>& memory = nullptr);
 
 /// The macrocells with `columns` appended to those of the volume's channels.
 std::shared_ptr<const MacrocellGrid> withColumns(const std::shared_ptr<const MacrocellGrid>& macrocells,
-                                                 std::span<const std::shared_ptr<const BoundColumn>> columns,
+                                                 std::span<const std::shared_ptr<const CellColumn>> columns,
                                                  const std::shared_ptr<MemoryBudget>& memory = nullptr);
 
 }  // namespace scolopax

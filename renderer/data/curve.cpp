@@ -97,8 +97,9 @@ OpticalCurve makeOpticalCurve(const Curve<float>& opacity, const Curve<glm::vec3
   const auto opacityView = opacity.view();
   const auto colorView = color.view();
   for (const float p : positions) {
-    if (p > 0 && (jumpsAt(opacity, p) || jumpsAt(color, p)))
-      curve.knots.push_back({p, 0, p, valueBefore(opacity, p), valueBefore(color, p)});
+    const bool jumps = p > 0 && (jumpsAt(opacity, p) || jumpsAt(color, p));
+    curve.jumps = curve.jumps || jumps;
+    if (jumps) curve.knots.push_back({p, 0, p, valueBefore(opacity, p), valueBefore(color, p)});
     curve.knots.push_back({p, 0, p, kernel::evaluate(opacityView, p), kernel::evaluate(colorView, p)});
   }
   for (std::size_t i = 0; i + 1 < curve.knots.size(); ++i) {

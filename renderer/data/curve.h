@@ -26,9 +26,10 @@ struct Curve {
 struct OpticalCurve {
   std::vector<kernel::OpticalKnot> knots;
   std::vector<std::uint16_t> buckets;
+  bool jumps = false;
   float first = 0, last = 1;  ///< opacity is 0 at positions <= first and >= last
   kernel::OpticalCurveView view() const {
-    return {knots.data(), buckets.data(), int(knots.size()), first, last};
+    return {knots.data(), buckets.data(), int(knots.size()), jumps, first, last};
   }
 };
 

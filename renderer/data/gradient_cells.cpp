@@ -12,6 +12,7 @@
 
 #include "renderer/data/measuring.h"
 #include "renderer/data/value_levels.h"
+#include "renderer/kernel/filters.h"
 
 namespace scolopax {
 namespace {
@@ -33,8 +34,8 @@ void forEach(const Voxels& voxels, F&& f) {
 template <class T>
 class Steepness {
  public:
-  Steepness(const StridedVoxels<T>& voxels, glm::ivec3 dims, const glm::dmat3& fromVoxel)
-      : voxels_(voxels), dims_(dims), fromVoxel_(fromVoxel) {
+  Steepness(const StridedVoxels<T>& voxels, glm::ivec3 dims, const glm::dmat3& fromVoxel, bool spline)
+      : voxels_(voxels), dims_(dims), fromVoxel_(fromVoxel), spline_(spline) {
     for (int column = 0; column < 3; ++column)
       for (int row = 0; row < 3; ++row) entries_[column] += std::abs(fromVoxel[column][row]);
   }
@@ -44,11 +45,14 @@ class Steepness {
   float most(const Voxels& between) const {
     const glm::ivec3 last = dims_ - 1;
     const Voxels around{glm::max(between.low - 1, 0), glm::min(between.high + 1, last)};
-    const bool inner = around.low == between.low - 1 && around.high == between.high + 1;
+    const bool inner = !spline_ && around.low == between.low - 1 && around.high == between.high + 1;
     glm::dvec3 least(kInfinity), largest(-kInfinity);
     double value = 0;
-    for (int axis = 0; axis < 3; ++axis)
-      addSlopes(between, around, axis, &least[axis], &largest[axis], &value);
+    for (int axis = 0; axis < 3; ++axis) {
+      const bool atBorder = around.low[axis] == between.low[axis] || around.high[axis] == between.high[axis];
+      if (spline_ && atBorder) least[axis] = largest[axis] = 0;  // voxels are repeated beyond the border
+      addSlopes(spline_ ? around : between, around, axis, &least[axis], &largest[axis], &value);
+    }
     glm::dvec3 steepest(0);
     for (int axis = 0; axis < 3; ++axis) {
       if (least[axis] > largest[axis]) least[axis] = largest[axis] = 0;  // no slope: an axis of one voxel
@@ -102,15 +106,17 @@ class Steepness {
     return std::isfinite(length) ? length : 0.0;
   }
 
-  /// Adds the largest possible rounding error: of the two samples of every difference (as slackFor() in
-  /// macrocell_grid.cpp), of their positions (times the slope), and of the transform to world space.
+  /// Adds the largest possible rounding error: of the two samples of every difference (kernel::roundingOf),
+  /// of their positions (times the slope), and of the transform to world space.
   float roundedUp(double length, const glm::dvec3& steepest, double value) const {
     if (steepest == glm::dvec3(0)) return 0.0f;
+    const double rounding =
+        2 * kernel::roundingOf(spline_ ? kernel::Filter::cubic : kernel::Filter::trilinear);
     double slack = 0;
     for (int axis = 0; axis < 3; ++axis)
       if (dims_[axis] > 1)
-        slack += entries_[axis] * (value * 0x1p-19 + (steepest[0] + steepest[1] + steepest[2]) *
-                                                         (double(dims_[axis]) * 0x1p-22 + 0x1p-20));
+        slack += entries_[axis] * (value * rounding + (steepest[0] + steepest[1] + steepest[2]) *
+                                                          (double(dims_[axis]) * 0x1p-22 + 0x1p-20));
     const float most = float((length + slack) * (1 + 0x1p-20));
     constexpr float kLargest = std::numeric_limits<float>::max();
     return most < kLargest ? std::nextafter(most, kLargest) : kLargest;
@@ -119,19 +125,21 @@ class Steepness {
   const StridedVoxels<T>& voxels_;
   glm::ivec3 dims_;
   glm::dmat3 fromVoxel_;
+  bool spline_;
   glm::dvec3 entries_{0};  // per column of the matrix: sum of magnitudes
 };
 
 }  // namespace
 
-GradientCells buildGradientCells(const Volume& volume, int channel, int size, const std::stop_token& stop) {
+GradientCells buildGradientCells(const Volume& volume, int channel, int size, Interpolation interpolation,
+                                 const std::stop_token& stop) {
   const Grid& grid = volume.grid();
   const glm::ivec3 cells = macrocellsOf(grid.dims, size), last = grid.dims - 1;
   std::vector<ValueInterval> steepness(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z));
   const VoxelView& view = volume.channels()[std::size_t(channel)].voxels;
   visitScalarType(view.type(), [&](auto zero) {
     const auto voxels = view.as<decltype(zero)>();
-    const Steepness steep(voxels, grid.dims, grid.gradientFromVoxel());
+    const Steepness steep(voxels, grid.dims, grid.gradientFromVoxel(), interpolation == Interpolation::cubic);
     tbb::parallel_for(0, cells.z, [&](int z) {
       std::size_t cell = std::size_t(z) * std::size_t(cells.y) * std::size_t(cells.x);
       for (int y = 0; y < cells.y; ++y) {

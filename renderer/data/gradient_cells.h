@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "renderer/data/macrocell_grid.h"
+#include "renderer/data/method.h"
 
 namespace scolopax {
 
@@ -21,9 +22,9 @@ struct GradientCells {
 /// Where no difference is one-sided, the gradient of the trilinear interpolant by central differences is the
 /// trilinear interpolation of the voxels' gradients, so it is no longer than the longest of them. At the
 /// border every difference is a mean of slopes between neighbouring voxels along its axis, so these slopes
-/// bound each component.
+/// bound each component. So is every component of the gradient of a cubic B-spline.
 /// Throws Error(cancelled) once `stop` is requested.
-GradientCells buildGradientCells(const Volume& volume, int channel, int size,
+GradientCells buildGradientCells(const Volume& volume, int channel, int size, Interpolation interpolation,
                                  const std::stop_token& stop = {});
 
 }  // namespace scolopax

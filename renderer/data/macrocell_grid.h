@@ -29,6 +29,13 @@ struct ValueLevels {
   ValueInterval decode(kernel::LevelInterval interval) const;
 };
 
+/// One interval per macrocell.
+struct CellColumn {
+  ValueLevels levels;
+  std::vector<kernel::LevelInterval> cells;  ///< x fastest
+  std::size_t sizeBytes() const { return cells.size() * sizeof(kernel::LevelInterval); }
+};
+
 /// Divides a grid of cells into blocks with edges of kernel::kBlockEdge cells.
 struct CellBlocks {
   glm::ivec3 cells, size;  ///< per axis: number of cells, and of blocks
@@ -76,6 +83,10 @@ glm::ivec3 macrocellsOf(glm::ivec3 dims, int size);
 /// and the other half follows the density of the ends.
 /// Throws Error(cancelled) once `stop` is requested.
 MacrocellGrid buildMacrocells(const Volume& volume, int size, const std::stop_token& stop = {});
+
+/// The same for one channel whose samples are those of the cubic B-spline, which reads the voxels around a
+/// cell, too.
+CellColumn buildSplineColumn(const Volume& volume, int channel, int size, const std::stop_token& stop = {});
 
 /// Number of intervals, over all cells and channels, in a grid with cells of this size.
 std::size_t intervalCount(const Volume& volume, int size);

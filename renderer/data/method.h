@@ -50,6 +50,11 @@ namespace scolopax {
   X(both, "both", "surfaces at the curve's peaks are drawn beside the curve") \
   X(only, "only", "surfaces at the curve's peaks are drawn instead of the curve")
 
+#define SCOLOPAX_INTERPOLATIONS(X)                                                             \
+  X(trilinear, "trilinear", "linear along every axis between the eight voxels around a point") \
+  X(cubic, "cubic", "smoothed by the cubic B-spline over the 64 voxels around a point")        \
+  X(nearest, "nearest", "the value of the nearest voxel: for labels, and to see the voxels themselves")
+
 #define SCOLOPAX_AOVS(X)                                                                           \
   X(depth, "depth", "mean distance of the first collision from the eye, along the view direction") \
   X(transmittance, "transmittance", "share of the light from behind that comes through")           \
@@ -74,6 +79,7 @@ SCOLOPAX_DECLARE_ENUM(LightType, SCOLOPAX_LIGHT_TYPES, kLightTypes)
 SCOLOPAX_DECLARE_ENUM(PixelFilter, SCOLOPAX_PIXEL_FILTERS, kPixelFilters)
 SCOLOPAX_DECLARE_ENUM(Sampling, SCOLOPAX_SAMPLINGS, kSamplings)
 SCOLOPAX_DECLARE_ENUM(Peaks, SCOLOPAX_PEAKS, kPeaks)
+SCOLOPAX_DECLARE_ENUM(Interpolation, SCOLOPAX_INTERPOLATIONS, kInterpolations)
 SCOLOPAX_DECLARE_ENUM(Aov, SCOLOPAX_AOVS, kAovs)
 
 /// Whether a method has a step, and a bias that falls with it.

@@ -11,6 +11,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
 #include "renderer/data/clip_view.h"
+#include "renderer/data/field_view.h"
 #include "renderer/data/shared_macrocells.h"
 
 namespace scolopax {
@@ -21,7 +22,8 @@ static_assert(kMaxChannels <= kernel::kMaxVisibleChannels);
 /// Whether two appearances give the same voxels the same extinction, on which the bounds depend.
 bool sameExtinction(const ChannelAppearance& a, const ChannelAppearance& b) {
   return a.rangeLo == b.rangeLo && a.rangeHi == b.rangeHi && a.gamma == b.gamma && a.density == b.density &&
-         a.opacity == b.opacity && a.gradientOpacity == b.gradientOpacity && a.peaks == b.peaks;
+         a.opacity == b.opacity && a.gradientOpacity == b.gradientOpacity && a.peaks == b.peaks &&
+         a.interpolation == b.interpolation;
 }
 
 /// Whether both scenes make the same film. They may differ only in the background, which is added to the
@@ -152,8 +154,14 @@ bool RenderPlan::nextTakesLong(const Scene& scene) const {
   // An edit may change the totals of all cells.
   constexpr std::size_t kManyIntervals = 4 << 20;
   if (macrocells_->size != scene.macrocell || macrocells_->intervals.size() > kManyIntervals) return true;
-  for (std::size_t i = 0; i < scene.channels.size() && i < channels_.gradients.size(); ++i)
-    if (!channels_.gradients[i] && needsGradients(volume_->channels()[i], scene.channels[i])) return true;
+  for (std::size_t i = 0; i < scene.channels.size() && i < channels_.measured.size(); ++i) {
+    const Measured& measured = channels_.measured[i];
+    const bool spline = scene.channels[i].interpolation == Interpolation::cubic;
+    if (spline && !measured.spline) return true;
+    if ((!measured.gradients || spline != (scene_.channels[i].interpolation == Interpolation::cubic)) &&
+        needsGradients(volume_->channels()[i], scene.channels[i]))
+      return true;
+  }
   return false;
 }
 
@@ -178,12 +186,16 @@ void RenderPlan::planChannels(const RenderPlan* before, const std::shared_ptr<Me
   const bool newCells = !before || macrocells_ != before->macrocells_;
   if (before) channels_.plans = before->channels_.plans;
   channels_.plans.resize(scene_.channels.size());
-  if (!newCells) channels_.gradients = before->channels_.gradients;
-  channels_.gradients.resize(scene_.channels.size());
+  if (!newCells) channels_.measured = before->channels_.measured;
+  channels_.measured.resize(scene_.channels.size());
   for (std::size_t i = 0; i < scene_.channels.size(); ++i) {
     const Channel& channel = volume_->channels()[i];
     const ChannelAppearance& appearance = scene_.channels[i];
     std::optional<ChannelPlan>& plan = channels_.plans[i];
+    Measured& measured = channels_.measured[i];
+    const bool spline = appearance.interpolation == Interpolation::cubic;
+    if (!newCells && spline != (before->scene_.channels[i].interpolation == Interpolation::cubic))
+      measured = {};
     if (newCells || before->scene_.channels[i] != appearance) {
       TransferFunction transfer(channel, appearance);
       if (newCells || !sameExtinction(before->scene_.channels[i], appearance))
@@ -193,27 +205,44 @@ void RenderPlan::planChannels(const RenderPlan* before, const std::shared_ptr<Me
     }
     if (!plan->visible(appearance)) continue;
     channels_.visible.push_back(int(i));
-    if (!plan->bounds) {
-      plan->bounds = buildBounds(macrocells_->levels[i], plan->transfer, int(i));
-      ++rebuilt_.majorantChannels;
+    if (spline) {
+      if (!measured.spline)
+        measured.spline = sharedSplineColumn(volume_, int(i), macrocells_->size, stop, memory);
+      channels_.splines.push_back(measured.spline);
     }
-    if (!plan->factor) continue;
-    if (!channels_.gradients[i])
-      channels_.gradients[i] = sharedGradientCells(volume_, int(i), macrocells_->size, stop, memory);
-    if (!plan->column)
-      plan->column = buildBoundColumn(*macrocells_, int(i), *plan->bounds, *channels_.gradients[i],
-                                      *plan->factor, memory);
-    channels_.columns.push_back(plan->column);
+    channels_.valueColumns.push_back(int(spline ? scene_.channels.size() + channels_.splines.size() - 1 : i));
+    if (plan->bounds) continue;
+    plan->bounds = buildBounds(spline ? measured.spline->levels : macrocells_->levels[i], plan->transfer,
+                               channels_.valueColumns.back());
+    ++rebuilt_.majorantChannels;
+  }
+}
+
+/// Bounds the visible channels whose opacity depends on the gradient.
+void RenderPlan::planFactors(const std::shared_ptr<MemoryBudget>& memory, const std::stop_token& stop) {
+  for (std::size_t v = 0; v < channels_.visible.size(); ++v) {
+    const int i = channels_.visible[v];
+    ChannelPlan& plan = *channels_.plans[std::size_t(i)];
+    if (!plan.factor) continue;
+    std::shared_ptr<const GradientCells>& gradients = channels_.measured[std::size_t(i)].gradients;
+    if (!gradients)
+      gradients = sharedGradientCells(volume_, i, macrocells_->size,
+                                      scene_.channels[std::size_t(i)].interpolation, stop, memory);
+    if (!plan.column)
+      plan.column = buildBoundColumn(*values_, channels_.valueColumns[v], *plan.bounds, *gradients,
+                                     *plan.factor, memory);
+    channels_.columns.push_back(plan.column);
   }
 }
 
 /// Bounds of the visible channels, by value or by an appended column.
 std::vector<kernel::BoundTable> RenderPlan::boundTables() const {
   std::vector<kernel::BoundTable> tables;
-  int column = int(macrocells_->levels.size());
-  for (const int i : channels_.visible) {
-    const ChannelPlan& plan = *channels_.plans[std::size_t(i)];
+  int column = int(values_->levels.size());
+  for (std::size_t v = 0; v < channels_.visible.size(); ++v) {
+    const ChannelPlan& plan = *channels_.plans[std::size_t(channels_.visible[v])];
     tables.push_back(plan.factor ? boundsOfExtinction(plan.column->levels, column++) : *plan.bounds);
+    if (!plan.factor) tables.back().column = channels_.valueColumns[v];
   }
   return tables;
 }
@@ -221,9 +250,11 @@ std::vector<kernel::BoundTable> RenderPlan::boundTables() const {
 /// Whether the macrocells may hold surfaces of the visible channels.
 std::vector<kernel::BoundTable> RenderPlan::presenceTables() const {
   std::vector<kernel::BoundTable> tables;
-  for (const int i : channels_.visible)
-    tables.push_back(
-        buildPresence(macrocells_->levels[std::size_t(i)], channels_.plans[std::size_t(i)]->surfaces, i));
+  for (std::size_t v = 0; v < channels_.visible.size(); ++v) {
+    const int column = channels_.valueColumns[v];
+    tables.push_back(buildPresence(values_->levels[std::size_t(column)],
+                                   channels_.plans[std::size_t(channels_.visible[v])]->surfaces, column));
+  }
   return tables;
 }
 
@@ -251,11 +282,16 @@ RenderPlan::RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene,
   macrocells_ = newCells ? sharedMacrocells(volume_, scene_.macrocell, stop, memory) : before->macrocells_;
   if (newCells) rebuilt_.macrocellChannels = int(volume_->channels().size());
   planChannels(before, memory, stop);
-  const bool sameColumns = !newCells && channels_.columns == before->channels_.columns;
-  bounded_ = sameColumns ? before->bounded_ : withColumns(macrocells_, channels_.columns, memory);
+  const bool sameValues = !newCells && channels_.splines == before->channels_.splines;
+  values_ = sameValues ? before->values_ : withColumns(macrocells_, channels_.splines, memory);
+  planFactors(memory, stop);
+  const bool sameColumns = sameValues && channels_.columns == before->channels_.columns;
+  bounded_ = sameColumns ? before->bounded_ : withColumns(values_, channels_.columns, memory);
   for (const int i : channels_.visible) {
     const ChannelPlan& plan = *channels_.plans[std::size_t(i)];
-    channelViews_.push_back(plan.transfer.view(volume_->channels()[std::size_t(i)]));
+    const Channel& channel = volume_->channels()[std::size_t(i)];
+    channelViews_.push_back(plan.transfer.view(channel));
+    channelViews_.back().field = fieldView(channel, scene_.channels[std::size_t(i)].interpolation);
     if (plan.factor) channelViews_.back().factor = plan.factor->view();
     plan.surfaces.addTo(channelViews_.back());
   }
@@ -266,7 +302,7 @@ RenderPlan::RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene,
   rebuilt_.majorantCells = majorants_->cellsRebuilt();
   if (hasSurfaces()) {
     const auto* surfaceCellsBefore = before && before->surfaceCells_ ? &*before->surfaceCells_ : nullptr;
-    surfaceCells_.emplace(macrocells_, presenceTables(), false, true, surfaceCellsBefore, memory);
+    surfaceCells_.emplace(values_, presenceTables(), false, true, surfaceCellsBefore, memory);
   }
   fillView(rays, clip);
   rebuilt_.rebuildMs =
@@ -284,9 +320,13 @@ void RenderPlan::fillView(const kernel::CameraRays& rays, const std::optional<ke
   view_.clip = clip.value_or(kernel::ClipView{});
   view_.channelCount = clip ? int(channelViews_.size()) : 0;
   view_.channels = channelViews_.data();
-  view_.voxelwise = scene_.step == 0;
+  view_.nearest = std::any_of(channelViews_.begin(), channelViews_.end(), [](const auto& channel) {
+    return channel.field.filter == kernel::Filter::nearest;
+  });
+  // Between the nearest voxels' values there is nothing, so that only cuts where they change are right.
+  view_.voxelwise = scene_.step == 0 || view_.nearest;
   view_.step =
-      view_.voxelwise ? std::numeric_limits<float>::infinity() : view_.smallestSpacing * float(scene_.step);
+      scene_.step == 0 ? std::numeric_limits<float>::infinity() : view_.smallestSpacing * float(scene_.step);
   view_.thickest = float(kThickestSegment);
   view_.opaque = opacityLimit(kOpaqueTransmittance);
   view_.stratum = stratumOf(scene_.method);

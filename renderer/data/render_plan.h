@@ -60,19 +60,27 @@ class RenderPlan {
     Surfaces surfaces;
     std::optional<GradientFactor> factor;
     // Empty until the channel is first visible with these curves.
-    std::optional<kernel::BoundTable> bounds;   // by value alone
-    std::shared_ptr<const BoundColumn> column;  // with the factor, if there is one
+    std::optional<kernel::BoundTable> bounds;  // by value alone
+    std::shared_ptr<const CellColumn> column;  // with the factor, if there is one
     bool visible(const ChannelAppearance& appearance) const;
+  };
+  /// What was measured of a channel's voxels beside the macrocells, once it was needed.
+  struct Measured {
+    std::shared_ptr<const CellColumn> spline;  // values of the cubic B-spline
+    std::shared_ptr<const GradientCells> gradients;
   };
   /// Channels of a scene, and what bounds the visible ones.
   struct Channels {
     std::vector<std::optional<ChannelPlan>> plans;
+    std::vector<Measured> measured;
     std::vector<int> visible;
-    std::vector<std::shared_ptr<const BoundColumn>> columns;
-    std::vector<std::shared_ptr<const GradientCells>> gradients;  // per channel, once needed
+    std::vector<int> valueColumns;  // per visible channel: column of values_ that holds its values
+    std::vector<std::shared_ptr<const CellColumn>> splines;  // of the visible channels that are cubic
+    std::vector<std::shared_ptr<const CellColumn>> columns;  // of those with a factor
   };
   void planChannels(const RenderPlan* before, const std::shared_ptr<MemoryBudget>& memory,
                     const std::stop_token& stop);
+  void planFactors(const std::shared_ptr<MemoryBudget>& memory, const std::stop_token& stop);
   std::optional<GradientFactor> factorOf(const Channel& channel, const ChannelAppearance& appearance) const;
   std::vector<kernel::BoundTable> boundTables() const;
   std::vector<kernel::BoundTable> presenceTables() const;
@@ -85,7 +93,8 @@ class RenderPlan {
   RebuildStats rebuilt_;
   std::shared_ptr<const MacrocellGrid> macrocells_;
   Channels channels_;
-  std::shared_ptr<const MacrocellGrid> bounded_;  // macrocells with channels_.columns appended
+  std::shared_ptr<const MacrocellGrid> values_;   // macrocells with channels_.splines appended
+  std::shared_ptr<const MacrocellGrid> bounded_;  // values_ with channels_.columns appended
   std::optional<MajorantGrid> majorants_;         // set by the constructor
   std::optional<MajorantGrid> surfaceCells_;      // 1 where a macrocell may hold a surface; if there are any
   std::vector<kernel::ChannelView> channelViews_;

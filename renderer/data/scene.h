@@ -62,6 +62,13 @@ struct ChannelAppearance {
   /// Whether every interior maximum of the opacity curve is a surface, with the opacity that matter of the
   /// curve's extinction has if it is as thick as the smallest spacing. A plateau has one, in its middle.
   Peaks peaks = Peaks::off;
+  /// How the scalar follows from the voxels. Points are first moved to the nearest point between the
+  /// outermost voxel centres. Trilinear: where one of the eight voxels of a cell is not finite, there is no
+  /// value. Cubic: the uniform cubic B-spline whose coefficients are the voxels, which are repeated beyond
+  /// the border; no value where one of the 64 is not finite; its gradient is the spline's own. Nearest: of
+  /// two voxels at the same distance along an axis, the later; the gradient is that of trilinear
+  /// interpolation.
+  Interpolation interpolation = Interpolation::trilinear;
   bool operator==(const ChannelAppearance&) const = default;
 };
 

@@ -19,9 +19,14 @@ std::shared_ptr<const MacrocellGrid> sharedMacrocells(const std::shared_ptr<cons
                                                       const std::stop_token& stop = {},
                                                       const std::shared_ptr<MemoryBudget>& memory = nullptr);
 
-/// The same for buildGradientCells.
+/// The same for buildSplineColumn.
+std::shared_ptr<const CellColumn> sharedSplineColumn(const std::shared_ptr<const Volume>& volume, int channel,
+                                                     int size, const std::stop_token& stop = {},
+                                                     const std::shared_ptr<MemoryBudget>& memory = nullptr);
+
+/// The same for buildGradientCells. Only Interpolation::cubic has gradients of its own.
 std::shared_ptr<const GradientCells> sharedGradientCells(
-    const std::shared_ptr<const Volume>& volume, int channel, int size, const std::stop_token& stop = {},
-    const std::shared_ptr<MemoryBudget>& memory = nullptr);
+    const std::shared_ptr<const Volume>& volume, int channel, int size, Interpolation interpolation,
+    const std::stop_token& stop = {}, const std::shared_ptr<MemoryBudget>& memory = nullptr);
 
 }  // namespace scolopax

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "renderer/core/error.h"
+#include "renderer/data/field_view.h"
 #include "renderer/kernel/segment_cubics.h"
 
 namespace scolopax {
@@ -79,14 +80,10 @@ kernel::ChannelView TransferFunction::placed() const {
 
 kernel::ChannelView TransferFunction::view(const Channel& channel) const {
   kernel::ChannelView view = placed();
-  view.voxels = channel.voxels.base();
-  view.lane = int(channel.voxels.lane());
-  view.stride = int(channel.voxels.stride());
-  view.type = channel.voxels.type();
+  view.field = fieldView(channel);
   view.weight = weight_;
   view.material = material_;
   view.inverseRange = inverseRange_;
-  view.finite = channel.histogram.nonFiniteCount == 0;
   view.opacity = opacity_.view();
   view.color = color_.view();
   view.optical = optical_.view();

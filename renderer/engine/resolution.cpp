@@ -22,7 +22,7 @@ double sceneStep(const Resolution& resolution) {
 }
 
 void setResolution(kernel::SceneView& view, const Resolution& resolution) {
-  view.voxelwise = resolution.voxelwise;
+  view.voxelwise = resolution.voxelwise || view.nearest;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   view.step = std::isfinite(resolution.step) ? view.smallestSpacing * float(resolution.step) : kInfinity;
   // The biases of ending rays early, and of what hides other matter in the same segment, must fall with that

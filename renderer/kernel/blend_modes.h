@@ -15,14 +15,14 @@ struct Classified {
 template <class View>
 SCOLOPAX_HD Classified classify(const View& scene, int n, glm::vec3 point, SampleCost* cost) {
   const ChannelView& channel = scene.channels[n];
-  ++cost->fetches;
-  const float stored = sampleStored(channel, scene.dims, point);
+  cost->fetches += channel.field.cost();
+  const float stored = sampleStored<One>(channel.field, scene.dims, point);
   if (!isFinite(stored)) return {0.0f, 0.0f};
   const float position = curvePosition(channel, stored);
   float extinction = extinctionAt(channel, position);
   if (scene.hasFactor(n) && extinction > 0.0f) [[unlikely]] {
     extinction *= gradientFactorAt(channel, scene.dims, point);
-    cost->fetches += gradientFetches(scene.dims);
+    cost->fetches += gradientFetches(channel.field, scene.dims);
   }
   return {extinction, position};
 }

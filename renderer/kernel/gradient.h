@@ -4,7 +4,7 @@
 // parameter: passing its address would force it into memory.
 #pragma once
 #include "renderer/kernel/classify.h"
-#include "renderer/kernel/sample_volume.h"
+#include "renderer/kernel/filters.h"
 
 namespace scolopax::kernel {
 
@@ -25,29 +25,35 @@ struct Gradient {
   typename L::Mask finite;     ///< where all differences are finite
 };
 
-/// Central differences of one voxel, one-sided at the border. `point` is in voxel coordinates.
+/// `point` is in voxel coordinates. Central differences of one voxel of the trilinear interpolation,
+/// one-sided at the border; for the cubic B-spline, its own gradient.
 template <class L>
-SCOLOPAX_LANES Gradient<L> gradientAt(const ChannelView& channel, glm::ivec3 dims, const glm::mat3& fromVoxel,
+SCOLOPAX_LANES Gradient<L> gradientAt(const FieldView& field, glm::ivec3 dims, const glm::mat3& fromVoxel,
                                       const typename L::Vec& point) {
   using Float = typename L::Float;
   using Vec = typename L::Vec;
   Vec perVoxel(0.0f);
-  for (int axis = 0; axis < 3; ++axis) {
-    if (dims[axis] < 2) continue;
-    const float last = float(dims[axis] - 1);
-    const Float at = clamp(point[axis], 0.0f, last);
-    Vec low = point, high = point;
-    low[axis] = maximum(at - 1.0f, 0.0f);
-    high[axis] = minimum(at + 1.0f, last);
-    const Float difference = sampleStored(channel, dims, high) - sampleStored(channel, dims, low);
-    perVoxel[axis] = difference / (high[axis] - low[axis]);
+  if (field.has(Filter::cubic)) [[unlikely]] {
+    findSplineGradient(field, dims, point, &perVoxel);
+  } else {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (dims[axis] < 2) continue;
+      const float last = float(dims[axis] - 1);
+      const Float at = clamp(point[axis], 0.0f, last);
+      Vec low = point, high = point;
+      low[axis] = maximum(at - 1.0f, 0.0f);
+      high[axis] = minimum(at + 1.0f, last);
+      const Float difference = sampleTrilinear(field, dims, high) - sampleTrilinear(field, dims, low);
+      perVoxel[axis] = difference / (high[axis] - low[axis]);
+    }
   }
   const typename L::Mask finite = isFinite(perVoxel[0]) & isFinite(perVoxel[1]) & isFinite(perVoxel[2]);
   return {product<L>(fromVoxel, perVoxel), finite};
 }
-/// Number of fetches that gradientAt() takes.
-SCOLOPAX_HD inline unsigned gradientFetches(glm::ivec3 dims) {
-  return 2u * (unsigned(dims.x > 1) + unsigned(dims.y > 1) + unsigned(dims.z > 1));
+/// Number of trilinear samples that gradientAt() costs as much as.
+SCOLOPAX_HD inline unsigned gradientFetches(const FieldView& field, glm::ivec3 dims) {
+  return field.has(Filter::cubic) ? 2 * field.cost()
+                                  : 2u * (unsigned(dims.x > 1) + unsigned(dims.y > 1) + unsigned(dims.z > 1));
 }
 
 /// Length of a vector whose squared components may overflow or underflow.
@@ -67,7 +73,7 @@ SCOLOPAX_LANES_RARE void findFactorPosition(const ChannelView& channel, glm::ive
                                             const typename L::Vec& point, typename L::Float* position) {
   using Float = typename L::Float;
   const GradientFactorView& factor = channel.factor;
-  const Gradient<L> gradient = gradientAt<L>(channel, dims, factor.fromVoxel, point);
+  const Gradient<L> gradient = gradientAt<L>(channel.field, dims, factor.fromVoxel, point);
   const Float unbounded = (lengthOf<L>(gradient.perSpacing) - factor.origin) * factor.scale + factor.offset;
   *position = select(gradient.finite, clamp(unbounded, -kFarPosition, kFarPosition), Float(kNaN));
 }
@@ -75,7 +81,7 @@ SCOLOPAX_LANES_RARE void findFactorPosition(const ChannelView& channel, glm::ive
 /// Factor of the opacity at a point; 0 where the gradient is not finite.
 SCOLOPAX_RARE inline float gradientFactorAt(const ChannelView& channel, glm::ivec3 dims, glm::vec3 point) {
   const GradientFactorView& factor = channel.factor;
-  const Gradient<One> gradient = gradientAt<One>(channel, dims, factor.fromVoxel, point);
+  const Gradient<One> gradient = gradientAt<One>(channel.field, dims, factor.fromVoxel, point);
   if (!gradient.finite) return 0.0f;
   return evaluate(factor.curve, factorPosition(factor, lengthOf<One>(gradient.perSpacing)));
 }

@@ -130,14 +130,15 @@ class PointSegments {
     Float stored[kMaxVisibleChannels];
     const typename L::Vec point = rays_.origin + t * rays_.direction;
     sampleChannels(scene_, channels, point, stored);
-    unsigned fetches = unsigned(std::popcount(channels));
+    unsigned fetches = 0;
     for (std::uint32_t left = channels; left != 0; left &= left - 1) {
       const int n = std::countr_zero(left);
       const ChannelView& channel = scene_.channels[n];
+      fetches += channel.field.cost();
       points[n] = pointOn<L>(channel.optical, stretchPosition(channel, stored[n]));
       if (scene_.hasFactor(n)) [[unlikely]] {
         findFactorPosition<L>(channel, scene_.dims, point, &factorPositions[n]);
-        fetches += gradientFetches(scene_.dims);
+        fetches += gradientFetches(channel.field, scene_.dims);
       }
     }
     cost_->fetches = cost_->fetches + Word(onesOf(live_)) * Word(fetches);

@@ -41,15 +41,15 @@ SCOLOPAX_HD float trilinear(const T* v, const AxisWeight& x, const AxisWeight& y
   return lerp(lerp(c00, c10, y.t), lerp(c01, c11, y.t), z.t);
 }
 
-/// Stored value of one channel at a point in voxel coordinates. Not finite if and only if one of the eight
+/// Stored value of a field at a point in voxel coordinates. Not finite if and only if one of the eight
 /// corners is not (differences cannot overflow: Volume keeps float voxels below 2^124).
-SCOLOPAX_HD inline float sampleStored(const ChannelView& channel, glm::ivec3 dims, glm::vec3 point) {
-  const auto stride = std::size_t(channel.stride);
+SCOLOPAX_HD inline float sampleTrilinear(const FieldView& field, glm::ivec3 dims, glm::vec3 point) {
+  const auto stride = std::size_t(field.stride);
   const AxisWeight x = axisWeight(point.x, dims.x, stride);
   const AxisWeight y = axisWeight(point.y, dims.y, stride * std::size_t(dims.x));
   const AxisWeight z = axisWeight(point.z, dims.z, stride * std::size_t(dims.x) * std::size_t(dims.y));
-  return visitScalarType(channel.type, [&](auto zero) {
-    return trilinear(static_cast<const decltype(zero)*>(channel.voxels) + channel.lane, x, y, z);
+  return visitScalarType(field.type, [&](auto zero) {
+    return trilinear(static_cast<const decltype(zero)*>(field.voxels) + field.lane, x, y, z);
   });
 }
 
@@ -58,18 +58,17 @@ inline constexpr int kCorners = 8;
 
 /// Voxels of the cell that contains a point in voxel coordinates. Beyond the outermost centres, those of the
 /// nearest cell; along an axis with a single voxel, both are that one.
-SCOLOPAX_HD inline void cellVoxels(const ChannelView& channel, glm::ivec3 dims, glm::vec3 point,
-                                   float* corners) {
+SCOLOPAX_HD inline void cellVoxels(const FieldView& field, glm::ivec3 dims, glm::vec3 point, float* corners) {
   std::size_t low = 0, step[3];
-  auto stride = std::size_t(channel.stride);
+  auto stride = std::size_t(field.stride);
   for (int axis = 0; axis < 3; ++axis) {
     const int size = dims[axis];
     low += std::size_t(int(clamp(point[axis], 0.0f, float(size > 1 ? size - 2 : 0)))) * stride;
     step[axis] = size > 1 ? stride : 0;
     stride *= std::size_t(size);
   }
-  visitScalarType(channel.type, [&](auto zero) {
-    const auto* voxels = static_cast<const decltype(zero)*>(channel.voxels) + channel.lane + low;
+  visitScalarType(field.type, [&](auto zero) {
+    const auto* voxels = static_cast<const decltype(zero)*>(field.voxels) + field.lane + low;
     for (int c = 0; c < kCorners; ++c)
       corners[c] = float(voxels[(c & 1 ? step[0] : 0) + (c & 2 ? step[1] : 0) + (c & 4 ? step[2] : 0)]);
   });
@@ -78,7 +77,7 @@ SCOLOPAX_HD inline void cellVoxels(const ChannelView& channel, glm::ivec3 dims, 
 SCOLOPAX_HD inline void cellVoxels(const SceneView& scene, std::uint32_t channels, glm::vec3 point,
                                    float (*corners)[kCorners]) {
   for (int n = 0; n < scene.channelCount; ++n)
-    if (channels >> n & 1) cellVoxels(scene.channels[n], scene.dims, point, corners[n]);
+    if (channels >> n & 1) cellVoxels(scene.channels[n].field, scene.dims, point, corners[n]);
 }
 
 /// Place of points in the cell of eight voxels that contains `point`: 0 at its lower voxel, 1 at its upper.

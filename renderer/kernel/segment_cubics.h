@@ -201,24 +201,30 @@ SCOLOPAX_LANES_RARE void multiplyByFactorAt(const ChannelView& channel, const ty
   *opacity = *opacity * opticalAt<Detail::extinction, L>(curve, pointOn<L>(curve, position), which).opacity;
 }
 
+/// Extinction of channel n at a place in [0,1] of a segment, where its curve has the given opacity.
+template <class L, class View>
+SCOLOPAX_LANES typename L::Float extinctionOn(const View& scene, const SegmentCubics<L, View>& scalars, int n,
+                                              typename L::Float place, typename L::Mask which,
+                                              typename L::Float opacity) {
+  const ChannelView& channel = scene.channels[n];
+  typename L::Mask known = isFinite(scalars.place[n].c0);
+  if (scene.hasFactor(n)) [[unlikely]] {
+    const Cubic<L>& g = scalars.factorPosition[n];
+    known = known & isFinite(g.c0);
+    multiplyByFactorAt<L>(channel, g.at(2.0f * place - 1.0f), which, &opacity);
+  }
+  return where(known, opacity * channel.density);
+}
+
 /// Extinction (as `opacity`) and colour of channel n at a place in [0,1] of a segment. Undefined for rays
 /// that are not in `which`.
 template <Detail kDetail, class L, class View>
 SCOLOPAX_LANES Optical<L> opticalOn(const View& scene, const SegmentCubics<L, View>& scalars, int n,
                                     typename L::Float place, typename L::Mask which) {
-  using Float = typename L::Float;
   const ChannelView& channel = scene.channels[n];
-  const Cubic<L>& f = scalars.place[n];
-  const Float y = 2.0f * place - 1.0f;
-  const CurvePoint<L> point = pointOn<L>(channel.optical, positionAt<L>(channel, f.at(y)));
-  Optical<L> optical = opticalAt<kDetail, L>(channel.optical, point, which);
-  typename L::Mask known = isFinite(f.c0);
-  if (scene.hasFactor(n)) [[unlikely]] {
-    const Cubic<L>& g = scalars.factorPosition[n];
-    known = known & isFinite(g.c0);
-    multiplyByFactorAt<L>(channel, g.at(y), which, &optical.opacity);
-  }
-  optical.opacity = where(known, optical.opacity * channel.density);
+  const auto position = positionAt<L>(channel, scalars.place[n].at(2.0f * place - 1.0f));
+  Optical<L> optical = opticalAt<kDetail, L>(channel.optical, pointOn<L>(channel.optical, position), which);
+  optical.opacity = extinctionOn(scene, scalars, n, place, which, optical.opacity);
   return optical;
 }
 

@@ -3,8 +3,7 @@
 // and which of them counts where they hide each other. Takes segments (point_segments.h); used by raymarch.h
 // and strata.h.
 #pragma once
-#include "renderer/kernel/point_segments.h"
-#include "renderer/kernel/voxel_segments.h"
+#include "renderer/kernel/jumps.h"
 
 namespace scolopax::kernel {
 
@@ -72,7 +71,7 @@ SCOLOPAX_LANES PartOf<L> partAlone(const View& scene, const SegmentEnds<L, View>
   }
   CurvePoint<L> from = ends.from[n], to = ends.to[n];
   Float density(channel.density);
-  if (!channel.finite) {
+  if (!channel.field.finite) {
     const Mask known = from.position == from.position, other = to.position == to.position;
     const CurvePoint<L> start = select(known, from, to);
     to = select(other, to, from);
@@ -137,6 +136,19 @@ SCOLOPAX_LANES_RARE void multiplyByFactor(const ChannelView& channel, const Segm
   *opacity = where(known | other, *opacity * factor);
 }
 
+/// Extinction of channel n at a place in [0,1] of a segment, where its curve has the given opacity.
+template <class L, class View>
+SCOLOPAX_LANES typename L::Float extinctionOn(const View& scene, const SegmentEnds<L, View>& ends, int n,
+                                              typename L::Float place, typename L::Mask which,
+                                              typename L::Float opacity) {
+  const ChannelView& channel = scene.channels[n];
+  const auto p = ends.from[n].position, q = ends.to[n].position;
+  typename L::Float extinction = where((p == p) | (q == q), opacity * channel.density);
+  if (scene.hasFactor(n)) [[unlikely]]
+    multiplyByFactor<L>(channel, ends, n, place, which, &extinction);
+  return extinction;
+}
+
 /// Extinction (as `opacity`) and colour of channel n at a place in [0,1] of a segment. Undefined for rays
 /// that are not in `which`.
 template <Detail kDetail, class L, class View>
@@ -151,21 +163,69 @@ SCOLOPAX_LANES Optical<L> opticalOn(const View& scene, const SegmentEnds<L, View
   CurvePoint<L> point{p.position + place * (q.position - p.position), p.piece};
   if (any(without(which, p.piece == q.piece))) point = pointOn<L>(channel.optical, point.position);
   Optical<L> optical = opticalAt<kDetail, L>(channel.optical, point, which);
-  optical.opacity = where(known | other, optical.opacity * channel.density);
-  if (scene.hasFactor(n)) [[unlikely]]
-    multiplyByFactor<L>(channel, ends, n, place, which, &optical.opacity);
+  optical.opacity = extinctionOn(scene, ends, n, place, which, optical.opacity);
   return optical;
 }
 
+/// Adds a part of a segment from `begin` to `end`, for rays in `on`, over which the channels' extinctions and
+/// colours are linear: sets `hidden` to the visible part of each channel, and returns the largest extinction,
+/// times the part's share of the segment. At most one channel takes over from another: where their
+/// extinctions are equal.
+template <Detail kDetail, class L, class View>
+SCOLOPAX_LANES typename L::Float addLargest(const View& scene, bool mixes, const Segment<L>& segment,
+                                            const Optical<L>* front, const Optical<L>* back,
+                                            typename L::Float begin, typename L::Float end,
+                                            typename L::Mask on, Hidden<L, false>& hidden) {
+  using Float = typename L::Float;
+  using Int = typename L::Int;
+  using Mask = typename L::Mask;
+  // The largest at either end, and each of the two at the other end.
+  Float largest(0.0f), largestBehind(0.0f), before(0.0f), after(0.0f);
+  Int winner(-1), next(-1);
+  for (int n = 0; n < scene.channelCount; ++n) {
+    if (!(segment.channels >> n & 1)) continue;
+    const Mask larger = front[n].opacity > largest, largerBehind = back[n].opacity > largestBehind;
+    largest = select(larger, front[n].opacity, largest);
+    winner = select(larger, Int(n), winner);
+    after = select(larger, back[n].opacity, after);
+    largestBehind = select(largerBehind, back[n].opacity, largestBehind);
+    next = select(largerBehind, Int(n), next);
+    before = select(largerBehind, front[n].opacity, before);
+  }
+  const Mask same = winner == next;
+  const Float lead = largest - before, behind = largestBehind - after, both = lead + behind;
+  const Float turn = select(same, Float(1.0f), where(both > 0.0f, lead / both));
+  const Float handed = largest + turn * (after - largest), share = end - begin;
+  if constexpr (kDetail >= Detail::emission) {
+    const Float place = select(same, end, begin + turn * share);
+    for (int n = 0; n < scene.channelCount; ++n) {
+      if (!(segment.channels >> n & 1)) continue;
+      const Optical<L>&a = front[n], &b = back[n];
+      if (mixes) {
+        const float weight = scene.channels[n].weight;
+        detail::addLinear<kDetail, L>({a.opacity * weight, a.color}, {b.opacity * weight, b.color}, begin,
+                                      end, on & segment.of(n), &hidden.of[n]);
+        continue;
+      }
+      const Mask wins = on & (winner == Int(n)), follows = without(on & (next == Int(n)), same);
+      if (!any(wins | follows)) continue;
+      const Optical<L> there{a.opacity + turn * (b.opacity - a.opacity),
+                             a.color + turn * (b.color - a.color)};
+      detail::addLinear<kDetail, L>(a, there, begin, place, wins, &hidden.of[n]);
+      detail::addLinear<kDetail, L>(there, b, place, end, follows, &hidden.of[n]);
+    }
+  }
+  return where(on, share * 0.5f * (turn * (largest + handed) + (1.0f - turn) * (handed + largestBehind)));
+}
+
 /// Compares the channels of a segment, for rays in `which`. Returns the mean of the largest extinction, and
-/// sets `hidden` to the visible part of each channel. Between two places extinctions and colours are taken to
-/// be linear, and at most one channel takes over from another there: where their extinctions are equal.
+/// sets `hidden` to the visible part of each channel. The segment is divided where curves jump and, where
+/// extinctions are not linear, into kPartsAtKnots.
 template <Detail kDetail, class L, class View, class Scalars>
 SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Segment<L>& segment,
                                          const Scalars& scalars, typename L::Mask which,
                                          Hidden<L, false>& hidden) {
   using Float = typename L::Float;
-  using Int = typename L::Int;
   using Mask = typename L::Mask;
   Mask bent = without(which, which);
   for (int n = 0; n < scene.channelCount; ++n) {
@@ -173,9 +233,7 @@ SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Se
     bent = bent | without(segment.of(n), isStraight<L>(scene, scalars, n));
     if constexpr (kDetail >= Detail::emission) hidden.of[n] = noPart<L>();
   }
-  bent = bent & which;
-  const int parts = any(bent) ? kPartsAtKnots : 1;
-  const Float share = select(bent, Float(1.0f / kPartsAtKnots), Float(1.0f));
+  const Float share = select(bent & which, Float(1.0f / kPartsAtKnots), Float(1.0f));
   Optical<L> at[2][kMaxVisibleChannels];  // the channels at the ends of a part
   const auto look = [&](int end, Float place) SCOLOPAX_LANES_LAMBDA {
     for (int n = 0; n < scene.channelCount; ++n) {
@@ -185,52 +243,34 @@ SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Se
       at[end][n].opacity = where(here, at[end][n].opacity);
     }
   };
-  look(0, Float(0.0f));
-  Float sum(0.0f);
-  for (int i = 0; i < parts; ++i) {
-    const Mask on = i == 0 ? which : bent;
-    const Float begin = float(i) * share, end = (float(i) + 1.0f) * share;
-    const auto& front = at[i & 1];
-    const auto& back = at[(i & 1) ^ 1];
-    look((i & 1) ^ 1, end);
-    // The largest at either end, and each of the two at the other end.
-    Float largest(0.0f), largestBehind(0.0f), before(0.0f), after(0.0f);
-    Int winner(-1), next(-1);
+  Jumps<L, View, Scalars> jumps(scene, scalars, segment, which);
+  // Sets the channels that jump at the end of a part to the value before their jump or behind it.
+  const auto setJumping = [&](int end, Float place, bool behind) SCOLOPAX_LANES_LAMBDA {
     for (int n = 0; n < scene.channelCount; ++n) {
-      if (!(segment.channels >> n & 1)) continue;
-      const Mask larger = front[n].opacity > largest, largerBehind = back[n].opacity > largestBehind;
-      largest = select(larger, front[n].opacity, largest);
-      winner = select(larger, Int(n), winner);
-      after = select(larger, back[n].opacity, after);
-      largestBehind = select(largerBehind, back[n].opacity, largestBehind);
-      next = select(largerBehind, Int(n), next);
-      before = select(largerBehind, front[n].opacity, before);
+      const Mask here = jumps.at(n);
+      if (!any(here)) continue;
+      Optical<L> optical = jumps.template opticalAt<kDetail>(n, behind);
+      optical.opacity = extinctionOn(scene, scalars, n, place, here, optical.opacity);
+      at[end][n].opacity = select(here, optical.opacity, at[end][n].opacity);
+      if constexpr (kDetail >= Detail::emission)
+        at[end][n].color = select(here, optical.color, at[end][n].color);
     }
-    const Mask same = winner == next;
-    const Float lead = largest - before, behind = largestBehind - after, both = lead + behind;
-    const Float turn = select(same, Float(1.0f), where(both > 0.0f, lead / both));
-    const Float handed = largest + turn * (after - largest);
-    sum = sum +
-          where(on, share * 0.5f * (turn * (largest + handed) + (1.0f - turn) * (handed + largestBehind)));
-    if constexpr (kDetail >= Detail::emission) {
-      const Float place = select(same, end, begin + turn * share);
-      for (int n = 0; n < scene.channelCount; ++n) {
-        if (!(segment.channels >> n & 1)) continue;
-        const Optical<L>&a = front[n], &b = back[n];
-        if (mixes) {
-          const float weight = scene.channels[n].weight;
-          detail::addLinear<kDetail, L>({a.opacity * weight, a.color}, {b.opacity * weight, b.color}, begin,
-                                        end, on & segment.of(n), &hidden.of[n]);
-          continue;
-        }
-        const Mask wins = on & (winner == Int(n)), follows = without(on & (next == Int(n)), same);
-        if (!any(wins | follows)) continue;
-        const Optical<L> there{a.opacity + turn * (b.opacity - a.opacity),
-                               a.color + turn * (b.color - a.color)};
-        detail::addLinear<kDetail, L>(a, there, begin, place, wins, &hidden.of[n]);
-        detail::addLinear<kDetail, L>(there, b, place, end, follows, &hidden.of[n]);
-      }
-    }
+  };
+  look(0, Float(0.0f));
+  Float sum(0.0f), begin(0.0f);
+  Mask on = which;
+  constexpr int kMostParts = 64;
+  for (int i = 0; i < kMostParts && any(on); ++i) {
+    const int front = i & 1, back = front ^ 1;
+    Float end = minimum(begin + share, 1.0f);
+    jumps.shorten(begin, on, &end);
+    look(back, end);
+    if (jumps.found()) setJumping(back, end, false);
+    sum = sum + addLargest<kDetail>(scene, mixes, segment, at[front], at[back], begin, end, on, hidden);
+    if (jumps.found()) setJumping(back, end, true);
+    jumps.advance(end);
+    begin = end;
+    on = on & (end < 1.0f);
   }
   return sum;
 }

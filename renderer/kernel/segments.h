@@ -115,14 +115,14 @@ class CellSegments {
   }
 
   SCOLOPAX_HD void sample(int n, float t, CurvePoint<One>* points, float* factorPositions) {
-    ++cost_->fetches;
     const ChannelView& channel = scene_.channels[n];
+    cost_->fetches += channel.field.cost();
     const glm::vec3 point = ray_.origin + t * ray_.direction;
-    const float stored = sampleStored(channel, scene_.dims, point);
+    const float stored = sampleStored<One>(channel.field, scene_.dims, point);
     points[n] = pointOn<One>(channel.optical, stretchPosition(channel, stored));
     if (scene_.hasFactor(n)) [[unlikely]] {
       findFactorPosition<One>(channel, scene_.dims, point, &factorPositions[n]);
-      cost_->fetches += gradientFetches(scene_.dims);
+      cost_->fetches += gradientFetches(channel.field, scene_.dims);
     }
   }
 

@@ -13,8 +13,8 @@ struct Unlit {
   static constexpr bool kAny = false;
 };
 
-/// A normal is turned towards the viewer if the cosine of its angle to the view is below this. Where a field is
-/// constant along the view, the cosine is 0 but for rounding, which must not decide about the normal.
+/// A normal is turned towards the viewer if the cosine of its angle to the view is below this. Where a field
+/// is constant along the view, the cosine is 0 but for rounding, which must not decide about the normal.
 inline constexpr float kFacesAway = -1e-6f;
 
 /// Points on rays at which lighting is evaluated, inside the clipped volume.
@@ -105,8 +105,9 @@ SCOLOPAX_LANES typename L::Vec lit(const SceneView& scene, const ChannelView& ch
 
   // Scaled by its largest component: stored values may be as large or as small as floats allow, so squares of
   // the gradient may overflow or underflow.
-  const Gradient<L> at = gradientAt<L>(channel, scene.dims, scene.gradientFromVoxel, hit.point);
-  cost->fetches = cost->fetches + typename L::Word(onesOf(which)) * gradientFetches(scene.dims);
+  const Gradient<L> at = gradientAt<L>(channel.field, scene.dims, scene.gradientFromVoxel, hit.point);
+  cost->fetches =
+      cost->fetches + typename L::Word(onesOf(which)) * gradientFetches(channel.field, scene.dims);
   const Vec gradient = select(at.finite, at.perSpacing, Vec(0.0f));
   const Float largest = largestComponent(gradient);
   Mask shaded = which & (largest > 0.0f);

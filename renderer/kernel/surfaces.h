@@ -55,6 +55,7 @@ class SurfaceWalk {
         walk_(scene, scene.surfaceCells, rays, inside, Word(channels), kInfinity, cost),
         hit_{Float(kInfinity), Float(0.0f), Vec(0.0f), {Int(-1), Float(0.0f)}} {
     inCell_ = without(L::everywhere(), L::everywhere());
+    if (scene.hasNearest()) face_ = endOfFace();
   }
 
   /// Moves the rays in `which` to their next surfaces.
@@ -68,7 +69,7 @@ class SurfaceWalk {
       }
       const Mask crosses = cross(seeking);
       inCell_ = without(inCell_, without(seeking, crosses));
-      const Mask kept = isKept(crosses);
+      const Mask kept = without(isKept(crosses), isWhereItBegins(crosses));
       hit_.t = select(without(crosses, kept), Float(kInfinity), hit_.t);
       seeking = without(seeking, kept);
     }
@@ -93,7 +94,8 @@ class SurfaceWalk {
     const float origin = maximum(channel.origin, -channel.origin);
     const Float length = maximum(walk_.end() - walk_.start(), scene_.smallestSpacing * 0.015625f);
     const Float slope = (bounds.upper - bounds.lower) / length;
-    return (maximum(bounds.upper, -bounds.lower) + origin) * 0x1p-20f + slope * (walk_.end() * 0x1p-21f);
+    return (maximum(bounds.upper, -bounds.lower) + origin) * roundingOf(channel.field.filter) +
+           slope * (walk_.end() * 0x1p-21f);
   }
 
   SCOLOPAX_LANES void enterCells(Mask which) {
@@ -120,7 +122,7 @@ class SurfaceWalk {
     for (int i = 0; i < kCubicNodes; ++i) own[i] = channel.dataFalls ? -values[i] : values[i];
     const Cubic<L> f = cubicThrough<L>(own);
     value_[n] = select<L>(which, f, value_[n]);
-    cost_->fetches = cost_->fetches + Word(onesOf(which));
+    cost_->fetches = cost_->fetches + Word(onesOf(which)) * Word(cubicFetches(channel.field));
     const Word bit(1u << n);
     const Mask finite = which & isFinite(f.c0);
     known_ = select(without(which, finite), known_ & Word(~(1u << n)), known_);
@@ -130,11 +132,11 @@ class SurfaceWalk {
     const float way = scene_.smallestSpacing * kSoon;
     Float soon = f.at(minimum(2.0f * way / length - 1.0f, 0.0f)), slack = slackOf(channel, boundsOf(f));
     const Mask starts = first & (start_.channel > Int(-1)) & (walk_.start() == enter_);
-    if (any(starts)) {
-      // The first cell may be too short to tell.
-      const Vec point = rays_.origin + (enter_ + way) * rays_.direction;
-      const Float away = sampleStored(channel, scene_.dims, point) - channel.origin;
-      soon = select(starts, channel.dataFalls ? -away : away, soon);
+    const Mask brief = starts | (first & (length < way));  // the cell may be too short to tell
+    if (any(brief)) {
+      const Vec point = rays_.origin + (walk_.start() + way) * rays_.direction;
+      const Float away = sampleStored<L>(channel.field, scene_.dims, point) - channel.origin;
+      soon = select(brief & isFinite(away), channel.dataFalls ? -away : away, soon);
       const Float change = maximum(soon - atBegin, atBegin - soon) * (kSamePlace / kSoon);
       slack = select(starts, maximum(slack, change), slack);
     }
@@ -142,7 +144,8 @@ class SurfaceWalk {
     for (int i = 0; i < channel.surfaceCount; ++i) {
       const Float value(channel.surfaces[i].value);
       const Mask begins = starts & (start_.channel == Int(n)) & (start_.value == value);
-      const Mask unclear = begins | ((atBegin >= value - slack) & (atBegin <= value + slack));
+      Mask unclear = begins | ((atBegin >= value - slack) & (atBegin <= value + slack));
+      if (channel.field.has(Filter::nearest)) unclear = without(unclear, unclear);
       above = above | where((unclear & (soon >= value)) | without(atBegin >= value, unclear), Word(1u << i));
     }
     above_[n] = select(first, above, above_[n]);
@@ -226,8 +229,11 @@ class SurfaceWalk {
       atBegin = select(further, atEnd, atBegin);
     }
     if (!any(found)) return none;
-    const Float y = crossing(f, low, high, f.at(low), f.at(high), value, without(found, flat));
-    return select(found, select(flat, low, y), none);
+    // The side may also have changed at the face where the cell begins.
+    const Float atLow = f.at(low);
+    const Mask atOnce = flat | (above & (atLow < value)) | without(atLow >= value, above);
+    const Float y = crossing(f, low, high, atLow, f.at(high), value, without(found, atOnce));
+    return select(found, select(atOnce, low, y), none);
   }
 
   /// Whether the channels of hits, in lanes of `which`, are not clipped there.
@@ -242,9 +248,36 @@ class SurfaceWalk {
     return found;
   }
 
+  /// Up to where rays that begin at a surface may meet the face between nearest voxels at which they begin:
+  /// rounding may have put their origins on either side of it.
+  SCOLOPAX_LANES Float endOfFace() const {
+    const int longest = maximum(maximum(scene_.dims.x, scene_.dims.y), scene_.dims.z);
+    const float rounding = float(longest) * 0x1p-20f;  // voxels
+    Float end(0.0f);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Float at = rays_.origin[axis] + enter_ * rays_.direction[axis];
+      const Float away = at - (toFloat(truncated(at)) + 0.5f);
+      const Mask onFace = (away < rounding) & (away > -rounding);
+      const Float speed = maximum(rays_.direction[axis], -rays_.direction[axis]);
+      end = select(onFace, maximum(end, 2.0f * rounding / speed), end);
+    }
+    // Rays almost along a face are on one of its sides for long.
+    return enter_ + minimum(end, scene_.smallestSpacing * 0.0625f);
+  }
+  /// Whether hits, in lanes of `which`, are at the face between nearest voxels at which their rays begin.
+  SCOLOPAX_LANES Mask isWhereItBegins(Mask which) const {
+    Mask found = without(which, which);
+    if (!scene_.hasNearest() || !any(which)) return found;
+    const Mask close = which & (start_.channel > Int(-1)) & (hit_.t <= face_);
+    for (int n = 0; n < scene_.channelCount && any(close); ++n)
+      if (scene_.channels[n].field.has(Filter::nearest))
+        found = found | (close & (hit_.surface.channel == Int(n)));
+    return found;
+  }
+
   const SceneView& scene_;
   const RayOf<L>& rays_;
-  Float enter_;
+  Float enter_, face_{0.0f};
   std::uint32_t channels_;
   SurfaceStart<L> start_;
   CostOf<L>* cost_;

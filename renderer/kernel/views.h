@@ -40,6 +40,7 @@ struct OpticalCurveView {
   const OpticalKnot* knots;
   const std::uint16_t* buckets;  ///< as in CurveView
   int count;
+  bool jumps;         ///< some knots share a position
   float first, last;  ///< the opacity is 0 at positions up to `first` and from `last` on
 };
 
@@ -98,11 +99,31 @@ struct SurfaceView {
 };
 inline constexpr int kMaxSurfaces = 32;  ///< of a channel
 
-/// One channel: where its voxels are and how a stored value becomes extinction and colour.
-struct ChannelView {
+/// How the scalar between voxels follows from them: filters.h.
+enum class Filter : std::uint8_t { trilinear, cubic, nearest };
+
+/// Where the values of a channel are.
+struct FieldView {
   const void* voxels;  ///< voxels of this channel, interleaved with others of its type
   ScalarType type;
-  int lane, stride;             ///< index among the interleaved channels, and their number
+  Filter filter;
+  std::uint8_t fetches;  ///< cost()
+  bool finite;           ///< whether all voxels are finite
+  int lane, stride;      ///< index among the interleaved channels, and their number
+
+  /// Kernels for devices are compiled for trilinear interpolation alone.
+#if defined(__CUDA_ARCH__)
+  SCOLOPAX_HD bool has(Filter which) const { return which == Filter::trilinear; }
+  SCOLOPAX_HD unsigned cost() const { return 1; }
+#else
+  SCOLOPAX_HD bool has(Filter which) const { return filter == which; }
+  SCOLOPAX_HD unsigned cost() const { return fetches; }  ///< of a sample, in trilinear samples
+#endif
+};
+
+/// One channel: its values, and how a stored value becomes extinction and colour.
+struct ChannelView {
+  FieldView field;
   float origin, scale, offset;  ///< position = clamp((stored - origin) * scale + offset, 0, 1)
   float gamma;                  ///< both curves are evaluated at position^gamma
   float density;                ///< extinction = opacity * density, per world unit
@@ -112,7 +133,6 @@ struct ChannelView {
   float weight;                ///< weight of the colour in blend mode mix
   MaterialView material;
   float inverseRange;  ///< 1 / |hi - lo| of the channel's range, in stored values
-  bool finite;         ///< whether all voxels are finite
   GradientFactorView factor;
   const SurfaceView* surfaces;
   int surfaceCount;
@@ -130,6 +150,7 @@ struct SceneView {
   std::uint32_t seed;
   float filterWidth;  ///< samples are spread over a square of this side, in pixels; 0: at the pixel's centre
   glm::ivec3 dims;
+  bool nearest;  ///< some channel takes the value of the nearest voxel, which changes between voxel centres
   ClipView clip;
   int channelCount;
   const ChannelView* channels;
@@ -153,14 +174,14 @@ struct SceneView {
   static constexpr int kFactors = kMaxVisibleChannels;  ///< channels that may have one: length of arrays
   /// Whether the opacity of channel n depends on the gradient.
   SCOLOPAX_HD bool hasFactor(int n) const { return channels[n].factor.curve.count != 0; }
-  /// Kernels for devices are compiled without surfaces.
-  SCOLOPAX_HD bool hasSurfaces() const {
+  /// Kernels for devices are compiled without surfaces and filters.
 #if defined(__CUDA_ARCH__)
-    return false;
+  SCOLOPAX_HD static constexpr bool hasSurfaces() { return false; }
+  SCOLOPAX_HD static constexpr bool hasNearest() { return false; }
 #else
-    return surfaces;
+  SCOLOPAX_HD bool hasSurfaces() const { return surfaces; }
+  SCOLOPAX_HD bool hasNearest() const { return nearest; }
 #endif
-  }
 };
 
 /// A scene in which no opacity depends on the gradient. Kernels of this view are compiled without the code

@@ -81,13 +81,13 @@ class VoxelSegments {
                       for (int i = 0; i < kCubicNodes; ++i)
                         own[i] = channel.scale < 0.0f ? -values[i] : values[i];
                       cell_.place[n] = select<L>(which, cubicThrough<L>(own), cell_.place[n]);
-                      ++fetches;
+                      fetches += cubicFetches(channel.field);
                       if (scene_.hasFactor(n)) [[unlikely]] {
                         for (int i = 0; i < kCubicNodes; ++i)
                           findFactorPosition<L>(channel, scene_.dims, points[i], &own[i]);
                         cell_.factorPosition[n] =
                             select<L>(which, cubicThrough<L>(own), cell_.factorPosition[n]);
-                        fetches += kCubicNodes * gradientFetches(scene_.dims);
+                        fetches += kCubicNodes * gradientFetches(channel.field, scene_.dims);
                       }
                     });
     cost_->fetches = cost_->fetches + Word(onesOf(which)) * Word(fetches);

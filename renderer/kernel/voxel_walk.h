@@ -3,6 +3,7 @@
 // cell, where every scalar is a cubic.
 #pragma once
 #include "renderer/kernel/cubic.h"
+#include "renderer/kernel/filters.h"
 #include "renderer/kernel/point_walk.h"
 #include "renderer/kernel/segments.h"
 
@@ -26,12 +27,13 @@ class VoxelWalk {
         rays_(rays),
         inside_(inside),
         longest_(longest),
+        planes_(scene.hasNearest() ? 2.0f : 1.0f),
         cost_(cost),
         walk_(rays, inside_, macrocells, channels) {
     more_ = walk_.meets();
     start_ = end_ = walk_.enter();
     for (int axis = 0; axis < 3; ++axis)
-      inverse_[axis] = clamp(1.0f / rays.direction[axis], -kLargestFinite, kLargestFinite);
+      inverse_[axis] = clamp(1.0f / (rays.direction[axis] * planes_), -kLargestFinite, kLargestFinite);
   }
 
   /// Moves the rays in `which` to their next cells. Returns those of them that have one.
@@ -84,13 +86,15 @@ class VoxelWalk {
     more_ = without(more_, which);
   }
 
-  /// Where each ray meets the next plane through voxel centres after t.
+  /// Where each ray meets the next plane through voxel centres after t; with fields of which the nearest
+  /// voxel counts, also of those between.
   SCOLOPAX_LANES Float faceAfter(Float t) const {
     Float face(kInfinity);
     for (int axis = 0; axis < 3; ++axis) {
-      const Float o = rays_.origin[axis], d = rays_.direction[axis];
+      const Float o = rays_.origin[axis] * planes_, d = rays_.direction[axis] * planes_;
       const Mask up = d > 0.0f;
-      const Float last = toFloat(Int(scene_.dims[axis] - 1)), way = select(up, Float(1.0f), Float(-1.0f));
+      const Float last = toFloat(Int(scene_.dims[axis] - 1)) * planes_,
+                  way = select(up, Float(1.0f), Float(-1.0f));
       const Float x = clamp(o + t * d, -1.0f, last + 1.0f);
       const Float floor = toFloat(truncated(x + 1.0f)) - 1.0f;
       const Float plane = select(up, floor + 1.0f, select(floor == x, floor - 1.0f, floor));
@@ -103,13 +107,14 @@ class VoxelWalk {
   /// Infinite if there is no such plane.
   SCOLOPAX_LANES Float crossingOf(int axis, Float plane, Float last) const {
     const Mask exists = (plane >= 0.0f) & (plane <= last);
-    return select(exists, (plane - rays_.origin[axis]) * inverse_[axis], Float(kInfinity));
+    return select(exists, (plane - rays_.origin[axis] * planes_) * inverse_[axis], Float(kInfinity));
   }
 
   const SceneView& scene_;
   const RayOf<L>& rays_;
   IntervalOf<L> inside_;
   float longest_;
+  float planes_;  // per voxel
   CostOf<L>* cost_;
   PointWalk<L> walk_;
   Mask more_;  // rays that have not ended, and go on beyond their cell
@@ -118,9 +123,25 @@ class VoxelWalk {
   Int taken_{0};
 };
 
+/// Samples a field whose filter is not trilinear at the nodes of a cubic, which are around `centre`.
+template <class L>
+SCOLOPAX_LANES_RARE void sampleNodes(const FieldView& field, glm::ivec3 dims, const typename L::Vec& centre,
+                                     const typename L::Vec* points, typename L::Float* stored) {
+  // The nodes may be on the plane at which the nearest voxel changes.
+  const bool nearest = field.has(Filter::nearest);
+  for (int i = 0; i < kCubicNodes; ++i) sampleFiltered(field, dims, nearest ? centre : points[i], &stored[i]);
+}
+
+/// What sampleCubics() costs for a field, in trilinear samples. One reading of eight voxels serves all nodes.
+SCOLOPAX_HD inline unsigned cubicFetches(const FieldView& field) {
+  return field.has(Filter::cubic) ? kCubicNodes * field.cost() : 1;
+}
+
 /// Samples `channels` at the nodes of a cubic on the parts of rays from `start` to `end`, each in a cell of
-/// eight voxels. Calls visit(n, points, values) for every channel: the nodes in voxel coordinates, and stored
-/// values less the channel's origin; NaN where a value is not finite.
+/// eight voxels and, for fields of which the nearest voxel counts, nearest to one of them. Calls visit(n,
+/// points, values) for every channel: the nodes in voxel coordinates, and stored values less the channel's
+/// origin; NaN where a value is not finite. Trilinear interpolation is a cubic there, and the nearest voxel's
+/// value a constant; the cubic B-spline is of degree 9, so that the cubic through its nodes approximates it.
 template <class L, class Visit>
 SCOLOPAX_LANES void sampleCubics(const SceneView& scene, const RayOf<L>& rays, std::uint32_t channels,
                                  typename L::Float start, typename L::Float end, Visit&& visit) {
@@ -128,9 +149,12 @@ SCOLOPAX_LANES void sampleCubics(const SceneView& scene, const RayOf<L>& rays, s
   using Vec = typename L::Vec;
   constexpr float kFarValue = 0x1p124f;  // as voxels; coefficients of a cubic are below 12 times that
   Float corners[kMaxVisibleChannels][kCorners];
+  std::uint32_t trilinear = 0;
+  for (std::uint32_t left = channels; left != 0; left &= left - 1)
+    if (scene.channels[std::countr_zero(left)].field.has(Filter::trilinear)) trilinear |= left & -left;
   const Float middle = 0.5f * (start + end), half = 0.5f * (end - start);
   const Vec centre = rays.origin + middle * rays.direction;
-  cellVoxels(scene, channels, centre, corners);
+  cellVoxels(scene, trilinear, centre, corners);
   const CellPlaces<L> cell(scene.dims, centre);
   Vec points[kCubicNodes], places[kCubicNodes];
   for (int i = 0; i < kCubicNodes; ++i) {
@@ -139,11 +163,15 @@ SCOLOPAX_LANES void sampleCubics(const SceneView& scene, const RayOf<L>& rays, s
   }
   for (std::uint32_t left = channels; left != 0; left &= left - 1) {
     const int n = std::countr_zero(left);
-    Float values[kCubicNodes];
+    const ChannelView& channel = scene.channels[n];
+    Float stored[kCubicNodes], values[kCubicNodes];
+    if (trilinear >> n & 1) [[likely]]
+      for (int i = 0; i < kCubicNodes; ++i) stored[i] = interpolate<L>(corners[n], places[i]);
+    else
+      sampleNodes<L>(channel.field, scene.dims, centre, points, stored);
     for (int i = 0; i < kCubicNodes; ++i) {
-      const Float stored = interpolate<L>(corners[n], places[i]);
-      const Float value = clamp(stored - scene.channels[n].origin, -kFarValue, kFarValue);
-      values[i] = select(isFinite(stored), value, Float(kNaN));
+      const Float value = clamp(stored[i] - channel.origin, -kFarValue, kFarValue);
+      values[i] = select(isFinite(stored[i]), value, Float(kNaN));
     }
     visit(n, points, values);
   }

@@ -28,26 +28,29 @@ double lerp(double a, double b, double u) { return a + u * (b - a); }
 
 }  // namespace
 
+double binomial(std::size_t n, std::size_t k) { return binomials(n)[k]; }
+
 Bernstein::Bernstein(std::span<const double> coefficients) : degree_(coefficients.size() - 1) {
   assert(coefficients.size() >= 1 && coefficients.size() <= b_.size());
   std::copy(coefficients.begin(), coefficients.end(), b_.begin());
 }
 
 double Bernstein::operator()(double u) const {
-  Row b = b_;
+  Row b;
+  std::copy_n(b_.begin(), degree_ + 1, b.begin());
   for (std::size_t level = degree_; level > 0; --level)
     for (std::size_t i = 0; i < level; ++i) b[i] = lerp(b[i], b[i + 1], u);
   return b[0];
 }
 
 /// De Casteljau's algorithm: the first value of each level is a coefficient of the left part, the last value
-/// one of the right part.
+/// one of the right part, and stays in its place.
 void Bernstein::splitAt(double u, Bernstein& left, Bernstein& right) const {
   left.degree_ = right.degree_ = degree_;
-  Row b = b_;
+  Row& b = right.b_;
+  std::copy_n(b_.begin(), degree_ + 1, b.begin());
   for (std::size_t level = degree_;; --level) {
     left.b_[degree_ - level] = b[0];
-    right.b_[level] = b[level];
     if (level == 0) return;
     for (std::size_t i = 0; i < level; ++i) b[i] = lerp(b[i], b[i + 1], u);
   }
@@ -98,7 +101,6 @@ Bernstein Bernstein::operator*(const Bernstein& other) const {
   assert(degree_ + other.degree_ <= kMaxDegree);
   Bernstein product;
   product.degree_ = degree_ + other.degree_;
-  product.b_ = {};
   for (std::size_t i = 0; i <= degree_; ++i)
     for (std::size_t j = 0; j <= other.degree_; ++j)
       product.b_[i + j] += binomials(degree_)[i] * b_[i] * binomials(other.degree_)[j] * other.b_[j];
@@ -108,8 +110,14 @@ Bernstein Bernstein::operator*(const Bernstein& other) const {
 
 Bernstein Bernstein::operator*(double factor) const {
   Bernstein product = *this;
-  for (double& b : product.b_) b *= factor;
+  for (std::size_t k = 0; k <= degree_; ++k) product.b_[k] *= factor;
   return product;
+}
+
+Bernstein Bernstein::operator-(double value) const {
+  Bernstein difference = *this;
+  for (std::size_t k = 0; k <= degree_; ++k) difference.b_[k] -= value;
+  return difference;
 }
 
 Bernstein Bernstein::elevated(std::size_t degree) const {

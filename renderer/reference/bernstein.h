@@ -9,9 +9,13 @@
 
 namespace scolopax::reference {
 
+/// n over k; n up to Bernstein::kMaxDegree.
+double binomial(std::size_t n, std::size_t k);
+
 class Bernstein {
  public:
-  static constexpr std::size_t kMaxDegree = 12;
+  /// Of the products in which LightCuts looks for kinks: (n.l)^2, where n is of degree 8 and l of degree 1.
+  static constexpr std::size_t kMaxDegree = 18;
   static constexpr double kNarrowest = 0x1p-44;  ///< width of a root's bracket
   /// Takes degree + 1 coefficients: one is a constant, two are the values at 0 and 1.
   explicit Bernstein(std::span<const double> coefficients);
@@ -35,6 +39,7 @@ class Bernstein {
   Bernstein operator*(double factor) const;
   Bernstein operator+(const Bernstein& other) const;
   Bernstein operator-(const Bernstein& other) const { return *this + other * -1; }
+  Bernstein operator-(double value) const;
 
  private:
   Bernstein elevated(std::size_t degree) const;

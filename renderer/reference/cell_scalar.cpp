@@ -5,17 +5,15 @@
 #include <cmath>
 #include <utility>
 
+#include "renderer/reference/lerp.h"
+
 namespace scolopax::reference {
 namespace {
 
-/// Exact at both ends, and where a and b are equal. The outer half voxels lie at u = 1, where a huge
-/// neighbour must not wipe out b. (std::lerp is exact there too, but several times slower.)
-double lerp(double a, double b, double u) { return u == 1 ? b : a + u * (b - a); }
-
 double trilinear(const std::array<double, 8>& c, double x, double y, double z) {
-  const double near = lerp(lerp(c[0], c[1], x), lerp(c[2], c[3], x), y);
-  const double far = lerp(lerp(c[4], c[5], x), lerp(c[6], c[7], x), y);
-  return lerp(near, far, z);
+  const double near = lerpExact(lerpExact(c[0], c[1], x), lerpExact(c[2], c[3], x), y);
+  const double far = lerpExact(lerpExact(c[4], c[5], x), lerpExact(c[6], c[7], x), y);
+  return lerpExact(near, far, z);
 }
 
 }  // namespace
@@ -34,8 +32,8 @@ CellScalar::CellScalar(const std::array<double, 8>& c, const glm::dvec3& p, cons
 }
 
 double CellScalar::operator()(double u) const {  // de Casteljau: exact where the scalar is constant
-  const double a = lerp(b_[0], b_[1], u), b = lerp(b_[1], b_[2], u), c = lerp(b_[2], b_[3], u);
-  return lerp(lerp(a, b, u), lerp(b, c, u), u);
+  const double a = lerpExact(b_[0], b_[1], u), b = lerpExact(b_[1], b_[2], u), c = lerpExact(b_[2], b_[3], u);
+  return lerpExact(lerpExact(a, b, u), lerpExact(b, c, u), u);
 }
 
 double CellScalar::lower() const { return *std::min_element(b_.begin(), b_.end()); }

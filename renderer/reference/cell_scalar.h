@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scalar along a straight line inside one cell of eight voxels: a cubic, and the points where it takes a
-// given value.
+// The trilinear scalar along a straight line inside one cell of eight voxels: a cubic, and the points where
+// it takes a given value.
 #pragma once
 #include <array>
 #include <glm/vec3.hpp>
@@ -14,6 +14,8 @@ class CellScalar {
  public:
   /// `corners` x fastest; points in the cell's own coordinates, [0,1]^3.
   CellScalar(const std::array<double, 8>& corners, const glm::dvec3& begin, const glm::dvec3& end);
+  /// One value along the whole line.
+  explicit CellScalar(double constant) { b_.fill(constant); }
 
   double operator()(double u) const;
   const std::array<double, 4>& coefficients() const { return b_; }

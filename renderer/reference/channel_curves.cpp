@@ -109,7 +109,8 @@ std::size_t ChannelCurves::pieceAt(double position) const {
 
 ChannelSample ChannelCurves::sample(std::size_t piece, double position) const {
   const Piece& p = pieces_[piece];
-  const double w = p.end > p.begin ? std::clamp((position - p.begin) / (p.end - p.begin), 0.0, 1.0) : 0.0;
+  const bool slopes = p.end > p.begin && lo_ != hi_;  // an empty range has the positions 0 and 1 only
+  const double w = slopes ? std::clamp((position - p.begin) / (p.end - p.begin), 0.0, 1.0) : 0.0;
   return {std::lerp(p.extinctionBegin, p.extinctionEnd, w), p.colorBegin + (p.colorEnd - p.colorBegin) * w};
 }
 

@@ -3,10 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <optional>
 
 namespace scolopax::reference {
 namespace {
+
+// Voxels; where a ray meets an edge of voxels, rounding may make it pass by the side of one through which it
+// does not go.
+constexpr double kLeastOfVoxel = 1e-9;
 
 /// Follows one scalar along a ray, and notes where it crosses a value.
 class Side {
@@ -15,7 +20,7 @@ class Side {
 
   /// Adds the crossings in a part of the ray from t = begin to end. Between two points at which the scalar
   /// has the value it is on one side, which its middle tells.
-  void follow(const CellScalar& scalar, double begin, double end, std::vector<Crossing>& crossings) {
+  void follow(const ScalarAlong& scalar, double begin, double end, std::vector<Crossing>& crossings) {
     ends_ = {0, 1};
     scalar.appendCrossings(surface_.value, ends_);
     std::sort(ends_.begin(), ends_.end());
@@ -42,19 +47,21 @@ class Side {
 std::vector<Crossing> crossingsOf(const RayCells& ray, const glm::ivec3& dims, const Clipping& clipping,
                                   std::span<const ActiveChannel> channels) {
   std::vector<Crossing> crossings;
+  const double least = kLeastOfVoxel / glm::length(ray.direction);
   for (const ActiveChannel& channel : channels) {
     std::vector<Side> sides;
     for (const Surface& surface : channel.surfaces) sides.emplace_back(channel, surface);
     if (sides.empty()) continue;
+    const bool nearest = channel.field.interpolation() == Interpolation::nearest;
     for (std::size_t i = 0; i + 1 < ray.cuts.size(); ++i) {
       const double begin = ray.cuts[i], end = ray.cuts[i + 1];
-      if (!(begin < end)) continue;
+      if (!(begin < end) || (nearest && end - begin < least)) continue;
       const CellOnRay part(ray, begin, end, dims);
       const bool kept = clipping.keeps(channel.number, part.middle);
-      const auto corners = kept ? channel.field.corners(glm::ivec3(part.cell)) : std::nullopt;
+      const auto scalar = kept ? scalarAlong(channel.field, part) : std::nullopt;
       for (Side& side : sides) {
-        if (corners)
-          side.follow(CellScalar(*corners, part.begin, part.end), begin, end, crossings);
+        if (scalar)
+          side.follow(*scalar, begin, end, crossings);
         else
           side.lose();
       }

@@ -5,43 +5,51 @@
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
-#include <glm/geometric.hpp>
 
 #include "renderer/reference/cell_scalar.h"
 
 namespace scolopax::reference {
 namespace {
 
-/// The scalar from `begin` to `end`, inside the outer voxel centres; none if a voxel is not finite.
-std::optional<Bernstein> scalarAlong(const ScalarField& field, const glm::dvec3& begin,
-                                     const glm::dvec3& end) {
-  const glm::dvec3 last = glm::max(glm::dvec3(field.dims()) - 2.0, 0.0);
-  const glm::dvec3 cell = glm::min(glm::floor(0.5 * (begin + end)), last);
-  const auto corners = field.corners(glm::ivec3(cell));
+/// A line and the cell that holds it.
+struct LineInCell {
+  glm::ivec3 cell;
+  glm::dvec3 begin, end;  // in the cell's coordinates; in the outer half voxels, clamped to the outer centres
+  LineInCell(const ScalarField& field, const glm::dvec3& from, const glm::dvec3& to)
+      : cell(field.cellAt(0.5 * (from + to))), begin(inside(from)), end(inside(to)) {}
+  glm::dvec3 inside(const glm::dvec3& point) const {
+    return glm::clamp(point - glm::dvec3(cell), glm::dvec3(0), glm::dvec3(1));
+  }
+};
+
+/// The trilinear scalar from `begin` to `end`, inside the outer voxel centres; none if a voxel is not finite.
+std::optional<Bernstein> trilinearAlong(const ScalarField& field, const glm::dvec3& begin,
+                                        const glm::dvec3& end) {
+  const LineInCell line(field, begin, end);
+  const auto corners = field.corners(line.cell);
   if (!corners) return std::nullopt;
-  const auto inside = [&](const glm::dvec3& p) { return glm::clamp(p - cell, glm::dvec3(0), glm::dvec3(1)); };
-  return Bernstein(CellScalar(*corners, inside(begin), inside(end)).coefficients());
+  return Bernstein(CellScalar(*corners, line.begin, line.end).coefficients());
 }
 
-}  // namespace
-
-std::vector<glm::dvec3> BernsteinVector::controlPoints() const {
-  const Bernstein zero = (x + y + z) * 0.0;  // of the highest of their degrees
-  const Bernstein a = x + zero, b = y + zero, c = z + zero;
-  std::vector<glm::dvec3> points;
-  for (std::size_t k = 0; k <= zero.degree(); ++k)
-    points.emplace_back(a.coefficients()[k], b.coefficients()[k], c.coefficients()[k]);
-  return points;
+/// The vector (x, y, z), transformed.
+BernsteinVector product(const glm::dmat3& m, const BernsteinVector& v) {
+  const auto component = [&](int i) { return v.x * m[0][i] + v.y * m[1][i] + v.z * m[2][i]; };
+  return {component(0), component(1), component(2)};
 }
 
-double BernsteinVector::longest() const {
-  double most = 0;
-  for (const glm::dvec3& p : controlPoints()) most = std::max(most, glm::length(p));
-  return most;
+/// Of cubic interpolation.
+std::optional<GradientAlong> derivativesAlong(const ScalarField& field, const glm::dvec3& begin,
+                                              const glm::dvec3& end, const glm::dmat3& worldFromGradient) {
+  const LineInCell line(field, begin, end);
+  const auto spline = field.spline(line.cell);
+  if (!spline) return std::nullopt;
+  return GradientAlong{product(worldFromGradient, spline->gradientAlong(line.begin, line.end)),
+                       Bernstein(std::array{1.0})};
 }
 
-std::optional<GradientAlong> gradientAlong(const ScalarField& field, const glm::dvec3& begin,
-                                           const glm::dvec3& end, const glm::dmat3& worldFromGradient) {
+/// By central differences of trilinear interpolation.
+std::optional<GradientAlong> differencesAlong(const ScalarField& field, const glm::dvec3& begin,
+                                              const glm::dvec3& end, const glm::dmat3& worldFromGradient) {
   const glm::dvec3 last(field.dims() - 1);
   std::array<Bernstein, 3> change, distance;
   for (int axis = 0; axis < 3; ++axis) {
@@ -53,8 +61,8 @@ std::optional<GradientAlong> gradientAlong(const ScalarField& field, const glm::
       p[axis] = std::clamp(p[axis] + by, 0.0, last[axis]);
       return p;
     };
-    const auto after = scalarAlong(field, stepped(begin, 1), stepped(end, 1));
-    const auto before = scalarAlong(field, stepped(begin, -1), stepped(end, -1));
+    const auto after = trilinearAlong(field, stepped(begin, 1), stepped(end, 1));
+    const auto before = trilinearAlong(field, stepped(begin, -1), stepped(end, -1));
     if (!after || !before) return std::nullopt;
     change[a] = *after - *before;
     const double first = stepped(begin, 1)[axis] - stepped(begin, -1)[axis];
@@ -64,12 +72,18 @@ std::optional<GradientAlong> gradientAlong(const ScalarField& field, const glm::
     else
       distance[a] = Bernstein(std::array{first, second});
   }
-  const Bernstein x = change[0] * distance[1] * distance[2], y = change[1] * distance[2] * distance[0],
-                  z = change[2] * distance[0] * distance[1];
-  const auto component = [&](int i) {
-    return x * worldFromGradient[0][i] + y * worldFromGradient[1][i] + z * worldFromGradient[2][i];
-  };
-  return GradientAlong{{component(0), component(1), component(2)}, distance[0] * distance[1] * distance[2]};
+  const BernsteinVector scaled{change[0] * distance[1] * distance[2], change[1] * distance[2] * distance[0],
+                               change[2] * distance[0] * distance[1]};
+  return GradientAlong{product(worldFromGradient, scaled), distance[0] * distance[1] * distance[2]};
+}
+
+}  // namespace
+
+std::optional<GradientAlong> gradientAlong(const ScalarField& field, const glm::dvec3& begin,
+                                           const glm::dvec3& end, const glm::dmat3& worldFromGradient) {
+  return field.interpolation() == Interpolation::cubic
+             ? derivativesAlong(field, begin, end, worldFromGradient)
+             : differencesAlong(field, begin, end, worldFromGradient);
 }
 
 }  // namespace scolopax::reference

@@ -6,32 +6,17 @@
 #include <glm/vec3.hpp>
 #include <optional>
 
-#include "renderer/reference/bernstein.h"
+#include "renderer/reference/bernstein_vector.h"
 #include "renderer/reference/scalar_field.h"
 
 namespace scolopax::reference {
 
-/// Three polynomials of u in [0,1].
-struct BernsteinVector {
-  Bernstein x, y, z;
-  Bernstein dot(const BernsteinVector& other) const { return x * other.x + y * other.y + z * other.z; }
-  Bernstein dot(const glm::dvec3& v) const { return x * v.x + y * v.y + z * v.z; }
-  BernsteinVector between(double begin, double end) const {
-    return {x.between(begin, end), y.between(begin, end), z.between(begin, end)};
-  }
-  glm::dvec3 operator()(double u) const { return {x(u), y(u), z(u)}; }
-  /// Bernstein coefficients, all components raised to the same degree. All values lie in their convex hull.
-  std::vector<glm::dvec3> controlPoints() const;
-  /// Upper bound of the length of any value.
-  double longest() const;
-};
-
-/// The gradient is `scaled` / `scale`. Inside the volume, `scaled` is a cubic and `scale` is 1. In the
-/// outermost cells, where central differences become one-sided, `scale` is a product of distances that change
-/// with u.
+/// The gradient is `scaled` / `scale`. For cubic interpolation, `scaled` is of degree 8 and `scale` is 1. For
+/// the others, `scaled` is a cubic and `scale` is 1 inside the volume; in the outermost cells, where central
+/// differences become one-sided, `scale` is a product of distances that change with u.
 struct GradientAlong {
-  BernsteinVector scaled;  ///< degree <= 5
-  Bernstein scale;         ///< > 0; degree <= 3
+  BernsteinVector scaled;  ///< degree <= 5, or 8
+  Bernstein scale;         ///< > 0; degree <= 3, or 0
 };
 
 /// The gradient from `begin` (u = 0) to `end` (u = 1), in voxel coordinates, both in one cell or in one outer

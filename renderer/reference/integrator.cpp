@@ -115,8 +115,9 @@ Integrator::Integrator(const Volume& volume, const Scene& scene, double toleranc
     const double radiance = lighting_.brightest(appearance.material, brightest);
     brightest_ = blend_ == BlendMode::mix ? brightest_ + std::max(1.0, appearance.weight) * radiance
                                           : std::max(brightest_, radiance);
-    channels_.push_back({int(n), ScalarField(volume.channels()[n], dims_), std::move(curves),
-                         appearance.weight, appearance.gamma != 1 || factor, appearance.material,
+    const bool bent = appearance.interpolation == Interpolation::cubic || appearance.gamma != 1 || factor;
+    channels_.push_back({int(n), ScalarField(volume.channels()[n], dims_, appearance.interpolation),
+                         std::move(curves), appearance.weight, bent, appearance.material,
                          std::abs(appearance.rangeHi - appearance.rangeLo), std::move(factor), surfaces});
   }
 }
@@ -139,18 +140,22 @@ RayResult Integrator::trace(const glm::dvec3& originWorld, const glm::dvec3& dir
   return {glm::dvec4(all.color, -std::expm1(-all.opticalDepth)), all.error};
 }
 
-/// Cuts a ray at the faces of cells and at clip and crop planes.
-RayCells Integrator::cutAtAll(const glm::dvec3& originVoxel, const glm::dvec3& directionWorld,
-                              double length) const {
-  RayCells cells = cutAtCells(originVoxel, voxelFromWorld_ * directionWorld, dims_, length);
+/// Cuts a ray where the scalars of the given channels have kinks or jumps, and at clip and crop planes.
+RayCells Integrator::cutAtAll(const glm::dvec3& originVoxel, const glm::dvec3& directionWorld, double length,
+                              Channels channels) const {
+  const bool nearest = std::any_of(channels.begin(), channels.end(), [](const ActiveChannel& channel) {
+    return channel.field.interpolation() == Interpolation::nearest;
+  });
+  RayCells cells = cutAtCells(originVoxel, voxelFromWorld_ * directionWorld, dims_, length,
+                              nearest ? CutAt::voxelCentresAndFaces : CutAt::voxelCentres);
   clipping_.cut(cells);
   return cells;
 }
 
 /// Integrates the given channels along a ray.
 Integrator::Path Integrator::follow(const Ray& ray, Channels channels) const {
-  RayCells cells =
-      cutAtAll(voxelFromWorld_ * ray.origin, ray.direction, std::numeric_limits<double>::infinity());
+  RayCells cells = cutAtAll(voxelFromWorld_ * ray.origin, ray.direction,
+                            std::numeric_limits<double>::infinity(), channels);
   const std::vector<Crossing> crossings = crossingsOf(cells, dims_, clipping_, channels);
   for (const Crossing& crossing : crossings) cells.cuts.push_back(crossing.t);
   std::sort(cells.cuts.begin(), cells.cuts.end());
@@ -269,7 +274,7 @@ Medium Integrator::mediumAt(const Ray& ray, Channels channels, const Stretch& st
 double Integrator::transmittance(const glm::dvec3& pointVoxel, bool onSurface, const glm::dvec3& direction,
                                  double distance, Channels channels) const {
   if (!(distance > 0)) return 1;
-  const RayCells cells = cutAtAll(pointVoxel, direction, distance);
+  const RayCells cells = cutAtAll(pointVoxel, direction, distance, channels);
   double passes = 1;
   for (const Crossing& crossing : crossingsOf(cells, dims_, clipping_, channels))
     if (!onSurface || crossing.t > cells.cuts.front() + kSamePlace * smallestSpacing_)

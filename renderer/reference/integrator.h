@@ -32,10 +32,11 @@ struct RayResult {
 /// channel. Mix: the largest extinction, and sum w_n sigma_n L_n divided by it. Composite: every channel
 /// alone, colours added, transmittances multiplied.
 ///
-/// The ray is cut at every plane through voxel centres. Inside each cell, where a channel's scalar is a cubic
-/// of t, it is cut where the scalar takes a value at which the channel's curves have a knot, where opacity by
-/// the gradient has a kink or a jump (FactorAlong), and, in max and mix, where the largest extinction passes
-/// from one channel to another. Without light, no feature is narrower than the resulting pieces, and each is
+/// The ray is cut at every plane through voxel centres, and where the interpolation of a channel is nearest
+/// also at the faces of voxels. In between, where a channel's scalar is a polynomial of t (ScalarAlong), it
+/// is cut where the scalar takes a value at which the channel's curves have a knot, where opacity by the
+/// gradient has a kink or a jump (FactorAlong), and, in max and mix, where the largest extinction passes from
+/// one channel to another. Without light, no feature is narrower than the resulting pieces, and each is
 /// bisected until two Gauss rules agree.
 ///
 /// Where a ray crosses a surface, it loses the share of its light that is the surface's opacity, in every
@@ -70,7 +71,8 @@ class Integrator {
   Path follow(const Ray& ray, Channels channels) const;
   void meet(const Ray& ray, const RayCells& cells, const Crossing& crossing, Channels channels,
             Path& path) const;
-  RayCells cutAtAll(const glm::dvec3& originVoxel, const glm::dvec3& directionWorld, double length) const;
+  RayCells cutAtAll(const glm::dvec3& originVoxel, const glm::dvec3& directionWorld, double length,
+                    Channels channels) const;
   using Rule = PieceEstimate(const MediumAt&, double length);
   void integrate(Rule& rule, const MediumAt& mediumAt, double stretchLength, double begin, double end,
                  Path& path) const;

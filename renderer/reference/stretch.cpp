@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/common.hpp>
 #include <utility>
 
 namespace scolopax::reference {
@@ -84,22 +83,6 @@ void appendHandovers(const Stretch& stretch, double begin, double end, std::vect
 
 }  // namespace
 
-CellOnRay::CellOnRay(const RayCells& ray, double from, double to, const glm::ivec3& dims) {
-  middle = ray.origin + 0.5 * (from + to) * ray.direction;
-  cell = glm::clamp(glm::floor(middle), glm::dvec3(0), glm::max(glm::dvec3(dims) - 2.0, 0.0));
-  // In the outer half voxels coordinates are exactly 0 or 1, also at the cuts. So what is equal is equal to
-  // the last bit, and max can tell which of two channels comes first.
-  const glm::dvec3 between = middle - cell;
-  const auto inCell = [&](double t) {
-    glm::dvec3 p = glm::clamp(ray.origin + t * ray.direction - cell, glm::dvec3(0), glm::dvec3(1));
-    for (int axis = 0; axis < 3; ++axis)
-      if (between[axis] <= 0 || between[axis] >= 1) p[axis] = between[axis] <= 0 ? 0 : 1;
-    return p;
-  };
-  begin = inCell(from);
-  end = inCell(to);
-}
-
 void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, const Clipping& clipping, BlendMode blend,
                        std::span<const ActiveChannel> channels,
                        const std::function<bool(const Stretch&, double begin, double end)>& visit) {
@@ -118,9 +101,9 @@ void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, const Clippi
     knots = {0, 1};
     for (const ActiveChannel& channel : channels) {
       if (!clipping.keeps(channel.number, part.middle)) continue;
-      const auto corners = channel.field.corners(glm::ivec3(part.cell));
-      if (!corners) continue;
-      ChannelInCell here{&channel, CellScalar(*corners, part.begin, part.end)};
+      const auto scalar = scalarAlong(channel.field, part);
+      if (!scalar) continue;
+      ChannelInCell here{&channel, *scalar};
       if (channel.factor) {
         if (!channel.curves.visibleBetween(here.scalar.lower(), here.scalar.upper())) continue;
         here.factor = channel.factor->along(channel.field, stretch.begin, stretch.end);

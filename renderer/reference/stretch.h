@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "renderer/data/scene.h"
-#include "renderer/reference/cell_scalar.h"
 #include "renderer/reference/channel_curves.h"
 #include "renderer/reference/clipping.h"
 #include "renderer/reference/gradient_factor.h"
 #include "renderer/reference/ray_cells.h"
+#include "renderer/reference/scalar_along.h"
 #include "renderer/reference/scalar_field.h"
 #include "renderer/reference/surfaces.h"
 
@@ -25,7 +25,7 @@ struct ActiveChannel {
   ScalarField field;
   ChannelCurves curves;
   double weight;  ///< in blend mode mix
-  bool bent;      ///< by gamma or a factor: extinction along a ray is no piecewise cubic
+  bool bent;      ///< by cubic interpolation, gamma or a factor: extinction along a ray is no piecewise cubic
   Material material;
   double range;                            ///< |hi - lo|, data units
   std::optional<GradientFactor> factor{};  ///< of the opacity
@@ -35,7 +35,7 @@ struct ActiveChannel {
 /// A channel along a stretch, and the piece of its curves that applies.
 struct ChannelInCell {
   const ActiveChannel* channel;
-  CellScalar scalar;
+  ScalarAlong scalar;
   std::optional<FactorAlong> factor{};
   std::size_t piece = 0;
   ChannelSample at(double u) const {
@@ -45,16 +45,7 @@ struct ChannelInCell {
   }
 };
 
-/// The part of a ray between two neighbouring cuts, and the cell of eight voxels in which it lies. In the
-/// outer half voxels, where values are clamped to the edge, that is the outermost cell.
-struct CellOnRay {
-  CellOnRay(const RayCells& ray, double begin, double end, const glm::ivec3& dims);
-  glm::dvec3 middle;      ///< voxel coordinates
-  glm::dvec3 cell;        ///< its first voxel
-  glm::dvec3 begin, end;  ///< in the cell's coordinates, [0,1]^3
-};
-
-/// One cell's stretch of a ray, u in [0,1].
+/// The stretch of a ray between two neighbouring cuts, inside one cell, u in [0,1].
 struct Stretch {
   double start = 0;                     ///< t of u = 0
   double length = 0;                    ///< world units
@@ -68,7 +59,8 @@ inline constexpr double kEqualExtinction = 1e-12;
 
 /// Calls visit(stretch, begin, end) front to back for every part [begin, end] of u in which extinction and
 /// colour of all channels are smooth and, in max and mix, one and the same channel has the largest
-/// extinction; stops when visit returns false. `ray` must already be cut at the planes of `clipping`.
+/// extinction; stops when visit returns false. `ray` must already be cut at the planes of `clipping`, and for
+/// nearest at the faces of voxels.
 void forEachSmoothPart(const RayCells& ray, const glm::ivec3& dims, const Clipping& clipping, BlendMode blend,
                        std::span<const ActiveChannel> channels,
                        const std::function<bool(const Stretch&, double begin, double end)>& visit);

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "renderer/data/volume.h"
-#include "renderer/kernel/sample_volume.h"
+#include "renderer/kernel/filters.h"
 #include "tests/support/sample_lanes.h"
 
 namespace {
@@ -125,9 +125,9 @@ void measure(const char* type, ScalarType scalar, int channels, bool json) {
     for (std::size_t i = 0; i < kVoxels; ++i) voxels[i] = T(random() & 255);
     for (std::size_t i = 0; i < kVoxels; ++i) mixed[i * std::size_t(channels) + std::size_t(n)] = voxels[i];
     kernel::ChannelView view{};
-    view.voxels = plane.data();
-    view.type = scalar;
-    view.stride = 1;
+    view.field.voxels = plane.data();
+    view.field.type = scalar;
+    view.field.stride = 1;
     views.push_back(view);
   }
   for (int z = 0; z < kSide; ++z)
@@ -156,7 +156,7 @@ void measure(const char* type, ScalarType scalar, int channels, bool json) {
     const double planar = nsPerPoint(lines, perPoint([&](glm::vec3 p) {
                                        float sum = 0;
                                        for (const auto& view : views)
-                                         sum += kernel::sampleStored(view, dims, p);
+                                         sum += kernel::sampleStored<kernel::One>(view.field, dims, p);
                                        return sum;
                                      }));
     const double together = nsPerPoint(lines, [&](const Line& line, int k) {
@@ -179,10 +179,11 @@ void measure(const char* type, ScalarType scalar, int channels, bool json) {
         channels == 1 ? nsPerPoint(lines, perPoint([&](glm::vec3 p) { return bricked(bricks.data(), p); }))
                       : 0;
     int turn = 0;
-    const double one = nsPerPoint(lines, perPoint([&](glm::vec3 p) {
-                                    turn = (turn + 1) % channels;
-                                    return kernel::sampleStored(views[std::size_t(turn)], dims, p);
-                                  }));
+    const double one =
+        nsPerPoint(lines, perPoint([&](glm::vec3 p) {
+                     turn = (turn + 1) % channels;
+                     return kernel::sampleStored<kernel::One>(views[std::size_t(turn)].field, dims, p);
+                   }));
     const double oneInterleaved =
         nsPerPoint(lines, perPoint([&](glm::vec3 p) {
                      turn = (turn + 1) % channels;

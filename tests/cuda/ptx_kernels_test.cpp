@@ -14,8 +14,8 @@ using namespace test;
 
 TEST(PtxKernels, AreOneForEveryMethodBlendModeAndLight) {
   // auto is one of the others, and hybrid is raymarch with another number in its view. Of each there is one
-  // for plain scenes.
-  EXPECT_EQ(ptx::kernelNames().size(), (std::size(kMethods) - 2) * std::size(kBlendModes) * 4 * 2);
+  // with light and one without, and another of both for plain scenes.
+  EXPECT_EQ(ptx::kernelNames().size(), (std::size(kMethods) - 2) * std::size(kBlendModes) * 2 * 2);
 }
 
 TEST(PtxKernels, AreCaughtReadingAndWritingWhereTheyMayNot) {

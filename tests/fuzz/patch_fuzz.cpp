@@ -35,7 +35,8 @@ void tryPatch(std::string_view sceneText, std::string_view patchText) try {
                                       .samplings = {{"independent", ""}},
                                       .colormaps = {{"gray", ""}},
                                       .lightTypes = {{"headlight", ""}},
-                                      .peaks = {{"off", ""}}};
+                                      .peaks = {{"off", ""}},
+                                      .interpolations = {{"trilinear", ""}}};
   const nlohmann::json scene = protocol::parseJson(sceneText);
   protocol::parseScene(scene, kLists);
   const nlohmann::json sparse = protocol::applyPatch(nlohmann::json::object(), scene, kChannels);

@@ -55,6 +55,7 @@ TEST(ParseScene, GivesAnEmptyChannelTheDefaultsOfTheDesign) {
   const Channel look = parsed(channel(json::object())).channels.at(0);
   EXPECT_TRUE(look.visible);
   EXPECT_EQ(look.gamma, 1);
+  EXPECT_EQ(look.interpolation, "trilinear");
   EXPECT_FALSE(look.name || look.range || look.color || look.colormap || look.density);
   ASSERT_EQ(look.opacity.size(), 2U);
   EXPECT_EQ(look.opacity[0].position, 0);
@@ -70,6 +71,7 @@ TEST(ParseScene, ReadsEveryField) {
                   "opacity": [[0, 0], [0.5, 0], [0.5, 1]], "gamma": 2, "density": 0, "weight": 0.5,
                   "gradientOpacity": {"range": [3, 0.5], "points": [[0.25, 1], [0.75, 0]]},
                   "isovalues": [{"value": -2, "opacity": 0.5, "color": "#00ff80"}], "peaks": "only",
+                  "interpolation": "nearest",
                   "material": {"ambient": 0, "diffuse": 1, "specular": 0.5, "shininess": 8}},
                  {"colormap": "fire"}, {"colormap": [[0, "#000000"], [1, "#ffffff"]]}],
     "clip": [{"point": [1, 2, 3], "normal": [0, 1, 0], "media": [2, 0]}],
@@ -98,6 +100,7 @@ TEST(ParseScene, ReadsEveryField) {
   EXPECT_EQ(scene.channels[0].isovalues[0].opacity, 0.5);
   EXPECT_EQ(scene.channels[0].isovalues[0].color, "#00ff80");
   EXPECT_EQ(scene.channels[0].peaks, "only");
+  EXPECT_EQ(scene.channels[0].interpolation, "nearest");
   EXPECT_EQ(scene.channels[0].gamma, 2);
   EXPECT_EQ(scene.channels[0].density, 0.0);
   EXPECT_EQ(std::get<std::string>(*scene.channels[1].colormap), "fire");
@@ -121,6 +124,7 @@ TEST(ParseScene, ReadsEveryField) {
        {"opacity", {{0, 0}, {1, 1}}},
        {"isovalues", json::array()},
        {"peaks", "off"},
+       {"interpolation", "trilinear"},
        {"gamma", 1},
        {"weight", 1},
        {"material", {{"ambient", 0.3}, {"diffuse", 0.7}, {"specular", 0.2}, {"shininess", 20}}}});
@@ -277,6 +281,7 @@ TEST(ParseScene, TakesOnlyTheNamesOfTheLists) {
   EXPECT_EQ(refusedAt({{"integrator", {{"method", ""}}}}), "/integrator/method");
   EXPECT_EQ(refusedAt({{"image", {{"filter", "gauss"}}}}), "/image/filter");
   EXPECT_EQ(channelRefusedAt({{"colormap", "jet"}}), "/channels/0/colormap");
+  EXPECT_EQ(channelRefusedAt({{"interpolation", "linear"}}), "/channels/0/interpolation");
   for (const EnumEntry& entry : server::rendererLists().colormaps) {
     EXPECT_EQ(channelRefusedAt({{"colormap", entry.name}}), "none") << entry.name;
   }

@@ -80,7 +80,7 @@ TEST(Schema, GivesEveryFieldADescriptionAndADefaultThatIsTaken) {
     EXPECT_TRUE(isTaken(path, field["default"]));
     ++fields;
   });
-  EXPECT_EQ(fields, 44);
+  EXPECT_EQ(fields, 45);
 }
 
 TEST(Schema, SaysOfAnObjectThatMayBeNullWhatItIsAndThatNullIsTheDefault) {

@@ -93,6 +93,19 @@ TEST(Pick, InterpolatesAndNamesTheNearestVoxelOfTheVolume) {
   EXPECT_EQ(picker.answers[0].found["values"], (json{1.25, 12.5}));
 }
 
+TEST(Pick, TellsValuesAsTheyAreInterpolatedInThePicture) {
+  Picker picker;
+  picker.session->patch({{"channels", {{{"interpolation", "nearest"}}, {{"interpolation", "cubic"}}}}}, {});
+  picker.workshop.control->found = {picker.at({1.25, 0, -0.5000001})};
+  picker.pick();
+  picker.workshop.step();
+  ASSERT_EQ(picker.answers.size(), 1u);
+  const json& values = picker.answers[0].found["values"];
+  EXPECT_EQ(values[0], 1.0);
+  // Ten times x + 4 y + 12 z. At the border, a sixth of the spline's weight is one voxel further inside.
+  EXPECT_NEAR(values[1].get<double>(), 10 * (1.25 + 4.0 / 6 + 12.0 / 6), 1e-4);
+}
+
 TEST(Pick, OfNothingIsNoHit) {
   Picker picker;
   picker.pick();

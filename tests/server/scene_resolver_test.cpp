@@ -63,7 +63,7 @@ TEST(SceneResolver, HandsTheRendererWhatTheSceneSays) {
   const json document = json::parse(R"({
     "channels": [
       {"range": [3, 7], "gamma": 2, "density": 5, "color": "#ff0080", "opacity": [[0, 0], [0.5, 1], [1, 0.25]]},
-      {"visible": false, "colormap": [[0, "#000000"], [1, "#ffffff"]]}],
+      {"visible": false, "colormap": [[0, "#000000"], [1, "#ffffff"]], "interpolation": "cubic"}],
     "camera": {"eye": [1, 2, 30], "target": [0, 1, 0], "up": [0, 1, 0], "orthoHeight": 4},
     "integrator": {"method": "sync-dda", "macrocell": 8, "seed": 9},
     "image": {"width": 40, "height": 30, "background": "#ffffff", "filter": "point"},
@@ -74,6 +74,7 @@ TEST(SceneResolver, HandsTheRendererWhatTheSceneSays) {
   const ChannelAppearance& first = render.channels[0];
   EXPECT_EQ(first.rangeLo, 3);
   EXPECT_EQ(first.rangeHi, 7);
+  EXPECT_EQ(first.interpolation, Interpolation::trilinear);
   EXPECT_EQ(first.gamma, 2);
   EXPECT_EQ(first.density, 5);
   ASSERT_EQ(first.opacity.size(), 3u);
@@ -85,6 +86,7 @@ TEST(SceneResolver, HandsTheRendererWhatTheSceneSays) {
   EXPECT_NEAR(first.color[0].color.b, 0.215861, 1e-5);  // IEC 61966-2-1 of 128/255
   EXPECT_FALSE(render.channels[1].visible);
   EXPECT_EQ(render.channels[1].color.size(), 2u);
+  EXPECT_EQ(render.channels[1].interpolation, Interpolation::cubic);
   EXPECT_EQ(render.camera.eye, glm::dvec3(1, 2, 30));
   EXPECT_EQ(render.camera.orthoHeight, 4);
   EXPECT_EQ(render.method, Method::syncDda);

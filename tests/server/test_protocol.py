@@ -101,7 +101,8 @@ class Description(unittest.TestCase):
         parts = call_json(server, "GET", "/api/v1/schema.json")[1]["$defs"]
         for list_name, part, field in (("methods", "Integrator", "method"), ("blendModes", "Blend", "mode"),
                                        ("filters", "ImageSettings", "filter"),
-                                       ("samplings", "Integrator", "sampling")):
+                                       ("samplings", "Integrator", "sampling"),
+                                       ("interpolations", "Channel", "interpolation")):
             self.assertEqual([entry["name"] for entry in told[list_name]], parts[part]["properties"][field]["enum"])
             self.assertTrue(all(entry["doc"] for entry in told[list_name]))
         self.assertEqual({entry["name"]: entry["points"] for entry in told["colormaps"]}["gray"][-1], [1, "#ffffff"])

@@ -23,10 +23,12 @@ struct LightConfiguration {
 inline constexpr LightConfiguration kLightConfigurations[] = {
     {"unlit", false, false}, {"shading", true, false}, {"shadows", false, true}, {"both", true, true}};
 
-enum class TestScene { figure3, orbitals, noise, lumps, tcga, stroke };
+enum class TestScene { figure3, orbitals, noise, lumps, tcga, stroke, filters };
 inline constexpr TestScene kTestScenes[] = {TestScene::figure3, TestScene::orbitals, TestScene::noise,
-                                            TestScene::lumps,   TestScene::tcga,     TestScene::stroke};
-inline constexpr const char* kTestSceneNames[] = {"Figure3", "Orbitals", "Noise", "Lumps", "Tcga", "Stroke"};
+                                            TestScene::lumps,   TestScene::tcga,     TestScene::stroke,
+                                            TestScene::filters};
+inline constexpr const char* kTestSceneNames[] = {"Figure3", "Orbitals", "Noise",  "Lumps",
+                                                  "Tcga",    "Stroke",   "Filters"};
 
 struct Setting {
   int scene, blend, light;  ///< indices into the three lists
@@ -150,7 +152,7 @@ inline std::optional<VolumeAndScene> testScene(TestScene which) {
       made->scene.channels[i].rangeHi = made->volume->channels()[i].histogram.maximum * 0.3;
       made->scene.channels[i].density = 0.12 + 0.02 * double(i);  // no two differ by rounding only
     }
-  } else if (which == TestScene::noise) {
+  } else if (which == TestScene::noise || which == TestScene::filters) {
     const glm::ivec3 dims(8, 7, 6);
     std::uint32_t state = 9;
     const auto noise = [&](int, int, int) { return (state = state * 1664525u + 1013904223u) >> 24; };
@@ -167,6 +169,11 @@ inline std::optional<VolumeAndScene> testScene(TestScene which) {
     made->scene.channels[1].rangeLo = 280;  // reversed
     made->scene.channels[1].rangeHi = -100;
     made->scene.channels[2].gamma = 2.2;
+    if (which == TestScene::filters) {
+      made->scene.channels[0].interpolation = Interpolation::cubic;
+      made->scene.channels[1].interpolation = Interpolation::nearest;
+      made->scene.width = made->scene.height = 8;  // the spline takes long
+    }
   } else if (which == TestScene::lumps) {
     // Different types on an anisotropic grid.
     const glm::ivec3 dims(12, 14, 9);

@@ -18,12 +18,17 @@ inline constexpr float kFewCollisions = 2.0f;
 enum class CellOutcome { nothing, hit, exhausted, stuck };
 
 /// A voxel cell, which lies between eight voxels: the one that a ray passes through after a point. `way` is
-/// how far the ray goes in it, in world units. Outer cells extend to the faces of the box.
+/// how far the ray goes in it, in world units. Outer cells extend to the faces of the box. With fields of
+/// which the nearest voxel counts, it is the part of the cell that is nearest to one of the eight.
 struct VoxelCell {
   glm::ivec3 low;
   float way;
+  glm::vec3 begin, end;  ///< first and last points, in voxel coordinates
+  glm::ivec3 nearest;    ///< the nearest voxel; only with such fields
 
-  SCOLOPAX_HD VoxelCell(const Ray& ray, glm::ivec3 dims, glm::vec3 point) : low(0), way(kInfinity) {
+  SCOLOPAX_HD VoxelCell(const SceneView& scene, const Ray& ray, glm::vec3 point)
+      : low(0), way(kInfinity), nearest(0) {
+    const glm::ivec3 dims = scene.dims;
     for (int axis = 0; axis < 3; ++axis) {
       const int last = dims[axis] > 1 ? dims[axis] - 2 : 0;
       const float direction = ray.direction[axis];
@@ -31,6 +36,10 @@ struct VoxelCell {
       int whole = int(inside);
       if (direction < 0.0f && float(whole) == inside) --whole;
       low[axis] = clampInt(whole, 0, last);
+      begin[axis] = low[axis] == 0 ? -0.5f : float(low[axis]);
+      end[axis] = low[axis] + 2 >= dims[axis] ? float(dims[axis]) - 0.5f : float(low[axis] + 1);
+      if (scene.hasNearest() && dims[axis] > 1) [[unlikely]]
+        if (takeHalf(axis, direction, inside, point[axis])) continue;
       if (direction == 0.0f || low[axis] == (direction > 0.0f ? last : 0)) continue;
       const int plane = direction > 0.0f ? low[axis] + 1 : low[axis];
       way = minimum(way, (float(plane) - point[axis]) / direction);
@@ -38,30 +47,74 @@ struct VoxelCell {
   }
   /// The point, moved into the cell if rounding has put it outside, because the cell's bounds hold only
   /// there.
-  SCOLOPAX_HD glm::vec3 inside(glm::ivec3 dims, glm::vec3 point) const {
-    for (int axis = 0; axis < 3; ++axis)
-      point[axis] = clamp(point[axis], low[axis] == 0 ? -0.5f : float(low[axis]),
-                          low[axis] + 2 >= dims[axis] ? float(dims[axis]) - 0.5f : float(low[axis] + 1));
+  SCOLOPAX_HD glm::vec3 inside(glm::vec3 point) const {
+    for (int axis = 0; axis < 3; ++axis) point[axis] = clamp(point[axis], begin[axis], end[axis]);
     return point;
+  }
+  /// Place of a point in the cell: 0 at the lower voxel, 1 at the upper one, if there is one.
+  SCOLOPAX_HD glm::vec3 placeOf(glm::ivec3 dims, glm::vec3 point) const {
+    for (int axis = 0; axis < 3; ++axis)
+      point[axis] = clamp(point[axis] - float(low[axis]), 0.0f, dims[axis] > 1 ? 1.0f : 0.0f);
+    return point;
+  }
+
+ private:
+  /// Takes the half of the cell in which the ray is, along an axis. Returns whether it leaves that half
+  /// between the two voxels.
+  SCOLOPAX_HD bool takeHalf(int axis, float direction, float inside, float at) {
+    const float middle = float(low[axis]) + 0.5f;
+    const bool upper = direction < 0.0f ? inside > middle : inside >= middle;
+    nearest[axis] = low[axis] + int(upper);
+    if (upper)
+      begin[axis] = middle;
+    else
+      end[axis] = floatOf(bitsOf(middle) - 1);  // in the middle, the upper voxel is the nearest
+    if (direction == 0.0f || upper == (direction > 0.0f)) return false;
+    way = minimum(way, (middle - at) / direction);
+    return true;
   }
 };
 
-/// Stored values of one channel in a voxel cell: at a point, and the smallest and largest at the corners.
+/// Stored values of a field in a voxel cell: at a point, and the smallest and largest of the voxels that
+/// samples in the cell depend on. The value is not finite if one of these is not.
 struct CellValues {
   float value, lo, hi;
 };
-SCOLOPAX_HD inline CellValues valuesIn(const ChannelView& channel, glm::ivec3 dims, const VoxelCell& cell,
+/// valuesIn() for filters other than trilinear.
+SCOLOPAX_RARE inline void findFilteredValues(const FieldView& field, glm::ivec3 dims, const VoxelCell& cell,
+                                             const glm::vec3& point, CellValues* values) {
+  if (field.filter == Filter::nearest) {
+    sampleFiltered(field, dims, glm::vec3(cell.nearest), &values->value);
+    values->lo = values->hi = values->value;
+    return;
+  }
+  const SplineAxes axes(field, dims, cell.low, cell.placeOf(dims, point));
+  values->value = splineValue(field, axes);
+  values->lo = kInfinity, values->hi = -kInfinity;
+  axes.visitRows(field, [&](int, int, auto&& of) {
+    for (int i = 0; i < 4; ++i) {
+      values->lo = minimum(values->lo, of(i));
+      values->hi = maximum(values->hi, of(i));
+    }
+  });
+}
+SCOLOPAX_HD inline CellValues valuesIn(const FieldView& field, glm::ivec3 dims, const VoxelCell& cell,
                                        glm::vec3 point) {
+  if (!field.has(Filter::trilinear)) [[unlikely]] {
+    CellValues values;
+    findFilteredValues(field, dims, cell, point, &values);
+    return values;
+  }
+  const glm::vec3 place = cell.placeOf(dims, point);
   const auto axisOf = [&](int axis, std::size_t stride) {
     const int low = cell.low[axis], high = low + 1 < dims[axis] ? low + 1 : low;
-    return AxisWeight{std::size_t(low) * stride, std::size_t(high) * stride,
-                      clamp(point[axis] - float(low), 0.0f, float(high - low))};
+    return AxisWeight{std::size_t(low) * stride, std::size_t(high) * stride, place[axis]};
   };
-  const auto stride = std::size_t(channel.stride);
+  const auto stride = std::size_t(field.stride);
   const AxisWeight x = axisOf(0, stride), y = axisOf(1, stride * std::size_t(dims.x)),
                    z = axisOf(2, stride * std::size_t(dims.x) * std::size_t(dims.y));
-  return visitScalarType(channel.type, [&](auto zero) {
-    const auto* v = static_cast<const decltype(zero)*>(channel.voxels) + channel.lane;
+  return visitScalarType(field.type, [&](auto zero) {
+    const auto* v = static_cast<const decltype(zero)*>(field.voxels) + field.lane;
     CellValues values{trilinear(v, x, y, z), kInfinity, -kInfinity};
     for (const std::size_t k : {z.low, z.high})
       for (const std::size_t j : {y.low, y.high})
@@ -79,32 +132,33 @@ struct CellGradient {
   float magnitude, change, slack;  ///< slack: what rounding may add
   bool finite;                     ///< the gradient is finite in the cell
 };
-/// Inside a cell, each difference is an average of slopes between neighbouring voxels along its axis. So a
-/// step of one voxel along any axis changes it by at most the spread of those slopes.
-SCOLOPAX_RARE inline CellGradient gradientIn(const ChannelView& channel, glm::ivec3 dims, glm::ivec3 cell,
-                                             glm::vec3 point) {
-  const glm::mat3& fromVoxel = channel.factor.fromVoxel;
-  const std::size_t strides[] = {std::size_t(channel.stride),
-                                 std::size_t(channel.stride) * std::size_t(dims.x),
-                                 std::size_t(channel.stride) * std::size_t(dims.x) * std::size_t(dims.y)};
+/// Inside a cell, each component per voxel is an average of slopes between neighbouring voxels along its
+/// axis. So a step of one voxel along any axis changes it by at most the spread of those slopes.
+SCOLOPAX_RARE inline CellGradient gradientIn(const FieldView& field, glm::ivec3 dims,
+                                             const glm::mat3& fromVoxel, glm::ivec3 cell, glm::vec3 point) {
+  const std::size_t strides[] = {std::size_t(field.stride), std::size_t(field.stride) * std::size_t(dims.x),
+                                 std::size_t(field.stride) * std::size_t(dims.x) * std::size_t(dims.y)};
   glm::vec3 change(0.0f);
   float most = 0.0f;
   bool finite = true;
-  visitScalarType(channel.type, [&](auto zero) {
-    const auto* voxels = static_cast<const decltype(zero)*>(channel.voxels) + channel.lane;
+  const int around = field.has(Filter::cubic) ? 1 : 0, width = 2 + 2 * around;  // voxels across the cell
+  visitScalarType(field.type, [&](auto zero) {
+    const auto* voxels = static_cast<const decltype(zero)*>(field.voxels) + field.lane;
     for (int axis = 0; axis < 3; ++axis) {
       const int u = (axis + 1) % 3, v = (axis + 2) % 3, low = cell[axis];
       float least = kInfinity, largest = -kInfinity;
+      if (around > 0 && (low == 0 || low + 2 >= dims[axis]))
+        least = largest = 0.0f;  // voxels are repeated beyond the border
       for (int edge = low > 0 ? low - 1 : 0; edge <= low + 1 && edge + 1 < dims[axis]; ++edge)
-        for (int corner = 0; corner < 4; ++corner) {
-          const int j = cell[u] + (corner & 1), k = cell[v] + (corner >> 1);
-          if (j >= dims[u] || k >= dims[v]) continue;
+        for (int corner = 0; corner < width * width; ++corner) {
+          const int j = cell[u] - around + corner % width, k = cell[v] - around + corner / width;
+          if (j < 0 || k < 0 || j >= dims[u] || k >= dims[v]) continue;
           const auto* from = voxels + std::size_t(edge) * strides[axis] + std::size_t(j) * strides[u] +
                              std::size_t(k) * strides[v];
           const float a = float(from[0]), b = float(from[strides[axis]]);
           if (!isFinite(a) || !isFinite(b)) {
             // Beyond the last voxel, differences are one-sided and do not use the edge before the cell.
-            finite = finite && edge < low && low + 2 == dims[axis];
+            finite = finite && around == 0 && edge < low && low + 2 == dims[axis];
             continue;
           }
           least = minimum(least, b - a);
@@ -122,10 +176,11 @@ SCOLOPAX_RARE inline CellGradient gradientIn(const ChannelView& channel, glm::iv
     turned += glm::vec3(magnitude(column.x), magnitude(column.y), magnitude(column.z)) * change[axis];
     scale = maximum(scale, sumOfMagnitudes(column));
   }
-  const Gradient<One> here = gradientAt<One>(channel, dims, fromVoxel, point);
+  const Gradient<One> here = gradientAt<One>(field, dims, fromVoxel, point);
   CellGradient gradient{lengthOf<One>(here.perSpacing), lengthOf<One>(turned), 0.0f, finite};
   // Rounding of values, and of coordinates, which may be as large as the longest side.
-  gradient.slack = 3.0f * scale * most * 0x1p-19f + gradient.change * longest * 0x1p-22f;
+  gradient.slack =
+      3.0f * scale * most * (2.0f * roundingOf(field.filter)) + gradient.change * longest * 0x1p-22f;
   // If the cell is finite, this happens only on a face, where the gradient uses voxels outside the cell.
   if (!here.finite) gradient.magnitude = 0.0f, gradient.change = kLargestFinite;
   return gradient;
@@ -133,26 +188,27 @@ SCOLOPAX_RARE inline CellGradient gradientIn(const ChannelView& channel, glm::iv
 
 /// Bound of channel n's extinction over the next `*way` (world units) from `point`. Halves `*way` while the
 /// bound is loose and `*way` is above `least`. The slope of the scalar along the ray is bounded by the range
-/// of the corners.
+/// of the voxels.
 template <class View>
 SCOLOPAX_HD float boundAhead(const View& scene, int n, const Ray& ray, const VoxelCell& cell, glm::vec3 point,
                              float least, float* way, SampleCost* cost) {
   const ChannelView& channel = scene.channels[n];
-  ++cost->fetches;
-  const CellValues values = valuesIn(channel, scene.dims, cell, point);
+  cost->fetches += channel.field.cost();
+  const CellValues values = valuesIn(channel.field, scene.dims, cell, point);
   if (!isFinite(values.value)) return 0.0f;  // then no sample of this cell is finite
   const float slope = (values.hi - values.lo) * sumOfMagnitudes(ray.direction);
-  // By how much rounding may put a sample outside the corners' range; an end at 0 is exact.
-  const float slack =
-      values.lo < values.hi ? maximum(magnitude(values.lo), magnitude(values.hi)) * 0x1p-20f : 0.0f;
+  // By how much rounding may put a sample outside the voxels' range; an end at 0 is exact.
+  const float slack = values.lo < values.hi ? maximum(magnitude(values.lo), magnitude(values.hi)) *
+                                                  roundingOf(channel.field.filter)
+                                            : 0.0f;
   const float lo = values.lo == 0.0f ? 0.0f : values.lo - slack;
   const float hi = values.hi == 0.0f ? 0.0f : values.hi + slack;
   float here = extinctionAt(channel, curvePosition(channel, values.value));
   const GradientFactorView& factor = channel.factor;
   CellGradient gradient{};
   if (scene.hasFactor(n)) {
-    gradient = gradientIn(channel, scene.dims, cell.low, point);
-    cost->fetches += gradientFetches(scene.dims);
+    gradient = gradientIn(channel.field, scene.dims, factor.fromVoxel, cell.low, point);
+    cost->fetches += gradientFetches(channel.field, scene.dims);
     if (!gradient.finite) return 0.0f;
     gradient.change *= sumOfMagnitudes(ray.direction);
     here *= largestFactor(factor, gradient.magnitude, gradient.magnitude);
@@ -182,17 +238,17 @@ SCOLOPAX_HD CellOutcome trackCellClosely(const View& scene, const Ray& ray, cons
   while (past < end) {
     const float t = walk.enter() + past;
     const glm::vec3 point = walk.pointAt(t);
-    const VoxelCell cell(ray, scene.dims, point);
+    const VoxelCell cell(scene, ray, point);
     // Shorter stretches might make no progress because of rounding.
     const float least = maximum(t * 0x1p-21f, end * 0x1p-20f);
     way = minimum(maximum(minimum(4.0f * way, cell.way), least), end - past);
-    const float bound = boundOf(cell, cell.inside(scene.dims, point), least, &way);
+    const float bound = boundOf(cell, cell.inside(point), least, &way);
     const float total = bound * way;
     float passed = 0.0f;
     while (*depth < total - passed) {
       passed += *depth;
       const Place place{walk.enter(), past + passed / bound};
-      if (const auto found = test(bound, place, cell.inside(scene.dims, walk.pointAt(place.t())), *random)) {
+      if (const auto found = test(bound, place, cell.inside(walk.pointAt(place.t())), *random)) {
         *hit = found;
         return CellOutcome::hit;
       }

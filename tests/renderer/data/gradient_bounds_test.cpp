@@ -178,6 +178,7 @@ void searchForViolations(unsigned seed) {
         a.opacity = draw.chance(0.5) ? std::vector<OpacityKnot>{{0, 1}} : draw.curve();
         a.density = std::pow(10, draw.between(-2, 6));
         a.gamma = draw.chance(0.2) ? 1.7 : 1;
+        a.interpolation = Interpolation(std::max(0, draw.among(-1, 2)));
         if (n == 0 || draw.chance(0.5))
           a.gradientOpacity = draw.opacity(gradientMagnitudes(grid, volume->channels()[n]));
       }
@@ -282,13 +283,14 @@ TEST(GradientBounds, AreAfterAnySeriesOfEditsWhatAFreshPlanHas) {
   for (int edit = 0; edit < 120; ++edit) {
     const std::size_t n = std::size_t(draw.among(0, 2));
     ChannelAppearance& a = scene.channels[n];
-    const int kind = draw.among(0, 9);
+    const int kind = draw.among(0, 10);
     if (kind == 0) a.visible = !a.visible;
     if (kind == 1) a.opacity = draw.curve();
     if (kind == 2) scene.macrocell = draw.among(1, 5);
     if (kind == 3) scene.blend = scene.blend == BlendMode::density ? BlendMode::max : BlendMode::density;
     if (kind == 4) a.gradientOpacity.reset();
-    if (kind >= 5)
+    if (kind == 10) a.interpolation = Interpolation(draw.among(0, 2));
+    if (kind >= 5 && kind <= 9)
       a.gradientOpacity = draw.opacity(gradientMagnitudes(volume->grid(), volume->channels()[n]));
     edited = std::make_shared<const RenderPlan>(volume, scene, edited.get());
     const RenderPlan fresh(volume, scene);
@@ -306,7 +308,7 @@ TEST(GradientBounds, AreAfterAnySeriesOfEditsWhatAFreshPlanHas) {
       for (int i = 0; i < edited->view().channelCount; ++i)
         ASSERT_EQ(found.bound(cell, i), expected.bound(cell, i)) << "edit " << edit << " cell " << cell;
     }
-    changed += kind >= 5 && now != before;
+    changed += kind >= 5 && kind <= 9 && now != before;
     before = std::move(now);
   }
   EXPECT_GT(changed, 10);  // by edits of the factor only

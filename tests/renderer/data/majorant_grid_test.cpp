@@ -4,12 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <random>
 
+#include "renderer/data/bound_columns.h"
+#include "renderer/data/field_view.h"
 #include "renderer/kernel/classify.h"
-#include "renderer/kernel/sample_volume.h"
+#include "renderer/kernel/filters.h"
 #include "tests/support/volumes.h"
 
 namespace scolopax {
@@ -34,13 +37,20 @@ std::vector<OpacityKnot> randomCurve(std::mt19937& random) {
   return knots;
 }
 
-/// The bounds of a single channel.
+/// The bounds of a single channel whose values are in the last column.
 MajorantGrid majorantsOf(const std::shared_ptr<const MacrocellGrid>& cells,
                          const TransferFunction& transfer) {
-  return MajorantGrid(cells, {buildBounds(cells->levels[0], transfer, 0)}, true, false);
+  const int column = int(cells->levels.size()) - 1;
+  return MajorantGrid(cells, {buildBounds(cells->levels.back(), transfer, column)}, true, false);
 }
 std::shared_ptr<const MacrocellGrid> macrocellsOf(const Volume& volume, int size) {
   return std::make_shared<const MacrocellGrid>(buildMacrocells(volume, size));
+}
+
+/// The same where the samples are those of the cubic B-spline.
+std::shared_ptr<const MacrocellGrid> splineCellsOf(const Volume& volume, int size) {
+  const auto column = std::make_shared<const CellColumn>(buildSplineColumn(volume, 0, size));
+  return withColumns(macrocellsOf(volume, size), std::array{column});
 }
 
 /// Tests points that a tracker can fetch in a cell: corners, faces and the interior.
@@ -51,9 +61,11 @@ void expectBound(F&& value, glm::ivec3 dims, double rangeLo, double rangeHi, uns
   const auto volume = volumeOf(gridOf(dims), channelOf<T>(dims, value));
   const Channel& channel = volume->channels()[0];
   for (const int size : {1, 2, 3, 4, 7, 16}) {
-    const auto macrocells = macrocellsOf(*volume, size);
-    const MacrocellGrid& cells = *macrocells;
     for (int trial = 0; trial < 12; ++trial) {
+      const auto interpolation = Interpolation(trial / 3 % 3);
+      const auto macrocells =
+          interpolation == Interpolation::cubic ? splineCellsOf(*volume, size) : macrocellsOf(*volume, size);
+      const MacrocellGrid& cells = *macrocells;
       ChannelAppearance a;
       a.opacity = randomCurve(random);
       a.rangeLo = rangeLo;
@@ -64,6 +76,7 @@ void expectBound(F&& value, glm::ivec3 dims, double rangeLo, double rangeHi, uns
       const MajorantGrid majorants = majorantsOf(macrocells, transfer);
       const kernel::MajorantView bounds = majorants.view();
       const kernel::ChannelView view = transfer.view(channel);
+      const kernel::FieldView field = fieldView(channel, interpolation);
       for (int sample = 0; sample < 4000; ++sample) {
         const glm::ivec3 cell(int(uniform(random) * float(cells.cells.x)),
                               int(uniform(random) * float(cells.cells.y)),
@@ -76,7 +89,7 @@ void expectBound(F&& value, glm::ivec3 dims, double rangeLo, double rangeHi, uns
                                                           : uniform(random))) *
                     float(size);
         }
-        const float stored = kernel::sampleStored(view, dims, p);
+        const float stored = kernel::sampleStored<kernel::One>(field, dims, p);
         const float sigma =
             kernel::isFinite(stored) ? kernel::extinctionAt(view, kernel::curvePosition(view, stored)) : 0.0f;
         const std::size_t index = (std::size_t(cell.z) * std::size_t(cells.cells.y) + std::size_t(cell.y)) *

@@ -14,6 +14,7 @@
 #include "renderer/reference/render.h"
 #include "renderer/renderer.h"
 #include "tests/support/orbitals.h"
+#include "tests/support/statistics.h"
 
 namespace scolopax {
 namespace {
@@ -342,7 +343,9 @@ TEST(Automatic, KnowsItsErrorFromTheFirstSamplesOn) {
   const Image truth = reference::renderReference(*volume, scene, 1).image;
   EXPECT_NEAR(medianRatio(volume, scene, truth, 16), 1, 0.25);
   EXPECT_NEAR(medianRatio(volume, scene, truth, 64), 1, 0.2);
-  EXPECT_NEAR(medianRatio(volume, scene, truth, 512), 1, 0.2);
+  if (allCombinations()) {
+    EXPECT_NEAR(medianRatio(volume, scene, truth, 512), 1, 0.2);
+  }
 }
 
 TEST(Automatic, WithoutAnythingToSeeDrawsNothing) {

@@ -9,9 +9,10 @@
 #include <vector>
 
 #include "renderer/core/error.h"
+#include "renderer/data/field_view.h"
 #include "renderer/data/transfer_function.h"
 #include "renderer/kernel/classify.h"
-#include "renderer/kernel/sample_volume.h"
+#include "renderer/kernel/filters.h"
 #include "tests/support/volumes.h"
 
 namespace scolopax {
@@ -37,8 +38,8 @@ class Row {
     return row;
   }
   double sample(double x) const {
-    return double(kernel::sampleStored(transfer(0, 1).view(channel()), volume_->grid().dims,
-                                       glm::vec3(float(x), 0, 0)));
+    return double(
+        kernel::sampleTrilinear(fieldView(channel()), volume_->grid().dims, glm::vec3(float(x), 0, 0)));
   }
   double position(double x, double lo, double hi) const {
     const TransferFunction t = transfer(lo, hi);

@@ -56,13 +56,17 @@ TEST(Voxelwise, IsExactForOneChannelOfOneColor) {
   for (const TestScene which : kTestScenes) {
     const auto made = testScene(which);
     if (!made) continue;
-    for (std::size_t shown = 0; shown < made->scene.channels.size(); ++shown)
+    for (std::size_t shown = 0; shown < made->scene.channels.size(); ++shown) {
+      // The spline is no cubic: Filters.OfTheSplineConvergeInSmallSteps.
+      if (made->scene.channels[shown].interpolation == Interpolation::cubic) continue;
       for (const double factor : {1.0, 100.0}) {
         Scene scene = thin(made->scene, factor);
         for (std::size_t i = 0; i < scene.channels.size(); ++i) scene.channels[i].visible = i == shown;
-        // Rays end at a transmittance of 1e-4.
-        EXPECT_LT(largestError(made->volume, scene), 1.2e-4) << kTestSceneNames[int(which)] << ' ' << shown;
+        // Rays end at a transmittance of 1e-4. A gamma bends the curves, which Gauss's rule approximates.
+        const double slack = made->scene.channels[shown].gamma == 1 ? 1.2e-4 : 3e-4;
+        EXPECT_LT(largestError(made->volume, scene), slack) << kTestSceneNames[int(which)] << ' ' << shown;
       }
+    }
   }
 }
 

@@ -53,6 +53,7 @@ void expectBounds(double largest, unsigned seed, bool factors = false) {
     a.rangeLo = trial % 3 == 0 ? largest : 0;
     a.rangeHi = trial % 3 == 0 ? 0 : largest;
     a.gamma = trial % 7 == 0 ? 1.7 : 1;
+    a.interpolation = Interpolation(trial / 4 % 3);
     if (factors) {
       const double lo = gradientQuantile(*volume, 0, 0.5 * double(uniform(random))),
                    hi = gradientQuantile(*volume, 0, double(uniform(random)));
@@ -66,18 +67,17 @@ void expectBounds(double largest, unsigned seed, bool factors = false) {
               glm::vec3(uniform(random), uniform(random), uniform(random)) * 2.0f - 1.0f};
       if (random() % 3 == 0) ray.direction[int(random() % 3)] = 0;
       if (random() % 3 == 0) ray.origin = glm::vec3(glm::ivec3(ray.origin));  // on faces and edges
-      const VoxelCell cell(ray, dims, ray.origin);
+      const VoxelCell cell(plan.view(), ray, ray.origin);
       ASSERT_GT(cell.way, 0.0f);
       SampleCost cost;
       float way = std::min(cell.way, 4.0f);
       const float before = way;
-      const float bound =
-          boundAhead(plan.view(), 0, ray, cell, cell.inside(dims, ray.origin), 1e-6f, &way, &cost);
+      const float bound = boundAhead(plan.view(), 0, ray, cell, cell.inside(ray.origin), 1e-6f, &way, &cost);
       short_ += way < before;
       // If a voxel is not finite, points on a face of the cell may take their value from the cell beyond it.
       for (int k = holes ? 1 : 0; k <= (holes ? 63 : 64); ++k) {
         const float t = way * float(k) / 64.0f;
-        const glm::vec3 point = cell.inside(dims, ray.origin + t * ray.direction);
+        const glm::vec3 point = cell.inside(ray.origin + t * ray.direction);
         ASSERT_LE(classify(plan.view(), 0, point, &cost).extinction, bound) << trial << " " << i << " " << k;
       }
     }
@@ -111,7 +111,7 @@ TEST(CloseLook, NeedsNoShortStretchWhereNothingChanges) {
   const RenderPlan plan(volume, scene);
   for (const float x : {0.5f, 2.5f}) {
     const Ray ray{{x, 1, 1.25f}, {0, 0, 1}};
-    const VoxelCell cell(ray, dims, ray.origin);
+    const VoxelCell cell(plan.view(), ray, ray.origin);
     EXPECT_EQ(cell.way, 0.75f);
     SampleCost cost;
     float way = cell.way;

@@ -39,6 +39,7 @@ class Marcher {
           matter.values.push_back(channel.slope * double(voxel) + channel.intercept);
       });
       matter.findSurfaces(smallest_);
+      if (matter.look->interpolation == Interpolation::nearest) cutsPerVoxel_ = 2;
       matters_.push_back(std::move(matter));
     }
     lights_ = scene.lights;
@@ -145,7 +146,7 @@ class Marcher {
     double sum = 0;
     for (const Matter& m : matters) {
       Classified c;
-      c.value = m.at(p);
+      c.value = m.at(p, decisions);
       const bool isThere = std::isfinite(c.value) && isLeft(m.number, p);
       decisions->note(isThere);
       if (isThere) {
@@ -180,7 +181,7 @@ class Marcher {
     std::vector<Side> sides;
     for (const Matter& m : matters) {
       if (m.surfaces.empty()) continue;
-      const double value = m.at(p);
+      const double value = m.at(p, decisions);
       const bool isThere = std::isfinite(value) && isLeft(m.number, p);
       for (const Matter::Surface& surface : m.surfaces)
         sides.push_back(!isThere ? Side::neither : value >= surface.value ? Side::above : Side::below);
@@ -212,8 +213,7 @@ class Marcher {
       std::vector<Side> sides = sidesAt(p + t * direction, matters, &decisions);
       return PointSample{extinction, dvec3(0), decisions.hash(), std::move(sides)};
     };
-    const auto decisionsAt = [&](double t) { return sampleAt(t).decisions; };
-    SteppedMarch march(sampleAt, decisionsAt, surfaceAt,
+    SteppedMarch march(sampleAt, sampleAt, surfaceAt,
                        {stepOf(direction, 12), 1e-7, density_, 1, kMostShadowSamples});
     marchCells(p, direction, begin, end, march);
     *error = std::fmax(*error, march.error());
@@ -281,13 +281,14 @@ class Marcher {
   static double stepOf(const dvec3& way, int n) {
     return 1 / (n * (std::abs(way.x) + std::abs(way.y) + std::abs(way.z)));
   }
-  /// Marches between the planes of voxel centres, where the field has kinks.
+  /// Marches between the planes of voxel centres, where the field has kinks, and between the faces of voxels
+  /// if it may jump there.
   template <class March>
   void marchCells(const dvec3& origin, const dvec3& way, double begin, double end, March& march) const {
     std::vector<double> cuts{begin, end};
     for (int axis = 0; axis < 3; ++axis)
-      for (int k = 0; k < grid_.dims[axis] && way[axis] != 0; ++k) {
-        const double t = (k - origin[axis]) / way[axis];
+      for (int k = 0; k < cutsPerVoxel_ * grid_.dims[axis] && way[axis] != 0; ++k) {
+        const double t = (double(k) / cutsPerVoxel_ - origin[axis]) / way[axis];
         if (t > begin && t < end) cuts.push_back(t);
       }
     std::sort(cuts.begin(), cuts.end());
@@ -318,7 +319,7 @@ class Marcher {
       return result;
     };
     const auto sampleAt = [&](double t) { return sample(t, true); };
-    const auto decisionsAt = [&](double t) { return sample(t, false).decisions; };
+    const auto glanceAt = [&](double t) { return sample(t, false); };
     const int perVoxel = scene_.shadows ? 16 : lit ? 64 : 300;
     const StepRules rules{stepOf(way, perVoxel), lit ? 1e-6 : 1e-9, density_, radiance_,
                           scene_.shadows ? kMostLitSamples : kMostSamples};
@@ -332,7 +333,7 @@ class Marcher {
                       lightsAt(p, true, eye, matters, true, &shadowError), &decisions);
       return Stretch{1 - met->opacity, met->opacity * color};
     };
-    SteppedMarch march(sampleAt, decisionsAt, surfaceAt, rules);
+    SteppedMarch march(sampleAt, glanceAt, surfaceAt, rules);
     marchCells(origin, way, begin, end, march);
     const Stretch& result = march.result();
     return {glm::dvec4(result.light, 1 - result.transmittance),
@@ -348,6 +349,7 @@ class Marcher {
   Matters matters_;
   std::vector<Light> lights_;
   double density_ = 0, radiance_ = 0;
+  int cutsPerVoxel_ = 1;
 };
 
 }  // namespace

@@ -83,6 +83,82 @@ TEST(DirectMarch, FindsADipOfTheGradientFarNarrowerThanItsSteps) {
   EXPECT_LT(found.error, 1e-5);
 }
 
+// Every voxel is a slab of its own opacity. One that is not finite leaves a gap between its faces alone, at
+// which no surface is.
+TEST(DirectMarch, TakesTheNearestVoxel) {
+  const glm::ivec3 dims(1, 1, 5);
+  Drawing d = drawing(
+      channelOf<float>(dims,
+                       [](int, int, int z) { return z == 1 ? std::numeric_limits<double>::quiet_NaN() : z; }),
+      dims);
+  d.scene.channels[0].interpolation = Interpolation::nearest;
+  d.scene.channels[0].density = 0.8;
+  d.scene.channels[0].rangeHi = 4;
+  d.scene.channels[0].color = {{0, {0, 1, 0}}};
+  d.scene.channels[0].isovalues = {{1, 1, glm::dvec3(0, 0, 1)}, {2.5, 0.4, glm::dvec3(1, 0, 0)}};
+  const Marched found = directMarch(d.source, d.scene, 0, 0);
+  const double before = std::exp(-0.8 * 0.5), all = std::exp(-0.8 * (0.5 + 0.75 + 1));
+  EXPECT_NEAR(found.rgba.r, before * 0.4, found.error + 1e-9);
+  EXPECT_NEAR(found.rgba.g, 1 - before + 0.6 * (before - all), found.error + 1e-9);
+  EXPECT_EQ(found.rgba.b, 0);
+  EXPECT_NEAR(found.rgba.a, 1 - 0.6 * all, found.error + 1e-9);
+  EXPECT_LT(found.error, 1e-6);
+}
+
+// The gradient of a ramp, although every voxel is flat.
+TEST(DirectMarch, LightsFacesOfVoxelsByTheTrilinearGradient) {
+  const glm::ivec3 dims(1, 1, 5);
+  Drawing d = drawing(channelOf<float>(dims, [](int, int, int z) { return z; }), dims);
+  d.scene.channels[0].interpolation = Interpolation::nearest;
+  d.scene.channels[0].opacity = {{0, 0}};
+  d.scene.channels[0].material = {0, 1, 0, 1};
+  d.scene.channels[0].isovalues = {{2, 0.25, glm::dvec3(1, 1, 1)}};
+  d.scene.shading = true;
+  d.scene.lights = {{LightType::directional, {0, 0.8, 0.6}}};
+  const Marched found = directMarch(d.source, d.scene, 0, 0);
+  EXPECT_NEAR(found.rgba.r, 0.25 * 0.6, 1e-6);
+  EXPECT_LT(found.error, 1e-6);
+}
+
+// One voxel among zeros is the spline's basis function, whose area is 1; beyond the second voxel behind it,
+// it is 0, and 1/24 of it lies between that and the first.
+TEST(DirectMarch, TakesTheSplineThatTheVoxelsAreTheCoefficientsOf) {
+  const glm::ivec3 dims(1, 1, 7);
+  double last = 0;
+  const auto values = [&](int, int, int z) { return z == 3 ? 1 : z == 6 ? last : 0; };
+  Drawing d = drawing(channelOf<float>(dims, values), dims);
+  d.scene.channels[0].interpolation = Interpolation::cubic;
+  Marched found = directMarch(d.source, d.scene, 0, 0);
+  EXPECT_NEAR(found.rgba.a, 1 - std::exp(-1), found.error + 1e-9);
+  EXPECT_LT(found.error, 1e-6);
+  // Of a voxel that is not finite, the cells to the second before it have none.
+  last = std::numeric_limits<double>::infinity();
+  d.source.channels[0] = channelOf<float>(dims, values);
+  found = directMarch(d.source, d.scene, 0, 0);
+  EXPECT_NEAR(found.rgba.a, 1 - std::exp(-23.0 / 24), found.error + 1e-9);
+  // A constant is met nowhere, not even by rounding.
+  d.source.channels[0] = channelOf<float>(dims, [](int, int, int) { return 0.3; });
+  d.scene.channels[0].opacity = {{0, 0}};
+  d.scene.channels[0].isovalues = {{double(0.3F), 1, {}}};
+  EXPECT_EQ(directMarch(d.source, d.scene, 0, 0).rgba.a, 0);
+}
+
+// The spline of the coefficients z^2 is z^2 + 1/3 where it does not reach the border: as above, the factor is
+// a half from 2 to 6, where the opacity ends.
+TEST(DirectMarch, TakesOpacityByTheGradientOfTheSpline) {
+  const glm::ivec3 dims(1, 1, 9);
+  Drawing d = drawing(channelOf<float>(dims, [](int, int, int z) { return z * z; }), dims);
+  const double end = (36 + 1.0 / 3) / 100;
+  d.scene.channels[0].interpolation = Interpolation::cubic;
+  d.scene.channels[0].density = 0.7;
+  d.scene.channels[0].rangeHi = 100;
+  d.scene.channels[0].opacity = {{0, 1}, {end, 1}, {end, 0}};
+  d.scene.channels[0].gradientOpacity = GradientOpacity{0, 16, {{0.25, 0}, {0.25, 0.5}, {1, 0.5}}};
+  const Marched found = directMarch(d.source, d.scene, 0, 0);
+  EXPECT_NEAR(found.rgba.a, 1 - std::exp(-0.7 * 4 / 2), found.error + 1e-9);
+  EXPECT_LT(found.error, 1e-5);
+}
+
 // A plate lit by a headlight that shines through it: A = ka + (1 - ka) exp(-2 s t) / exp(-s t).
 TEST(DirectMarch, CastsShadowsOfTheMatterBeforeIt) {
   const glm::ivec3 dims(2, 2, 3);
@@ -109,6 +185,22 @@ TEST(DirectMarch, MeetsSurfacesInMatter) {
   EXPECT_NEAR(found.rgba.b, before * 0.6 * 0.5, found.error + 1e-9);
   EXPECT_NEAR(found.rgba.a, 1 - 0.3 * all, found.error + 1e-9);
   EXPECT_LT(found.error, 1e-6);
+}
+
+// Along the ray the field rises by 10 a voxel only, and what x and y take off and z adds is rounded: the
+// value passes those of the surfaces several times.
+TEST(DirectMarch, MeetsASurfaceOnceWhereRoundingPassesItOften) {
+  const glm::ivec3 dims(4, 4, 4);
+  Drawing d = drawing(
+      channelOf<float>(dims, [](int x, int y, int z) { return 10000 + 1010 * z - 500 * x - 500 * y; }), dims);
+  d.scene.channels[0].opacity = {{0, 0}};
+  for (int i = 0; i < 8; ++i) d.scene.channels[0].isovalues.push_back({10011 + 1.3 * i, 0.1, glm::dvec3(1)});
+  d.scene.camera.target += glm::dvec3(0.01, 0.02, 0);
+  d.scene.camera.eye = d.scene.camera.target - glm::dvec3(4, 4, 4);
+  for (const Interpolation how : {Interpolation::trilinear, Interpolation::cubic}) {
+    d.scene.channels[0].interpolation = how;
+    EXPECT_NEAR(directMarch(d.source, d.scene, 0, 0).rgba.a, 1 - std::pow(0.9, 8), 1e-9) << int(how);
+  }
 }
 
 // The light comes from behind through the second surface, which takes half of it; n.l is 1 on the other side.

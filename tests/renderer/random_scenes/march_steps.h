@@ -41,25 +41,25 @@ struct StepRules {
   int most;                ///< number of samples after which no step is halved any more
 };
 
-/// sampleAt(t) gives the PointSample, decisionsAt(t) only its hash, surfaceAt(k, t) what surface number k
-/// does where it is crossed at t.
-template <class SampleAt, class DecisionsAt, class SurfaceAt>
+/// sampleAt(t) gives the PointSample, glanceAt(t) one whose radiance may be wrong, surfaceAt(k, t) what
+/// surface number k does where it is crossed at t.
+template <class SampleAt, class GlanceAt, class SurfaceAt>
 class SteppedMarch {
  public:
-  SteppedMarch(const SampleAt& sampleAt, const DecisionsAt& decisionsAt, const SurfaceAt& surfaceAt,
+  SteppedMarch(const SampleAt& sampleAt, const GlanceAt& glanceAt, const SurfaceAt& surfaceAt,
                const StepRules& rules)
-      : sampleAt_(sampleAt), decisionsAt_(decisionsAt), surfaceAt_(surfaceAt), rules_(rules) {}
+      : sampleAt_(sampleAt), glanceAt_(glanceAt), surfaceAt_(surfaceAt), rules_(rules) {}
 
   /// Marches the next stretch of the ray. Stretches must follow each other and end where the field has a
-  /// kink.
+  /// kink, or where it is known to jump.
   void march(double begin, double end) {
     if (!(begin < end)) return;
     const int steps = int(std::ceil((end - begin) / rules_.step));
     const double width = (end - begin) / steps;
-    std::uint64_t before = decisionsAt_(begin);
+    std::uint64_t before = glanceAt_(begin + kInset * width).decisions;
     for (int i = 0; i < steps && all_.transmittance > kOpaque; ++i) {
       const double a = begin + i * width, b = i + 1 < steps ? a + width : end;
-      const std::uint64_t after = decisionsAt_(b);
+      const std::uint64_t after = glanceAt_(i + 1 < steps ? b : end - kInset * width).decisions;
       step(a, b, before, after, sampleAt_(0.5 * (a + b)), 0);
       before = after;
     }
@@ -70,6 +70,10 @@ class SteppedMarch {
 
  private:
   static constexpr double kOpaque = 1e-9, kThin = 0.1;
+  /// Share of a step. So far inside its ends a point is beyond rounding, which decides at a jump.
+  static constexpr double kInset = 1e-9;
+  /// Share of the longest step. Sides that change more than once in so short a way do so by rounding.
+  static constexpr double kSettled = 1e-7;
 
   static Stretch slab(const PointSample& sample, double length) {
     const double alpha = -std::expm1(-sample.extinction * length);
@@ -79,13 +83,20 @@ class SteppedMarch {
     return {front.transmittance * back.transmittance, front.light + front.transmittance * back.light};
   }
 
-  /// Adds the surfaces between the last sample and this one, at t. Samples lie inside cells, so that a value
-  /// that is only touched at a face is not seen.
-  void cross(const PointSample& sample, double t) {
-    for (std::size_t k = 0; k < sample.sides.size() && k < sides_.size(); ++k)
-      if (sides_[k] != sample.sides[k] && sides_[k] != Side::neither && sample.sides[k] != Side::neither)
-        all_ = joined(all_, surfaceAt_(k, t));
-    sides_ = sample.sides;
+  /// Adds the surfaces between the last sample and this one, which is in the middle of [a, b]. Samples lie
+  /// inside cells, so that a value that is only touched at a face is not seen. A side counts from where it
+  /// lasts: next to a surface, the rounded value may pass it several times.
+  void cross(const PointSample& sample, double a, double b) {
+    if (sample.sides == sides_) return;
+    const std::vector<Side> ahead = glanceAt_(0.5 * (a + b) + kSettled * rules_.step).sides;
+    sides_.resize(ahead.size(), Side::neither);
+    for (std::size_t k = 0; k < ahead.size(); ++k) {
+      const Side now = sample.sides[k];
+      if (now == sides_[k] || now != ahead[k]) continue;
+      if (now != Side::neither && sides_[k] != Side::neither)
+        all_ = joined(all_, surfaceAt_(k, a + kInset * (b - a)));
+      sides_[k] = now;
+    }
   }
 
   void extend(const PointSample& sample, double length) {
@@ -116,9 +127,9 @@ class SteppedMarch {
     if ((enough && !crosses) || samples_ > rules_.most || depth == kMaxDepth || !(a < m && m < b)) {
       error_ += enough ? change : std::max(change, most);
       if (crosses && a < m && m < b && depth < kMaxDepth) error_ += all_.transmittance;  // it may be anywhere
-      cross(left, 0.5 * (a + m));
+      cross(left, a, m);
       all_ = joined(all_, slab(left, half));
-      cross(right, 0.5 * (m + b));
+      cross(right, m, b);
       all_ = joined(all_, slab(right, half));
       extend(middle, 2 * half);
       return;
@@ -129,10 +140,10 @@ class SteppedMarch {
   static constexpr int kMaxDepth = 45;
 
   const SampleAt& sampleAt_;
-  const DecisionsAt& decisionsAt_;
+  const GlanceAt& glanceAt_;
   const SurfaceAt& surfaceAt_;
   StepRules rules_;
-  std::vector<Side> sides_;  // of the last sample
+  std::vector<Side> sides_;  // on which the ray is
   Stretch all_;
   std::vector<Run> runs_;
   double error_ = 0;

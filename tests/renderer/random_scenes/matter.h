@@ -43,15 +43,41 @@ struct Matter {
   double voxel(int i, int j, int k) const { return values[std::size_t(i + dims.x * (j + dims.y * k))]; }
   static double mean(double a, double b, double w) { return w == 1 ? b : a + w * (b - a); }
 
-  /// Trilinear; NaN in a cell with a corner that is not finite.
-  double at(const glm::dvec3& p) const {
+  /// Where a coordinate is, moved to between the outermost centres: in the cell from voxel `low` on, at the
+  /// share `way` of its width.
+  struct Place {
+    int low;
+    double way;
+  };
+  double inside(double x, int axis) const { return std::fmin(std::fmax(x, 0), dims[axis] - 1); }
+  Place place(const glm::dvec3& p, int axis) const {
+    const double x = inside(p[axis], axis);
+    const int low = std::max(0, std::min(int(std::floor(x)), dims[axis] - 2));
+    return {low, x - low};
+  }
+
+  /// The value at a point; not finite if there is none.
+  double at(const glm::dvec3& p, Decisions* decisions) const {
+    switch (look->interpolation) {
+      case Interpolation::trilinear:
+        break;
+      case Interpolation::cubic:
+        return cubic(p, kNoAxis);
+      case Interpolation::nearest:
+        return nearest(p, decisions);
+    }
+    return trilinear(p);
+  }
+
+  /// NaN in a cell with a corner that is not finite.
+  double trilinear(const glm::dvec3& p) const {
     int low[3], high[3];
     double w[3];
     for (int axis = 0; axis < 3; ++axis) {
-      const double x = std::fmin(std::fmax(p[axis], 0), dims[axis] - 1);
-      low[axis] = std::max(0, std::min(int(std::floor(x)), dims[axis] - 2));
-      high[axis] = std::min(low[axis] + 1, dims[axis] - 1);
-      w[axis] = x - low[axis];
+      const Place found = place(p, axis);
+      low[axis] = found.low;
+      high[axis] = std::min(found.low + 1, dims[axis] - 1);
+      w[axis] = found.way;
     }
     double plane[2];
     for (int z = 0; z < 2; ++z) {
@@ -68,15 +94,63 @@ struct Matter {
     return mean(plane[0], plane[1], w[2]);
   }
 
-  /// Gradient per voxel along each axis, by differences of one voxel; none if one of them is not finite.
+  /// The uniform cubic B-spline with these coefficients, or its slope, at the share `w` of the way from the
+  /// second to the third. By de Boor's means, so that what is constant stays so to the last bit.
+  static double spline(const double (&c)[4], double w, bool slope) {
+    const double a = mean(c[0], c[1], (w + 2) / 3), b = mean(c[1], c[2], (w + 1) / 3);
+    const double d = mean(c[2], c[3], w / 3);
+    const double before = mean(a, b, (w + 1) / 2), after = mean(b, d, w / 2);
+    return slope ? 3 * (after - before) : mean(before, after, w);
+  }
+  static constexpr int kNoAxis = -1;
+  /// The spline over 64 voxels or, given an axis, its derivative along it. NaN in a cell for which one of
+  /// them is not finite.
+  double cubic(const glm::dvec3& p, int derived) const {
+    int index[3][4];
+    double w[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const Place found = place(p, axis);
+      for (int n = 0; n < 4; ++n) index[axis][n] = std::max(0, std::min(found.low + n - 1, dims[axis] - 1));
+      w[axis] = found.way;
+    }
+    double planes[4], rows[4], voxels[4];
+    for (int z = 0; z < 4; ++z) {
+      for (int y = 0; y < 4; ++y) {
+        for (int x = 0; x < 4; ++x) {
+          voxels[x] = voxel(index[0][x], index[1][y], index[2][z]);
+          if (!std::isfinite(voxels[x])) return std::numeric_limits<double>::quiet_NaN();
+        }
+        rows[y] = spline(voxels, w[0], derived == 0);
+      }
+      planes[z] = spline(rows, w[1], derived == 1);
+    }
+    return spline(planes, w[2], derived == 2);
+  }
+
+  double nearest(const glm::dvec3& p, Decisions* decisions) const {
+    int index[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      index[axis] = int(std::floor(inside(p[axis], axis) + 0.5));
+      decisions->note(std::uint64_t(index[axis]));
+    }
+    return voxel(index[0], index[1], index[2]);
+  }
+
+  /// Gradient per voxel along each axis; none if a part of it is not finite. The spline has its own; else by
+  /// trilinear differences of one voxel.
   std::optional<glm::dvec3> gradient(const glm::dvec3& p) const {
     glm::dvec3 g(0);
     for (int axis = 0; axis < 3; ++axis) {
-      const double last = dims[axis] - 1, x = std::fmin(std::fmax(p[axis], 0), last);
-      glm::dvec3 before = p, after = p;
-      before[axis] = std::fmax(x - 1, 0);
-      after[axis] = std::fmin(x + 1, last);
-      if (before[axis] < after[axis]) g[axis] = (at(after) - at(before)) / (after[axis] - before[axis]);
+      if (look->interpolation == Interpolation::cubic) {
+        g[axis] = cubic(p, axis);
+      } else {
+        const double x = inside(p[axis], axis);
+        glm::dvec3 before = p, after = p;
+        before[axis] = std::fmax(x - 1, 0);
+        after[axis] = std::fmin(x + 1, dims[axis] - 1);
+        if (before[axis] < after[axis])
+          g[axis] = (trilinear(after) - trilinear(before)) / (after[axis] - before[axis]);
+      }
       if (!std::isfinite(g[axis])) return std::nullopt;
     }
     return g;

@@ -163,6 +163,10 @@ const Field kChannelFields[] = {
        return {{"visible", d.chance(0.92)}};
      }},
     {"range", drawRange},
+    {"interpolation",
+     [](Draw& d, const Surroundings&) -> json {
+       return d.chance(0.75) ? json::object() : json{{"interpolation", nameFrom(d, kInterpolations)}};
+     }},
     {"color", drawColor},
     {"opacity", drawOpacity},
     {"gamma",
@@ -409,6 +413,8 @@ std::string describe(const RandomScene& drawn) {
   if (surfaces > 0) text << ", " << surfaces << " isovalues";
   for (const ChannelAppearance& c : s.channels)
     if (c.peaks != Peaks::off) text << ", peaks " << nameOf(c.peaks);
+  for (const ChannelAppearance& c : s.channels)
+    if (c.interpolation != Interpolation::trilinear) text << ", " << nameOf(c.interpolation);
   text << (s.camera.orthoHeight ? ", orthographic" : ", perspective") << ", " << s.width << "x" << s.height
        << " " << nameOf(s.filter) << ", macrocell " << s.macrocell << ", step " << s.step << ", "
        << nameOf(s.sampling) << ", thickness";

@@ -47,6 +47,21 @@ TEST(Bernstein, SumsProductsAndPartsTakeTheValuesThatTheyShould) {
   }
 }
 
+TEST(Bernstein, ProductsOfTheHighestDegreeAreExact) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int trial = 0; trial < 50; ++trial) {
+    std::array<double, Bernstein::kMaxDegree / 2 + 1> a;
+    for (double& x : a) x = unit(random);
+    const Bernstein p(a), square = p * p;
+    EXPECT_EQ(square.degree(), Bernstein::kMaxDegree);
+    for (const double u : {0.0, 0.1, 0.37, 0.5, 0.9, 1.0}) {
+      EXPECT_NEAR(square(u), p(u) * p(u), 1e-14);
+      EXPECT_NEAR((square - 0.25)(u), p(u) * p(u) - 0.25, 1e-14);
+    }
+  }
+}
+
 TEST(Bernstein, DerivativeIsTheSlope) {
   std::mt19937 random(6);
   std::uniform_real_distribution<double> unit(-1, 1);

@@ -72,6 +72,8 @@ TEST(ChannelCurves, AnEmptyRangeIsAStepThatHoldsAtItsValue) {
   EXPECT_EQ(at(curves, std::nextafter(5.0, 0.0)).extinction, 0);
   EXPECT_EQ(at(curves, 5).extinction, 1);
   EXPECT_THAT(curves.breakpoints(), testing::ElementsAre(5));
+  // A piece below the step stays below it, wherever rounding carries the scalar.
+  EXPECT_EQ(curves.sample(curves.pieceAt(curves.position(4)), curves.position(5)).extinction, 0);
 }
 
 TEST(ChannelCurves, GammaActsOnThePositionBeforeBothCurves) {

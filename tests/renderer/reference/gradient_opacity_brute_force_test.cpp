@@ -6,26 +6,9 @@
 #include "renderer/reference/integrator.h"
 #include "tests/renderer/reference/lit_march.h"
 #include "tests/renderer/reference/random_light.h"
-#include "tests/support/gradients.h"
 
 namespace scolopax::reference {
 namespace {
-
-/// Ranges within and around the channel's gradients; steps, reversed ranges and jumps.
-GradientOpacity randomFactor(RandomLight& draw, const Volume& volume, std::size_t channel) {
-  const auto quantile = [&] { return test::gradientQuantile(volume, channel, draw.unit()); };
-  GradientOpacity opacity{quantile(), quantile(), {}};
-  opacity.rangeLo *= draw.chance(0.5) ? 1 : 0.1;
-  opacity.rangeHi *= 1 + draw.unit();
-  if (draw.chance(0.15)) opacity.rangeHi = opacity.rangeLo = opacity.rangeLo * (0.9 + 0.2 * draw.unit());
-  if (draw.chance(0.2)) std::swap(opacity.rangeLo, opacity.rangeHi);
-  for (int i = draw.among(1, 5); i > 0; --i)
-    opacity.factor.push_back({draw.unit(), draw.chance(0.3) ? draw.among(0, 1) : draw.unit()});
-  std::sort(opacity.factor.begin(), opacity.factor.end(),
-            [](const OpacityKnot& a, const OpacityKnot& b) { return a.position < b.position; });
-  if (opacity.factor.size() > 2 && draw.chance(0.5)) opacity.factor[1].position = opacity.factor[2].position;
-  return opacity;
-}
 
 /// Compares one ray through each of `count` random scenes with tiny steps: the claimed error bounds must
 /// hold.
@@ -38,7 +21,7 @@ void expectClaimsHold(bool shading, bool shadows, unsigned count, int steps, dou
     scene.shading = shading;
     scene.shadows = shadows;
     for (std::size_t n = 0; n < scene.channels.size(); ++n)
-      if (n == 0 || draw.chance(0.5)) scene.channels[n].gradientOpacity = randomFactor(draw, volume, n);
+      if (n == 0 || draw.chance(0.5)) scene.channels[n].gradientOpacity = draw.factor(volume, n);
     const RandomRay ray(draw, volume, seed);
     const RayResult found = traceReference(volume, scene, ray.origin, ray.direction);
     const March expected = LitMarcher(volume, scene).march(ray.origin, ray.direction, steps, steps);

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "tests/renderer/reference/test_volumes.h"
+#include "tests/support/gradients.h"
 
 namespace scolopax::reference {
 
@@ -66,6 +67,22 @@ struct RandomLight {
     std::sort(a.color.begin(), a.color.end(), [](auto& x, auto& y) { return x.position < y.position; });
     if (chance(0.3)) a.opacity[2].position = a.opacity[1].position;
     return a;
+  }
+
+  /// Ranges within and around the channel's gradients; steps, reversed ranges and jumps.
+  GradientOpacity factor(const Volume& volume, std::size_t channel) {
+    const auto quantile = [&] { return test::gradientQuantile(volume, channel, unit()); };
+    GradientOpacity opacity{quantile(), quantile(), {}};
+    opacity.rangeLo *= chance(0.5) ? 1 : 0.1;
+    opacity.rangeHi *= 1 + unit();
+    if (chance(0.15)) opacity.rangeHi = opacity.rangeLo = opacity.rangeLo * (0.9 + 0.2 * unit());
+    if (chance(0.2)) std::swap(opacity.rangeLo, opacity.rangeHi);
+    for (int i = among(1, 5); i > 0; --i)
+      opacity.factor.push_back({unit(), chance(0.3) ? among(0, 1) : unit()});
+    std::sort(opacity.factor.begin(), opacity.factor.end(),
+              [](const OpacityKnot& a, const OpacityKnot& b) { return a.position < b.position; });
+    if (opacity.factor.size() > 2 && chance(0.5)) opacity.factor[1].position = opacity.factor[2].position;
+    return opacity;
   }
 
   Scene scene(const Volume& volume) {

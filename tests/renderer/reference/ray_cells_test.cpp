@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -27,6 +28,16 @@ TEST(RayCells, BeginAtTheFacesAndCutAtThePlanesThroughVoxelCentres) {
   EXPECT_THAT(coordinatesOfCuts(ray, 0), ElementsAre(-0.5, 0, 1, 2, 3, 3.5));
   const RayCells back = cutAtCells({20, 0.3, 0.7}, {-2, 0, 0}, {4, 2, 2});
   EXPECT_THAT(coordinatesOfCuts(back, 0), ElementsAre(3.5, 3, 2, 1, 0, -0.5));
+}
+
+TEST(RayCells, AreCutAtTheFacesOfVoxelsWhereAsked) {
+  const RayCells ray = cutAtCells({-20, 0.3, 0.7}, {2, 0, 0}, {4, 1, 2}, 100, CutAt::voxelCentresAndFaces);
+  EXPECT_THAT(coordinatesOfCuts(ray, 0), ElementsAre(-0.5, 0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5));
+  const RayCells oblique = cutAtCells({-3, -2, -5}, {1, 0.7, 1.3}, {5, 4, 6}, 100),
+                 more = cutAtCells({-3, -2, -5}, {1, 0.7, 1.3}, {5, 4, 6}, 100, CutAt::voxelCentresAndFaces);
+  EXPECT_TRUE(std::is_sorted(more.cuts.begin(), more.cuts.end()));
+  EXPECT_TRUE(std::includes(more.cuts.begin(), more.cuts.end(), oblique.cuts.begin(), oblique.cuts.end()));
+  EXPECT_GT(more.cuts.size(), oblique.cuts.size() + 5);
 }
 
 TEST(RayCells, BeginAtTheOriginInsideTheBox) {
