@@ -292,6 +292,7 @@ RenderPlan::RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene,
     const Channel& channel = volume_->channels()[std::size_t(i)];
     channelViews_.push_back(plan.transfer.view(channel));
     channelViews_.back().field = fieldView(channel, scene_.channels[std::size_t(i)].interpolation);
+    channelViews_.back().dataFalls = channel.slope < 0;
     if (plan.factor) channelViews_.back().factor = plan.factor->view();
     plan.surfaces.addTo(channelViews_.back());
   }

@@ -119,7 +119,7 @@ SCOLOPAX_LANES typename L::Vec lit(const SceneView& scene, const ChannelView& ch
   shaded = shaded & (s > 0.0f);
   if (!any(shaded)) return unshaded;
   const Vec toViewer = normalize(-toWorld<L>(scene, hit.ray.direction));
-  Vec normal = scaled * (1.0f / length);
+  Vec normal = scaled * ((channel.dataFalls ? -1.0f : 1.0f) / length);
   normal = select(dot(normal, toViewer) < kFacesAway, -normal, normal);
   Vec diffuse(0.0f), specular(0.0f);
   for (int i = 0; i < scene.lightCount; ++i) {

@@ -126,8 +126,8 @@ TEST(ExactLight, OnSpacingsOfOneToAHundredHasTheNormalOfTheWorld) {
 }
 
 /// A field that rises along an axis at right angles to the view, but for `tilt`: a picture of a rotated grid,
-/// lit from where the field rises to.
-double litAtRightAngles(double turn, double tilt, Method method) {
+/// lit from where the field rises to. `slope`: of data values by stored ones.
+double litAtRightAngles(double turn, double tilt, Method method, double slope = 1) {
   const glm::dvec3 across = glm::normalize(glm::dvec3(std::cos(turn), std::sin(turn), 0.3)),
                    view = glm::normalize(glm::cross(across, glm::dvec3(0.2, 0.1, 1))),
                    up = glm::cross(view, across);
@@ -135,7 +135,8 @@ double litAtRightAngles(double turn, double tilt, Method method) {
   grid.worldFromVoxel = glm::dmat4(glm::dvec4(0.0105778 * across, 0), glm::dvec4(0.0344994 * up, 0),
                                    glm::dvec4(0.0389877 * view, 0), glm::dvec4(0.3, -0.2, 0.1, 1));
   const auto volume =
-      volumeOf(grid, channelOf<std::int16_t>(grid.dims, [](int x, int, int) { return 1000 * x; }));
+      volumeOf(grid, channelOf<std::int16_t>(
+                         grid.dims, [&](int x, int, int) { return 1000 * x / slope; }, slope));
   Scene scene = frontScene(*volume, 8, 8);
   scene.camera.eye = scene.camera.target - grid.diagonal() * glm::normalize(view + tilt * across);
   scene.camera.up = up;
@@ -160,6 +161,7 @@ TEST(ExactLight, OnAFieldThatIsConstantAlongTheViewIsNotDecidedByRounding) {
   for (int i = 0; i < 20; ++i)
     for (const Method method : {Method::superposed, Method::raymarch}) {
       EXPECT_NEAR(litAtRightAngles(0.31 * i, 0, method), 1, 1e-4) << i << ' ' << nameOf(method);
+      EXPECT_NEAR(litAtRightAngles(0.31 * i, 0, method, -1), 1, 1e-4) << i << ' ' << nameOf(method);
       // The normal turns to the viewer where it clearly points away from it.
       EXPECT_NEAR(litAtRightAngles(0.31 * i, 1e-5, method), 0, 1e-4) << i << ' ' << nameOf(method);
       EXPECT_NEAR(litAtRightAngles(0.31 * i, -1e-5, method), 1, 1e-4) << i << ' ' << nameOf(method);
