@@ -38,8 +38,7 @@ std::vector<Peak> peaksOf(const std::vector<OpacityKnot>& curve) {
 }
 
 Surfaces::Surfaces(const Channel& channel, const ChannelAppearance& appearance, float origin,
-                   double smallestSpacing)
-    : dataFalls_(channel.slope < 0) {
+                   double smallestSpacing) {
   const auto fail = [&](const std::string& what) {
     throw Error(ErrorCode::badInput, "channel '" + channel.name + "': " + what);
   };
@@ -54,7 +53,7 @@ Surfaces::Surfaces(const Channel& channel, const ChannelAppearance& appearance, 
     const float stored = float((value - channel.intercept) / channel.slope);
     const float away = stored - origin;
     stored_.push_back(stored);
-    views_.push_back({dataFalls_ ? -away : away, float(opacity), shown});
+    views_.push_back({channel.slope < 0 ? -away : away, float(opacity), shown});
   };
   for (const Isovalue& isovalue : appearance.isovalues) {
     if (!std::isfinite(isovalue.value))
@@ -81,7 +80,6 @@ Surfaces::Surfaces(const Channel& channel, const ChannelAppearance& appearance, 
 void Surfaces::addTo(kernel::ChannelView& view) const {
   view.surfaces = views_.data();
   view.surfaceCount = int(views_.size());
-  view.dataFalls = dataFalls_;
 }
 
 float Surfaces::presence(ValueInterval interval, float range) const {

@@ -26,7 +26,6 @@ class Surfaces {
  private:
   std::vector<kernel::SurfaceView> views_;
   std::vector<float> stored_;  ///< their stored values
-  bool dataFalls_ = false;
 };
 
 /// A maximum of a curve.
