@@ -107,7 +107,7 @@ struct FieldView {
   const void* voxels;  ///< voxels of this channel, interleaved with others of its type
   ScalarType type;
   Filter filter;
-  std::uint8_t fetches;  ///< cost()
+  std::uint8_t fetches;  ///< trilinear samples that one sample costs as much as
   bool finite;           ///< whether all voxels are finite
   int lane, stride;      ///< index among the interleaved channels, and their number
 
@@ -117,7 +117,7 @@ struct FieldView {
   SCOLOPAX_HD unsigned cost() const { return 1; }
 #else
   SCOLOPAX_HD bool has(Filter which) const { return filter == which; }
-  SCOLOPAX_HD unsigned cost() const { return fetches; }  ///< of a sample, in trilinear samples
+  SCOLOPAX_HD unsigned cost() const { return fetches; }
 #endif
 };
 
@@ -158,13 +158,13 @@ struct SceneView {
   bool surfaces;              ///< some channel has surfaces
   MajorantView surfaceCells;  ///< the macrocells that may have one; only if there are surfaces
   float step;                 ///< step of quadrature, world units
-  bool voxelwise;       ///< quadrature also cuts rays at the faces of voxel cells, and integrates exactly in
-                        ///< between
+  bool voxelwise;       ///< quadrature also cuts rays at the faces of voxel cells, between which scalars are
+                        ///< cubics
   float thickest;       ///< optical depth above which voxelwise segments are shortened
   OpacityLimit opaque;  ///< where marched rays end
   float stratum;        ///< share of a ray's light per lighting computation of quadrature (strata.h)
-  bool shading, shadows;
-  int lightCount;  ///< 0 unless one of them is on
+  bool shading, shadows;  ///< the scene's
+  int lightCount;         ///< 0 unless one of them is on
   LightView lights[kMaxLights];
   glm::mat3 worldFromVoxel;  ///< linear part, in units of the smallest spacing, so that lengths are near 1 at
                              ///< any scale

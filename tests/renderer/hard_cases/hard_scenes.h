@@ -72,4 +72,29 @@ inline RenderStats statsOf(const std::shared_ptr<const Volume>& volume, Scene sc
   return renderer->stats();
 }
 
+/// Largest difference of quadrature from the reference over pixels and components, beyond the error that the
+/// reference claims.
+inline double largestError(const std::shared_ptr<const Volume>& volume, Scene scene, double step = 0,
+                           int samples = 1) {
+  scene.filter = PixelFilter::point;
+  scene.method = Method::raymarch;
+  scene.step = step;
+  const auto expected = reference::renderReference(*volume, scene, 1);
+  const Image found = renderSamples(volume, scene, samples);
+  double largest = 0;
+  for (std::size_t i = 0; i < found.pixels.size(); ++i)
+    for (int c = 0; c < 4; ++c)
+      largest = std::max(largest, std::abs(double(found.pixels[i][c]) - double(expected.image.pixels[i][c])));
+  return largest - expected.maximumRayError;
+}
+
+/// One colour per channel, as colours that change within a cell hide each other, and little extinction.
+inline Scene thin(Scene scene, double factor) {
+  for (ChannelAppearance& channel : scene.channels) {
+    channel.density *= factor;
+    channel.color = {channel.color.front()};
+  }
+  return scene;
+}
+
 }  // namespace scolopax::test

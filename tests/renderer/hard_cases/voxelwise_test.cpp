@@ -14,29 +14,6 @@ namespace {
 
 using namespace test;
 
-/// Largest difference from the reference over pixels and components, beyond the error that it claims.
-double largestError(const std::shared_ptr<const Volume>& volume, Scene scene) {
-  scene.filter = PixelFilter::point;
-  scene.method = Method::raymarch;
-  scene.step = 0;
-  const auto expected = reference::renderReference(*volume, scene, 1);
-  const Image found = renderSamples(volume, scene, 1);
-  double largest = 0;
-  for (std::size_t i = 0; i < found.pixels.size(); ++i)
-    for (int c = 0; c < 4; ++c)
-      largest = std::max(largest, std::abs(double(found.pixels[i][c]) - double(expected.image.pixels[i][c])));
-  return largest - expected.maximumRayError;
-}
-
-/// One colour per channel, as colours that change within a cell hide each other, and little extinction.
-Scene thin(Scene scene, double factor) {
-  for (ChannelAppearance& channel : scene.channels) {
-    channel.density *= factor;
-    channel.color = {channel.color.front()};
-  }
-  return scene;
-}
-
 TEST(Voxelwise, IsExactInThinMatter) {
   // What matter hides of other matter in the same cell is of second order in the density.
   for (const TestScene which : kTestScenes) {
