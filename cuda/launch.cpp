@@ -17,7 +17,7 @@ const kernel::SceneView& checked(const kernel::SceneView& view) {
   for (int n = 0; n < view.channelCount; ++n)
     if (view.channels[n].field.filter != kernel::Filter::trilinear)
       throw Error(ErrorCode::unsupported, "cuda: interpolation other than trilinear");
-  if (view.voxelwise)
+  if (view.cutsAtVoxels())
     throw Error(ErrorCode::unsupported, "cuda: quadrature from one face of voxel cells to the next (step 0)");
   if (view.surfaces) throw Error(ErrorCode::unsupported, "cuda: surfaces (isovalues and peaks)");
   return view;

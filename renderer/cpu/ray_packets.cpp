@@ -13,9 +13,9 @@ TileFunction packetTileFunction(const Scene& scene, const kernel::SceneView& vie
   if (!hasStep(scene.method) || cells.x * cells.y * cells.z >= 0x1p30) return nullptr;
   switch (set) {
     case InstructionSet::avx512:
-      return avx512PacketTiles(scene, view.voxelwise);
+      return avx512PacketTiles(scene, view.cutsAtVoxels());
     case InstructionSet::avx2:
-      return avx2PacketTiles(scene, view.voxelwise);
+      return avx2PacketTiles(scene, view.cutsAtVoxels());
     case InstructionSet::baseline:
       break;
   }
@@ -25,8 +25,8 @@ TileFunction packetTileFunction(const Scene& scene, const kernel::SceneView& vie
 TileFunction quadratureTileFunction(const Scene& scene, const kernel::SceneView& view) {
   const TileFunction packets = packetTileFunction(scene, view, fastestInstructionSet());
   if (packets) return packets;
-  return view.voxelwise ? chooseTileFunction<kernel::RayMarch<kernel::VoxelCells>>(scene)
-                        : chooseTileFunction<kernel::RayMarch<kernel::EqualSteps>>(scene);
+  return view.cutsAtVoxels() ? chooseTileFunction<kernel::RayMarch<kernel::VoxelCells>>(scene)
+                             : chooseTileFunction<kernel::RayMarch<kernel::EqualSteps>>(scene);
 }
 
 }  // namespace scolopax

@@ -324,8 +324,7 @@ void RenderPlan::fillView(const kernel::CameraRays& rays, const std::optional<ke
   view_.nearest = std::any_of(channelViews_.begin(), channelViews_.end(), [](const auto& channel) {
     return channel.field.filter == kernel::Filter::nearest;
   });
-  // Between the nearest voxels' values there is nothing, so that only cuts where they change are right.
-  view_.voxelwise = scene_.step == 0 || view_.nearest;
+  view_.voxelwise = scene_.step == 0;
   view_.step =
       scene_.step == 0 ? std::numeric_limits<float>::infinity() : view_.smallestSpacing * float(scene_.step);
   view_.thickest = float(kThickestSegment);

@@ -22,12 +22,12 @@ double sceneStep(const Resolution& resolution) {
 }
 
 void setResolution(kernel::SceneView& view, const Resolution& resolution) {
-  view.voxelwise = resolution.voxelwise || view.nearest;
+  view.voxelwise = resolution.voxelwise;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   view.step = std::isfinite(resolution.step) ? view.smallestSpacing * float(resolution.step) : kInfinity;
   // The biases of ending rays early, and of what hides other matter in the same segment, must fall with that
   // of the segments' lengths, which is of second order.
-  const double part = resolution.voxelwise ? std::min(1.0, resolution.step / 2) : 1.0;
+  const double part = view.cutsAtVoxels() ? std::min(1.0, resolution.step / 2) : 1.0;
   view.thickest = float(kThickestSegment * part);
   view.opaque = opacityLimit(kOpaqueTransmittance * part * part);
 }

@@ -62,6 +62,8 @@ SCOLOPAX_LANES typename L::Float placeOf(const SegmentCubics<L, View>& scalars, 
 template <class L, class View, class Scalars>
 class Jumps {
  public:
+  /// A cubic passes each jump of a curve of 4096 points at most three times.
+  static constexpr int kMostCuts = 3 << 12;
   using Float = typename L::Float;
   using Int = typename L::Int;
   using Mask = typename L::Mask;
@@ -76,9 +78,11 @@ class Jumps {
       piece_[n] = pieceAtPlace(n, Float(0.0f));
     }
   }
-  /// Shortens the parts of the rays in `on` that begin at `begin`, to the first jump up to `*end`.
+  /// Shortens the parts of the rays in `on` that begin at `begin`, to the first jump up to `*end`. After
+  /// kMostCuts parts, jumps are stepped over, so that no input makes a segment endless.
   SCOLOPAX_LANES void shorten(Float begin, Mask on, Float* end) {
     cut_ = without(on, on);
+    if (++parts_ > kMostCuts) return;
     for (std::uint32_t left = channels_; left != 0; left &= left - 1) {
       const int n = std::countr_zero(left);
       const Int to = pieceAtPlace(n, *end);
@@ -137,11 +141,13 @@ class Jumps {
     }
     return found;
   }
+
   const View& scene_;
   const Scalars& scalars_;
   const Segment<L>& segment_;
   std::uint32_t channels_ = 0;  // bit n: channel n may have jumps
   Int piece_[kMaxVisibleChannels];
+  int parts_ = 0;
   Mask cut_;                             // rays whose part ends at a jump
   Int channel_{0}, knot_{0}, rises_{0};  // of the jump: reached at this knot, from below if `rises_` is 1
 };

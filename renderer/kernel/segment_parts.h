@@ -259,8 +259,7 @@ SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Se
   look(0, Float(0.0f));
   Float sum(0.0f), begin(0.0f);
   Mask on = which;
-  constexpr int kMostParts = 64;
-  for (int i = 0; i < kMostParts && any(on); ++i) {
+  for (int i = 0; any(on); ++i) {
     const int front = i & 1, back = front ^ 1;
     Float end = minimum(begin + share, 1.0f);
     jumps.shorten(begin, on, &end);

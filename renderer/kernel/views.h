@@ -174,6 +174,8 @@ struct SceneView {
   static constexpr int kFactors = kMaxVisibleChannels;  ///< channels that may have one: length of arrays
   /// Whether the opacity of channel n depends on the gradient.
   SCOLOPAX_HD bool hasFactor(int n) const { return channels[n].factor.curve.count != 0; }
+  /// Between nearest voxels there are no values, so that only cuts where they change are right.
+  SCOLOPAX_HD bool cutsAtVoxels() const { return voxelwise || nearest; }
   /// Kernels for devices are compiled without surfaces and filters.
 #if defined(__CUDA_ARCH__)
   SCOLOPAX_HD static constexpr bool hasSurfaces() { return false; }

@@ -206,7 +206,7 @@ class RayPackets : public testing::TestWithParam<InstructionSet> {
           if (!done[std::size_t(pixel)]) render(pixel);
       });
     };
-    if (view_.voxelwise)
+    if (view_.cutsAtVoxels())
       renderAll(std::type_identity<kernel::VoxelCells>{});
     else
       renderAll(std::type_identity<kernel::EqualSteps>{});

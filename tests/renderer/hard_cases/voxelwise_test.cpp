@@ -63,6 +63,28 @@ TEST(Voxelwise, DividesCellsOfDenseMatter) {
   }
 }
 
+TEST(Voxelwise, LosesNothingWhereCurvesJumpOften) {
+  // A staircase of 200 jumps, all of which are passed within one cell; in max and mix, parts end at jumps.
+  const glm::ivec3 dims(2, 2, 2);
+  const auto along = [](int axis) {
+    return [axis](int x, int y, int z) { return axis == 0 ? x : axis == 1 ? y : z; };
+  };
+  const auto volume =
+      volumeOf(gridOf(dims), channelOf<float>(dims, along(2)), channelOf<float>(dims, along(0)));
+  Scene scene = frontScene(*volume, 8, 8);
+  scene.channels = {ramp(0, 1, 0.5, kRed), ramp(0, 1, 0.3, kBlue)};
+  scene.channels[0].opacity.clear();
+  for (int i = 0; i <= 200; ++i) {
+    const double at = i / 200.0;
+    scene.channels[0].opacity.push_back({at, i % 2 ? 0.4 : 0.6});
+    scene.channels[0].opacity.push_back({at, i % 2 ? 0.6 : 0.4});
+  }
+  for (const BlendMode blend : {BlendMode::max, BlendMode::mix}) {
+    scene.blend = blend;
+    EXPECT_LT(largestError(volume, scene), 0.01) << nameOf(blend);
+  }
+}
+
 TEST(Voxelwise, SeesPeaksOfAnyWidth) {
   const VolumeAndScene made = *testScene(TestScene::orbitals);
   Scene scene = thin(made.scene, 1);
