@@ -157,7 +157,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
                                            emission = emission + part.emission;
                                          });
         if constexpr (Steps::kDivides) {
-          if (along.shorten(segment, extinction * segment.length(), scene.thickest)) continue;
+          if (along.shorten(segment, extinction * segment.length(), transmittance, scene.thickest)) continue;
         }
         break;
       }
