@@ -54,7 +54,9 @@ double qualityOf(std::string_view accept, std::string_view mediaType) {
 net::Handler guarded(const ApiContext& context, const net::Handler& handler) {
   return [handler, &context](const net::Request& request) -> net::Response {
     try {
-      return handler(request);
+      net::Response response = handler(request);
+      // Whatever changes something is answered: its client would take a refusal to mean that nothing changed.
+      return request.method == "GET" ? charged(context.memory, std::move(response)) : response;
     } catch (const ProtocolError& error) {
       return errorResponse(error);
     } catch (const Error& error) {
@@ -105,6 +107,13 @@ int statusOf(ErrorCode code) {
 
 net::Response jsonResponse(int status, const json& body) {
   return {status, "application/json", body.dump(-1, ' ', false, json::error_handler_t::replace), {}};
+}
+
+net::Response charged(const std::shared_ptr<MemoryBudget>& memory, net::Response response) {
+  constexpr std::size_t kFreeBytes = 64 << 10;
+  if (!response.keep && response.body.size() > kFreeBytes)
+    response.keep = MemoryBudget::takeShared(memory, MemoryUse::answers, response.body.size());
+  return response;
 }
 
 net::Response errorResponse(const ProtocolError& error) {

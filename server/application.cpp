@@ -135,7 +135,7 @@ struct Application::Impl {
             sessions, now, log, background, [this] { encodeThread.wake(); }, memory),
         capabilities(capabilitiesJson(config, sessionResolver->lists())),
         streams(sessions, background, metrics,
-                {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities}),
+                {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities, log}),
         context{config,  *datasets, renderResolver,      sessions,
                 streams, metrics,   makeRenderer,        memory,
                 log,     stopping,  cutting.get_token(), [this] { return capabilities; }},

@@ -21,16 +21,12 @@ using protocol::ProtocolError;
 /// Text messages come one at a time, on any thread; frames come only from the encoder thread.
 class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
  public:
-  Stream(SessionStore& store, Background& background, const protocol::Limits& limits,
-         const nlohmann::json& capabilities, const std::shared_ptr<net::WebSocket>& socket)
-      : store_(store),
-        background_(background),
-        limits_(limits),
-        capabilities_(capabilities),
-        socket_(socket) {}
+  Stream(SessionStore& store, Background& background, const StreamHub::Options& options,
+         const std::shared_ptr<net::WebSocket>& socket)
+      : store_(store), background_(background), options_(options), socket_(socket) {}
 
   void join(std::shared_ptr<Session> session) {
-    sendText(protocol::helloText(capabilities_, session->id(), session->token()));
+    sendText(protocol::helloText(options_.capabilities, session->id(), session->token()));
     session_ = std::move(session);
     edits_ = std::make_shared<EditQueue>(background_);
     viewer_ = session_->addViewer(shared_from_this());
@@ -48,7 +44,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
     received_ = &text;
     try {
       std::visit([this](const auto& message) { handle(message); },
-                 protocol::parseClientMessage(text, limits_));
+                 protocol::parseClientMessage(text, options_.limits));
     } catch (const ProtocolError& error) {
       sendText(protocol::errorText(error));
     }
@@ -103,7 +99,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
     const EditOrigin origin{viewer_, message.id, std::nullopt};
     EditQueue::Edit edit;
     // Kept as text, since parsed it would take many times the memory while it waits.
-    edit.apply = [session = session_, text = *received_, origin, &limits = limits_] {
+    edit.apply = [session = session_, text = *received_, origin, &limits = options_.limits] {
       session->patch(std::get<protocol::PatchMessage>(protocol::parseClientMessage(text, limits)).patch,
                      origin);
     };
@@ -161,7 +157,8 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
       sendText(protocol::errorText(error, id));
     } catch (const Error& error) {
       sendText(protocol::errorText(ProtocolError(statusOf(error.code()), "", error.what()), id));
-    } catch (...) {
+    } catch (const std::exception& error) {
+      if (options_.log) options_.log(std::string("edit: ") + error.what());
       if (const auto socket = socket_.lock()) socket->close(1011, "the server failed");
     }
   }
@@ -183,8 +180,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
 
   SessionStore& store_;
   Background& background_;
-  const protocol::Limits& limits_;
-  const nlohmann::json& capabilities_;
+  const StreamHub::Options& options_;
   const std::weak_ptr<net::WebSocket> socket_;
   std::shared_ptr<Session> session_;
   ViewerId viewer_ = 0;
@@ -204,7 +200,7 @@ StreamHub::~StreamHub() = default;
 
 net::WebSocketEvents StreamHub::join(const std::shared_ptr<Session>& session,
                                      const std::shared_ptr<net::WebSocket>& socket) {
-  auto stream = std::make_shared<Stream>(store_, background_, options_.limits, options_.capabilities, socket);
+  auto stream = std::make_shared<Stream>(store_, background_, options_, socket);
   {
     const std::lock_guard lock(mutex_);
     if (streams_.size() >= options_.maxClients)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One client's WebSocket on a session: text messages in, frames and texts out. Between net/ and Session.
 #pragma once
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
@@ -24,6 +25,7 @@ class StreamHub {
     std::size_t maxClients = 64;
     protocol::Limits limits;
     nlohmann::json capabilities;  ///< for hello
+    std::function<void(const std::string&)> log;
   };
   /// `background` runs the measurements that edits wait for.
   StreamHub(SessionStore& store, Background& background, Metrics& metrics, Options options);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A limit on the memory that requests make a server allocate: films, pictures, encodings, macrocells. Large
-// allocations are charged here first; a refusal states the limit.
+// A limit on the memory that requests make a server allocate: films, pictures, encodings, macrocells, long
+// answers. Large allocations are charged here first; a refusal states the limit.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -12,8 +12,8 @@
 namespace scolopax {
 
 /// What memory is used for.
-enum class MemoryUse { films, grids, pictures, encodings };
-inline constexpr std::string_view kMemoryUses[] = {"films", "grids", "pictures", "encodings"};
+enum class MemoryUse { films, grids, pictures, encodings, answers };
+inline constexpr std::string_view kMemoryUses[] = {"films", "grids", "pictures", "encodings", "answers"};
 
 /// Every function may be called from any thread. Shares keep the budget alive.
 class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {

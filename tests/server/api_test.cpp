@@ -27,6 +27,22 @@ std::string headerOf(const net::Response& response, std::string_view name) {
   return "absent";
 }
 
+TEST(Api, ChargesLongAnswersUntilTheyHaveBeenSent) {
+  const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(1) << 20);
+  const auto answer = [](std::size_t bytes) { return net::Response{200, "", std::string(bytes, 'x'), {}}; };
+  EXPECT_EQ(charged(memory, answer(1000)).keep, nullptr);
+  {
+    const net::Response first = charged(memory, answer(600 << 10));
+    EXPECT_EQ(memory->used(MemoryUse::answers), 600u << 10);
+    EXPECT_THROW(charged(memory, answer(600 << 10)), Error);
+    // What has been charged already is not charged again.
+    net::Response encoded = answer(600 << 10);
+    encoded.keep = first.keep;
+    EXPECT_EQ(charged(memory, std::move(encoded)).keep, first.keep);
+  }
+  EXPECT_EQ(memory->used(MemoryUse::answers), 0u);
+}
+
 TEST(Api, ListsAndDescribesDatasets) {
   Api api;
   const json list = json::parse(api.call("GET", "/api/v1/datasets").body);

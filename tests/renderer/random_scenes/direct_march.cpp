@@ -129,27 +129,28 @@ class Marcher {
     return (scene_.crop->regions >> (slab(0) + 3 * slab(1) + 9 * slab(2))) & 1;
   }
 
+  /// One channel at a point, and its share of the radiance.
   struct Classified {
-    double value = 0, extinction = 0;
+    double value = 0, extinction = 0, share = 0;
+    bool isThere = false;
     dvec3 color{0};
   };
-  /// All channels at a point: the blended extinction, and each channel's share of the radiance.
+  /// All channels at a point, and the blended extinction.
   struct Mixture {
     std::vector<Classified> parts;
-    std::vector<double> share;
     double extinction = 0;
   };
   Mixture mixtureAt(const dvec3& p, const Matters& matters, Decisions* decisions) const {
     Mixture mixture;
-    mixture.share.assign(matters.size(), 0);
+    mixture.parts.reserve(matters.size());
     std::size_t largest = 0;
     double sum = 0;
     for (const Matter& m : matters) {
       Classified c;
       c.value = m.at(p, decisions);
-      const bool isThere = std::isfinite(c.value) && isLeft(m.number, p);
-      decisions->note(isThere);
-      if (isThere) {
+      c.isThere = std::isfinite(c.value) && isLeft(m.number, p);
+      decisions->note(c.isThere);
+      if (c.isThere) {
         const double position = m.position(c.value);
         decisions->note(std::uint64_t((position > 0) + (position >= 1)));
         if (m.look->peaks != Peaks::only)
@@ -170,21 +171,21 @@ class Marcher {
     if (!(mixture.extinction > 0)) return mixture;
     for (std::size_t n = 0; n < matters.size(); ++n) {
       if (one && n != largest) continue;
-      mixture.share[n] =
-          mixture.parts[n].extinction / mixture.extinction * (several ? matters[n].look->weight : 1);
+      Classified& part = mixture.parts[n];
+      part.share = part.extinction / mixture.extinction * (several ? matters[n].look->weight : 1);
     }
     return mixture;
   }
 
-  /// On which side of every surface a point is.
-  std::vector<Side> sidesAt(const dvec3& p, const Matters& matters, Decisions* decisions) const {
+  /// On which side of every surface the point of a mixture is.
+  static std::vector<Side> sidesOf(const Mixture& mixture, const Matters& matters, Decisions* decisions) {
     std::vector<Side> sides;
-    for (const Matter& m : matters) {
-      if (m.surfaces.empty()) continue;
-      const double value = m.at(p, decisions);
-      const bool isThere = std::isfinite(value) && isLeft(m.number, p);
-      for (const Matter::Surface& surface : m.surfaces)
-        sides.push_back(!isThere ? Side::neither : value >= surface.value ? Side::above : Side::below);
+    for (std::size_t n = 0; n < matters.size(); ++n) {
+      const Classified& part = mixture.parts[n];
+      for (const Matter::Surface& surface : matters[n].surfaces)
+        sides.push_back(!part.isThere                 ? Side::neither
+                        : part.value >= surface.value ? Side::above
+                                                      : Side::below);
     }
     for (const Side side : sides) decisions->note(std::uint64_t(side));
     return sides;
@@ -209,9 +210,9 @@ class Marcher {
     };
     const auto sampleAt = [&](double t) {
       Decisions decisions;
-      const double extinction = mixtureAt(p + t * direction, matters, &decisions).extinction;
-      std::vector<Side> sides = sidesAt(p + t * direction, matters, &decisions);
-      return PointSample{extinction, dvec3(0), decisions.hash(), std::move(sides)};
+      const Mixture mixture = mixtureAt(p + t * direction, matters, &decisions);
+      std::vector<Side> sides = sidesOf(mixture, matters, &decisions);
+      return PointSample{mixture.extinction, dvec3(0), decisions.hash(), std::move(sides)};
     };
     SteppedMarch march(sampleAt, sampleAt, surfaceAt,
                        {stepOf(direction, 12), 1e-7, density_, 1, kMostShadowSamples});
@@ -309,12 +310,12 @@ class Marcher {
         std::vector<Arriving> lights;
         if (lit) lights = lightsAt(p, false, eye, matters, look, &shadowError);
         for (std::size_t n = 0; n < matters.size(); ++n)
-          if (mixture.share[n] > 0)
-            result.radiance += mixture.share[n] * (lit ? shown(matters[n], mixture.parts[n].color, false, p,
-                                                               -direction, lights, &decisions)
-                                                       : mixture.parts[n].color);
+          if (const Classified& part = mixture.parts[n]; part.share > 0)
+            result.radiance +=
+                part.share *
+                (lit ? shown(matters[n], part.color, false, p, -direction, lights, &decisions) : part.color);
       }
-      result.sides = sidesAt(p, matters, &decisions);
+      result.sides = sidesOf(mixture, matters, &decisions);
       result.decisions = decisions.hash();
       return result;
     };
