@@ -22,7 +22,7 @@ SCOLOPAX := build/release/scolopax
 # Parallel recipes would run .ci/install twice at once; the tools called use all processors by themselves.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: fuzzers run build web test check check-hostile check-asan-ubsan check-tsan check-tidy check-fuzz check-format check-cuda fuzz soak deps test-deps format clean
+.PHONY: fuzzers run build web test check check-bench check-hostile check-asan-ubsan check-tsan check-tidy check-fuzz check-format check-cuda fuzz soak deps test-deps format clean
 
 run: build web $(if $(strip $(DATA)),,$(DEMO))
 	exec $(SCOLOPAX) serve $(if $(strip $(DATA)),$(DATA),$(DEMO)) --port $(PORT)
@@ -49,7 +49,12 @@ check: export SCOLOPAX_STATISTICS := 2
 check: export SCOLOPAX_RANDOM_SCENES := 2000
 check-asan-ubsan: export SCOLOPAX_STATISTICS := 1
 check-asan-ubsan: export SCOLOPAX_RANDOM_SCENES := 20
-check: test check-hostile check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
+check: test check-bench check-hostile check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
+
+# Benchmarks are built for a report only: this shows that they still can be.
+check-bench: test-deps
+	cmake --preset release -DBUILD_TESTING=ON > /dev/null
+	cmake --build --preset release -j $(JOBS) --target bench_rebuild bench_layout bench_peaks
 
 check-hostile: test-deps
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null

@@ -2,7 +2,9 @@
 // Independent pictures of one scene: each has its own seed, which scrambles the low-discrepancy points
 // differently. Their spread shows how large the noise is; agreement.h compares them.
 #pragma once
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -43,8 +45,8 @@ inline Replicates replicate(const std::shared_ptr<const Volume>& volume, Scene s
 }
 
 /// The same pictures from multi-level quadrature through these resolutions of the ladder, the film's first.
-/// Every level has an eighth as many corrections as there are samples. `omitted`, a level's index, is a
-/// defect: that level is left out.
+/// Levels have an eighth to a thirty-second as many corrections as there are samples. `omitted`, a level's
+/// index, is a defect: that level is left out.
 inline Replicates replicateLevels(const std::shared_ptr<const Volume>& volume, Scene scene, Method method,
                                   const std::vector<int>& resolutions,
                                   std::optional<std::size_t> omitted = {}) {
@@ -53,8 +55,10 @@ inline Replicates replicateLevels(const std::shared_ptr<const Volume>& volume, S
   Replicates result{{}, samplesPerReplicate()};
   std::vector<Level> levels;
   for (std::size_t k = 1; k < resolutions.size(); ++k)
-    levels.push_back(
-        {{resolutionAt(resolutions[k]), resolutionAt(resolutions[k - 1]), 1, 0, 0, 0}, 1, 1, 0.125});
+    levels.push_back({{resolutionAt(resolutions[k]), resolutionAt(resolutions[k - 1]), 1, 0, 0, 0},
+                      1,
+                      1,
+                      std::min(0.125, std::ldexp(0.5, -int(k)))});
   if (omitted) levels.erase(levels.begin() + std::ptrdiff_t(*omitted));
   const auto launcher = makeCpuLauncher(0);
   const std::atomic<bool> never = false;

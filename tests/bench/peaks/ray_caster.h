@@ -161,7 +161,7 @@ class RayCaster {
   Sample sampleAt(Path& path, double t) const {
     ++path.counts.samples;
     const glm::vec3 point = pointAt(path, t);
-    const float stored = kernel::sampleStored(channel_, scene_.dims, point);
+    const float stored = kernel::sampleStored<kernel::One>(channel_.field, scene_.dims, point);
     return {t, point, (stored - channel_.origin) * channel_.scale + channel_.offset};
   }
 
