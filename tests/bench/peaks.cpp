@@ -5,9 +5,10 @@
 // SETTINGS is {"repetitions": N, "settings": [...]}. Each setting has a method (postclassified,
 // preintegrated, or one of the renderer's) and, as far as they apply, step (smallest spacings) or footprints
 // (s_k), peaks (off, both, only; of the paper's methods also either), most (peaks of a segment), table
-// (entries per edge), adaptive (rates by macrocell), samples, truth (a reference picture, which may be
-// smaller by an odd factor), picture (a file to write). Prints one JSON object for each: seconds is the
-// median of the repetitions, and null without.
+// (entries per edge), adaptive (what longer steps follow: variance or bounds of macrocells, opacity, or
+// gradient), tolerance (of bounds and of gradient), opaque (transmittance at which rays end), samples, truth
+// (a reference picture, which may be smaller by an odd factor), picture (a file to write). Prints one JSON
+// object for each: seconds is the median of the repetitions, and null without.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -133,11 +134,19 @@ Drawn drawPaper(const json& setting, const Data& data) {
                   std::min(setting.value("most", 4), peaks::PeakTable::kMost));
   drawn.prepareSeconds = secondsSince(begin);
   std::vector<int> rates;
-  const bool adaptive = setting.value("adaptive", false);
-  if (adaptive) rates = peaks::cellRates(data.volume->channels()[0], grid.dims, scene.macrocell);
+  const std::string adaptive = setting.value("adaptive", "");
+  const double tolerance = setting.value("tolerance", 0.0);
+  if (adaptive == "variance")
+    rates = peaks::cellRates(data.volume->channels()[0], grid.dims, scene.macrocell);
+  else if (adaptive == "bounds")
+    rates = peaks::boundedRates(data.volume->channels()[0], grid, scene.macrocell, appearance,
+                                setting.value("step", 1.0) * grid.smallestSpacing(), tolerance);
+  else if (adaptive != "" && adaptive != "opacity" && adaptive != "gradient")
+    fail("adaptive: expected variance, bounds, opacity or gradient");
   castRays(peaks::RayCaster({view, lawOf(setting, scene, grid), means ? &*means : nullptr,
-                             found ? &*found : nullptr, mode, adaptive ? &rates : nullptr,
-                             float(kOpaqueTransmittance)}),
+                             found ? &*found : nullptr, mode, rates.empty() ? nullptr : &rates,
+                             float(setting.value("opaque", kOpaqueTransmittance)), adaptive == "opacity",
+                             adaptive == "gradient" ? float(tolerance) : 0.0f}),
            drawn);
   return drawn;
 }

@@ -198,7 +198,7 @@ def table1(bench, volumes):
     found = []
     step = footprints(bench.side)
     settings = [post("postclassification", **step), preintegrated(256, **step), post("peak finding", "either", **step),
-                post("peak finding, rates by macrocell", "either", adaptive=True, **step), marched("raymarch, both", "both"),
+                post("peak finding, rates by macrocell", "either", adaptive="variance", **step), marched("raymarch, both", "both"),
                 automatic("auto, both", "both")]
     for volume, files in volumes.items():
         for view in ("far", "close"):
@@ -206,6 +206,22 @@ def table1(bench, volumes):
                 rows = measure(bench, f"table 1, {volume}, {view}", files, scene(volume, bench.side, view=view), settings)
                 found.append({"volume": volume, "view": view, "rows": rows})
     return found
+
+
+def adaptive(bench, volumes):
+    """Steps that follow the data or the ray, on a smooth curve, with preintegration: what classification loses does not
+    count. All are multiples of a quarter of a voxel."""
+    steps = (4, 1, 0.25) if bench.quick else (8, 4, 2, 1, 0.5, 0.25)
+    switches = {"variance": (0,), "bounds": (1e-2,) if bench.quick else (1e-1, 1e-2, 1e-3, 1e-4), "opacity": (0,),
+                "gradient": (0.03,) if bench.quick else (0.1, 0.03, 0.01, 0.003)}
+    settings = [{**preintegrated(1024, step=step), "name": "uniform"} for step in steps]
+    settings += [{**preintegrated(1024, adaptive=by, tolerance=value, step=0.25), "name": f"by {by}" + (f", {value:g}" if value else "")}
+                 for by, values in switches.items() for value in values]
+    settings += [{**preintegrated(1024, opaque=opaque, step=0.25), "name": f"rays end at {opaque:g}"} for opaque in (0.05, 0.01)]
+    settings += [{**marched("raymarch, whole cells", "off"), "step": 0}, automatic("auto", "off")]
+    return [{"volume": volume, "rows": measure(bench, f"adaptive steps, {volume}", files,
+                                               scene(volume, bench.side, [], smooth=0.2, shading=False), settings)}
+            for volume, files in volumes.items()]
 
 
 def surfaces(bench):
@@ -218,4 +234,5 @@ def surfaces(bench):
         sys.exit("surfaces: there is none of the volumes")
     return {"figure3": figure3(bench, volumes), "spikes": spikes(bench, volumes), "figure4": figure4(bench, volumes),
             "figure5": figure5(bench, volumes), "figure6": sampling(bench, volumes, "close", ("bonsai", "engine")),
-            "figure7": sampling(bench, volumes, "far", ("bonsai", "embryo")), "table1": table1(bench, volumes)}
+            "figure7": sampling(bench, volumes, "far", ("bonsai", "embryo")), "table1": table1(bench, volumes),
+            "adaptive": adaptive(bench, volumes)}

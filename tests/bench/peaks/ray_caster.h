@@ -28,8 +28,10 @@ struct Casting {
   const PreintegratedTable* means;  ///< null: postclassification
   const PeakTable* peaks;           ///< unused with Mode::off
   Mode mode;
-  const std::vector<int>* rates;  ///< of macrocells (cellRates); null: 1
+  const std::vector<int>* rates;  ///< of macrocells (cell_rates.h); null: 1
   float opaque;                   ///< transmittance at which rays end
+  bool growing;                   ///< steps grow as a ray's light is absorbed
+  float even;                     ///< steps double, up to 8 at once, while positions change by less; 0: never
 };
 
 class RayCaster {
@@ -70,6 +72,7 @@ class RayCaster {
     Counts& counts;
     std::int64_t next = 0;         ///< number of the first sample that has not been passed
     std::int64_t lastNumber = -1;  ///< of `last`
+    int stride = 1;
     Sample last{};
     glm::vec3 color{0};
     float transmittance = 1;
@@ -85,8 +88,13 @@ class RayCaster {
     path.next = std::max(path.next, first);
     while (path.next < end && !ended(path)) {
       const std::int64_t from = path.next;
-      path.next = std::min(from + rate, end);
+      const float before = path.last.position;
+      std::int64_t steps = std::int64_t(rate) * path.stride;
+      if (c_.growing) steps = std::int64_t(float(steps) / std::sqrt(std::sqrt(path.transmittance)));
+      path.next = std::min(from + steps, end);
       crossSegment(path, from, path.next);
+      const bool isEven = path.lastNumber == path.next && std::abs(path.last.position - before) < c_.even;
+      path.stride = isEven ? std::min(2 * path.stride, 8) : 1;
     }
   }
 
