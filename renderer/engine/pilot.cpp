@@ -32,8 +32,9 @@ constexpr double kBiasLeft = 1e-3;
 /// Thumbnails at the first resolutions of the ladder.
 class Ladder {
  public:
-  /// Leaves out resolutions with steps below `leastStep`; there are always whole voxel cells.
-  Ladder(Thumbnails& thumbnails, double leastStep) : leastStep_(leastStep) {
+  /// Begins at resolution number `first`, and leaves out those with steps below `leastStep`; there are always
+  /// whole voxel cells.
+  Ladder(Thumbnails& thumbnails, int first, double leastStep) : leastStep_(leastStep), next_(first) {
     while (next_ <= kFinestThumbnail) render(thumbnails);
     // In dense matter, halves of voxel cells may differ from whole ones, and finer parts from those as much.
     if (isRough()) render(thumbnails);
@@ -93,7 +94,7 @@ class Ladder {
 
   std::vector<Pictures> pictures_;
   double leastStep_;
-  int next_ = 0;  // resolution after those of the thumbnails
+  int next_;  // resolution after those of the thumbnails
 };
 
 /// The resolutions through which a film is corrected, the base first, and the work that they need: the square
@@ -134,7 +135,8 @@ AutomaticChoice chooseAutomatically(Launcher& launcher, const RenderPlan& plan, 
   Thumbnails thumbnails(launcher, plan, quadrature, true, stop);
   // A march has at most 2^16 steps.
   const double leastStep = plan.grid().diagonal() / double(plan.view().smallestSpacing) * 0x1p-16;
-  const Ladder ladder(thumbnails, leastStep);
+  // Equal steps between the faces of nearest voxels are whole cells, or parts of them.
+  const Ladder ladder(thumbnails, plan.view().nearest ? kEqualSteps : 0, leastStep);
   const Path path = cheapestPath(ladder);
 
   const int base = path.resolutions.front();

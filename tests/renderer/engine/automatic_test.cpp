@@ -92,6 +92,16 @@ TEST(Automatic, WorksOutLightAtFewPlacesWhereThereAreShadows) {
   EXPECT_EQ(chosen(volume, scene).method, Method::hybrid);
 }
 
+TEST(Automatic, TriesNoStepsThatFacesOfNearestVoxelsCutAnyway) {
+  const auto volume = orbitals();
+  Scene scene = automaticScene(*volume);
+  const auto launcher = makeCpuLauncher(0);
+  const auto raysOf = [&] { return chooseAutomatically(*launcher, RenderPlan(volume, scene)).rays; };
+  const std::uint64_t before = raysOf();
+  for (ChannelAppearance& channel : scene.channels) channel.interpolation = Interpolation::nearest;
+  EXPECT_LT(2 * raysOf(), before);
+}
+
 TEST(Automatic, DependsOnSceneAndDataAlone) {
   const auto volume = orbitals();
   const Scene scene = automaticScene(*volume);
