@@ -12,7 +12,7 @@ template <class L, class View>
 SCOLOPAX_LANES typename L::Float coordinateOn(const SegmentEnds<L, View>& ends, int n,
                                               typename L::Float place) {
   const auto p = ends.from[n].position, q = ends.to[n].position;
-  const auto known = p == p, other = q == q;
+  const auto known = isFinite(p), other = isFinite(q);
   const auto from = select(known, p, q);
   return from + place * (select(other, q, p) - from);
 }

@@ -143,7 +143,7 @@ SCOLOPAX_LANES typename L::Float extinctionOn(const View& scene, const SegmentEn
                                               typename L::Float opacity) {
   const ChannelView& channel = scene.channels[n];
   const auto p = ends.from[n].position, q = ends.to[n].position;
-  typename L::Float extinction = where((p == p) | (q == q), opacity * channel.density);
+  typename L::Float extinction = where(isFinite(p) | isFinite(q), opacity * channel.density);
   if (scene.hasFactor(n)) [[unlikely]]
     multiplyByFactor<L>(channel, ends, n, place, which, &extinction);
   return extinction;
