@@ -32,7 +32,7 @@ SCOLOPAX_LANES Cubic<L> partOf(const Cubic<L>& f, typename L::Float middle, type
 
 /// Where a cubic is sampled: inside the interval, as the voxels at its ends belong to two cells.
 inline constexpr int kCubicNodes = 4;
-inline constexpr float kCubicNode[kCubicNodes] = {-0.75f, -0.25f, 0.25f, 0.75f};
+SCOLOPAX_HD constexpr float cubicNode(int i) { return 0.5f * float(i) - 0.75f; }
 
 /// The cubic with the given values at the nodes.
 template <class L>

@@ -158,7 +158,7 @@ SCOLOPAX_LANES void sampleCubics(const SceneView& scene, const RayOf<L>& rays, s
   const CellPlaces<L> cell(scene.dims, centre);
   Vec points[kCubicNodes], places[kCubicNodes];
   for (int i = 0; i < kCubicNodes; ++i) {
-    points[i] = rays.origin + (middle + half * kCubicNode[i]) * rays.direction;
+    points[i] = rays.origin + (middle + half * cubicNode(i)) * rays.direction;
     places[i] = cell.of(points[i]);
   }
   for (std::uint32_t left = channels; left != 0; left &= left - 1) {

@@ -35,7 +35,7 @@ DoubleCubic anyCubic(Draw& draw) {
 Cubic<One> sampled(const DoubleCubic& f, double scale = 1, double offset = 0) {
   float values[kernel::kCubicNodes];
   for (int i = 0; i < kernel::kCubicNodes; ++i)
-    values[i] = float((f.at(double(kernel::kCubicNode[i])) - offset) / scale);
+    values[i] = float((f.at(double(kernel::cubicNode(i))) - offset) / scale);
   return kernel::cubicThrough<One>(values);
 }
 
