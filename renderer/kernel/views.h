@@ -174,7 +174,7 @@ struct SceneView {
   static constexpr int kFactors = kMaxVisibleChannels;  ///< channels that may have one: length of arrays
   /// Whether the opacity of channel n depends on the gradient.
   SCOLOPAX_HD bool hasFactor(int n) const { return channels[n].factor.curve.count != 0; }
-  /// Between nearest voxels there are no values, so that only cuts where they change are right.
+  /// Whether quadrature cuts rays at the faces of voxel cells. It must for nearest voxels, where fields jump.
   SCOLOPAX_HD bool cutsAtVoxels() const { return voxelwise || nearest; }
   /// Kernels for devices are compiled without surfaces and filters.
 #if defined(__CUDA_ARCH__)

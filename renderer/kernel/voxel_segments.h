@@ -58,10 +58,11 @@ class VoxelSegments {
     return any(wants_ & (walk_.more() | (to_ < 1.0f)));
   }
 
-  /// Shortens segments whose optical depth is above `most`, because they hide much of their own far end; less
-  /// where only a share `left` of their light is seen. Errors are of third order in a segment's depth: with
-  /// depths proportional to the cube root of 1 / left, a ray has the least error for its number of segments,
-  /// and with the fourth root almost that. Returns false, and changes nothing, if there are none.
+  /// Shortens segments whose optical depth is above `most`, because they hide much of their own far end.
+  /// Where the transmittance in front of a segment is `left`, it may be deeper by the fourth root of 1 /
+  /// left: the error of a segment is of third order in its depth, so that the cube root would give the least
+  /// error for a number of segments; the fourth root is almost as good and needs no power(). Returns false,
+  /// and changes nothing, if no segment is too deep.
   SCOLOPAX_LANES bool shorten(Segment<L>& segment, Float depth, Float left, float most) {
     Mask thick = live_ & (depth > most) & (way_ > kShortest);
     if (!any(thick)) return false;

@@ -72,7 +72,7 @@ class RayCaster {
     Counts& counts;
     std::int64_t next = 0;         ///< number of the first sample that has not been passed
     std::int64_t lastNumber = -1;  ///< of `last`
-    int stride = 1;
+    int stride = 1;                ///< steps at once, by `even`
     Sample last{};
     glm::vec3 color{0};
     float transmittance = 1;
