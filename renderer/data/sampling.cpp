@@ -2,6 +2,7 @@
 #include "renderer/data/sampling.h"
 
 #include <array>
+#include <iterator>
 
 namespace scolopax {
 namespace {
@@ -10,11 +11,25 @@ namespace {
 struct Polynomial {
   int degree;
   std::uint32_t inner;
-  std::uint32_t m[5];
+  std::uint32_t m[6];
 };
-constexpr Polynomial kPolynomials[] = {
-    {1, 0, {1}},          {2, 1, {1, 3}},        {3, 1, {1, 3, 1}},        {3, 2, {1, 1, 1}},
-    {4, 1, {1, 1, 3, 3}}, {4, 4, {1, 3, 5, 13}}, {5, 2, {1, 1, 5, 5, 17}}, {5, 4, {1, 1, 5, 5, 5}}};
+constexpr Polynomial kPolynomials[] = {{1, 0, {1}},
+                                       {2, 1, {1, 3}},
+                                       {3, 1, {1, 3, 1}},
+                                       {3, 2, {1, 1, 1}},
+                                       {4, 1, {1, 1, 3, 3}},
+                                       {4, 4, {1, 3, 5, 13}},
+                                       {5, 2, {1, 1, 5, 5, 17}},
+                                       {5, 4, {1, 1, 5, 5, 5}},
+                                       {5, 7, {1, 1, 7, 11, 19}},
+                                       {5, 11, {1, 1, 5, 1, 1}},
+                                       {5, 13, {1, 1, 1, 3, 11}},
+                                       {5, 14, {1, 3, 5, 5, 31}},
+                                       {6, 1, {1, 3, 3, 9, 7, 49}},
+                                       {6, 13, {1, 1, 1, 15, 21, 21}},
+                                       {6, 16, {1, 3, 1, 13, 27, 49}},
+                                       {6, 19, {1, 1, 1, 15, 7, 5}},
+                                       {6, 22, {1, 3, 1, 15, 13, 25}}};
 static_assert(std::size(kPolynomials) + 1 == kSobolDimensions);
 
 /// What bit k of the index contributes to each coordinate, by exclusive or.
@@ -40,8 +55,10 @@ constexpr Columns kColumns = [] {
 }();
 
 /// The dimensions of the sequence for the words of each block. The best ones go where most depends on them:
-/// to the position in the pixel, then to the first collision.
-constexpr int kDimensions[kernel::kLowDiscrepancyBlocks][3] = {{0, 1, 8}, {2, 3, 4}, {5, 6, 7}};
+/// to the position in the pixel, then to the first collision. The other sampler's words are the places and
+/// jitters of lit strata.
+constexpr int kDimensions[][3] = {{0, 1, 8}, {2, 3, 4}, {5, 6, 7}, {9, 10, 11}, {12, 13, 14}, {15, 16, 17}};
+static_assert(3 * std::size(kDimensions) == kSobolDimensions);
 
 }  // namespace
 
@@ -54,7 +71,7 @@ std::uint32_t sobol(int dimension, std::uint32_t index) {
 
 kernel::SampleNumber sampleNumber(Sampling sampling, std::uint32_t sample) {
   kernel::SampleNumber number{sample, sampling == Sampling::lowDiscrepancy, {}};
-  for (std::uint32_t block = 0; block < kernel::kLowDiscrepancyBlocks; ++block)
+  for (std::size_t block = 0; block < std::size(kDimensions); ++block)
     for (int i = 0; i < 3; ++i)
       number.point[block][i] =
           kernel::reverseBits(sobol(kDimensions[block][i], sample / kernel::kScramblings));

@@ -8,7 +8,8 @@
 
 namespace scolopax {
 
-inline constexpr int kSobolDimensions = 3 * int(kernel::kLowDiscrepancyBlocks);
+inline constexpr int kSobolDimensions =
+    3 * int(kernel::kLowDiscrepancySamplers * kernel::kLowDiscrepancyBlocks);
 
 /// Coordinate `dimension` (below kSobolDimensions) of point `index` of the Sobol sequence, times 2^32;
 /// direction numbers of Joe and Kuo, "Constructing Sobol sequences with better two-dimensional projections",

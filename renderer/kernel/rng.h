@@ -46,8 +46,10 @@ SCOLOPAX_LANES Word hashOf(Word x) {
   return x ^ right<16>(x);
 }
 
-/// Number of leading blocks of a sample whose words x, y, z come from a Sobol sequence.
+/// Number of leading blocks of a sampler whose words x, y, z come from a Sobol sequence.
 inline constexpr std::uint32_t kLowDiscrepancyBlocks = 3;
+/// Samplers of a sample with such blocks: the one that places and follows its ray, and that of aside().
+inline constexpr std::uint32_t kLowDiscrepancySamplers = 2;
 /// Samples of a pixel alternate between this many scramblings. The halves of a pixel's samples are thus
 /// independent of each other, so that their difference tells the error of the picture.
 inline constexpr std::uint32_t kScramblings = 2;
@@ -56,8 +58,10 @@ inline constexpr std::uint32_t kScramblings = 2;
 struct SampleNumber {
   std::uint32_t sample;
   bool lowDiscrepancy;  ///< false: all draws are independent
-  /// Point sample / kScramblings of the Sobol sequence, with the bits of each coordinate reversed.
-  std::uint32_t point[kLowDiscrepancyBlocks][3];
+  /// Point sample / kScramblings of the Sobol sequence, with the bits of each coordinate reversed. No two
+  /// numbers of a sample use the same coordinate: scrambled differently, they would still depend on each
+  /// other.
+  std::uint32_t point[kLowDiscrepancySamplers * kLowDiscrepancyBlocks][3];
 };
 
 template <class Word>
@@ -107,7 +111,7 @@ class SamplerOf {
     // Samples stay below 2^31, so no other draw has this counter.
     const Word half(0x80000000u | (number_.sample % kScramblings));
     const Block scrambling = pcg4d(pixel_, half, block, Word(seed_));
-    const Word row = minimum(block, Word(kLowDiscrepancyBlocks - 1)) * 3u;
+    const Word row = (minimum(block, Word(kLowDiscrepancyBlocks - 1)) + Word(firstRow_)) * 3u;
     return {select(low, owenScramble(gather(&number_.point[0][0], row), scrambling.x), random.x),
             select(low, owenScramble(gather(&number_.point[0][1], row), scrambling.y), random.y),
             select(low, owenScramble(gather(&number_.point[0][2], row), scrambling.z), random.z),
@@ -116,13 +120,19 @@ class SamplerOf {
   /// Number of blocks that next() has returned.
   SCOLOPAX_LANES Word blocks() const { return block_; }
   SCOLOPAX_LANES void skipTo(Word block) { block_ = block; }
-  /// A sampler with other numbers, for a purpose whose draws must not change these. Pixels stay below 2^31.
-  SCOLOPAX_LANES SamplerOf aside() const { return SamplerOf(pixel_ | Word(0x80000000u), number_, seed_); }
+  /// A sampler with other numbers, independent of these, for a purpose whose draws must not change them.
+  /// Pixels stay below 2^31.
+  SCOLOPAX_LANES SamplerOf aside() const {
+    SamplerOf other(pixel_ | Word(0x80000000u), number_, seed_);
+    other.firstRow_ = kLowDiscrepancyBlocks;
+    return other;
+  }
 
  private:
   const SampleNumber& number_;
   Word pixel_;
   std::uint32_t seed_;
+  std::uint32_t firstRow_ = 0;  // of SampleNumber::point
   Word block_{0u};
 };
 using Sampler = SamplerOf<One>;

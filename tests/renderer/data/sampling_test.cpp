@@ -16,15 +16,18 @@ using kernel::kScramblings;
 using kernel::RandomBlock;
 using kernel::Sampler;
 
-/// The words of the first blocks of one sample of one pixel.
+constexpr std::size_t kWords = kSobolDimensions;
+
+/// The words of the first blocks of one sample of one pixel, and of its sampler aside().
 std::vector<std::uint32_t> words(std::uint32_t pixel, std::uint32_t sample, std::uint32_t seed = 7) {
   const kernel::SampleNumber number = sampleNumber(Sampling::lowDiscrepancy, sample);
-  Sampler sampler(pixel, number, seed);
+  const Sampler sampler(pixel, number, seed);
   std::vector<std::uint32_t> all;
-  for (std::uint32_t block = 0; block < kernel::kLowDiscrepancyBlocks; ++block) {
-    const RandomBlock random = sampler.next();
-    all.insert(all.end(), {random.x, random.y, random.z});
-  }
+  for (const Sampler& each : {sampler, sampler.aside()})
+    for (std::uint32_t block = 0; block < kernel::kLowDiscrepancyBlocks; ++block) {
+      const RandomBlock random = each.at(block);
+      all.insert(all.end(), {random.x, random.y, random.z});
+    }
   return all;
 }
 
@@ -48,11 +51,11 @@ TEST(Sobol, EveryCoordinateVisitsEveryInterval) {
 }
 
 TEST(Sobol, CoordinatesAreNotCopiesOfEachOther) {
-  // Two dimensions with the same polynomial or m_i would lie on a line; these fill cells of 1/16.
+  // Two dimensions with the same polynomial or m_i would lie on a line; these fill all cells of 1/16.
   for (int a = 0; a < kSobolDimensions; ++a)
     for (int b = 0; b < a; ++b) {
       std::map<std::uint32_t, int> cells;
-      for (std::uint32_t i = 0; i < 1024; ++i) ++cells[(sobol(a, i) >> 28) * 16 + (sobol(b, i) >> 28)];
+      for (std::uint32_t i = 0; i < 4096; ++i) ++cells[(sobol(a, i) >> 28) * 16 + (sobol(b, i) >> 28)];
       EXPECT_EQ(cells.size(), 256u) << a << " and " << b;
     }
 }
@@ -63,7 +66,7 @@ TEST(Sampling, SpreadsEveryWordOfEachHalfEvenly) {
   for (const std::uint32_t pixel : {0u, 1u, 99999u})
     for (const std::uint32_t half : {0u, 1u})
       for (const std::uint32_t first : {0u, 64u, 320000u}) {
-        std::vector<std::vector<int>> counts(9, std::vector<int>(64));
+        std::vector<std::vector<int>> counts(kWords, std::vector<int>(64));
         std::vector<int> places(64);
         for (std::uint32_t i = 0; i < 64; ++i) {
           const auto w = words(pixel, kScramblings * (first + i) + half);
@@ -77,7 +80,7 @@ TEST(Sampling, SpreadsEveryWordOfEachHalfEvenly) {
 }
 
 TEST(Sampling, GoesOnToSpreadEvenlyAsSamplesGrow) {
-  std::vector<std::vector<int>> counts(9, std::vector<int>(4096));
+  std::vector<std::vector<int>> counts(kWords, std::vector<int>(4096));
   for (std::uint32_t i = 0; i < 4096; ++i) {
     const auto w = words(7, kScramblings * i);
     for (std::size_t d = 0; d < w.size(); ++d) ++counts[d][w[d] >> 20];
@@ -87,10 +90,10 @@ TEST(Sampling, GoesOnToSpreadEvenlyAsSamplesGrow) {
 
 TEST(Sampling, LeavesEverySampleUniform) {
   // Over pixels, and over seeds of one pixel, the word of a fixed sample is uniform; this makes the estimator
-  // unbiased. Chi-square with 255 degrees of freedom exceeds 347 with probability 1e-4; 36 tables.
+  // unbiased. Chi-square with 255 degrees of freedom exceeds 347 with probability 1e-4; 72 tables.
   for (const std::uint32_t sample : {0u, 37u})
     for (const bool overPixels : {true, false}) {
-      std::vector<std::vector<int>> counts(9, std::vector<int>(256));
+      std::vector<std::vector<int>> counts(kWords, std::vector<int>(256));
       constexpr int kDraws = 1 << 15;
       for (std::uint32_t i = 0; i < kDraws; ++i) {
         const auto w = overPixels ? words(i, sample) : words(3, sample, i);
@@ -114,21 +117,37 @@ double correlation(const std::vector<std::uint32_t>& a, const std::vector<std::u
 
 TEST(Sampling, IsIndependentBetweenPixelsHalvesSeedsAndWords) {
   constexpr std::uint32_t kDraws = 1 << 14;
-  const double limit = 5.0 / std::sqrt(double(kDraws));  // 5 sigma: 6e-7 each, 36 comparisons
-  for (std::size_t d = 0; d < 9; ++d) {
+  const double limit = 5.0 / std::sqrt(double(kDraws));  // 5 sigma: 6e-7 each, 72 comparisons
+  for (std::size_t d = 0; d < kWords; ++d) {
     std::vector<std::uint32_t> here, right, otherHalf, otherSeed, otherWord;
     for (std::uint32_t i = 0; i < kDraws; ++i) {
       here.push_back(words(2 * i, 5)[d]);
       right.push_back(words(2 * i + 1, 5)[d]);
       otherHalf.push_back(words(2 * i, 4)[d]);
       otherSeed.push_back(words(2 * i, 5, 8)[d]);
-      otherWord.push_back(words(2 * i, 5)[(d + 1) % 9]);
+      otherWord.push_back(words(2 * i, 5)[(d + 1) % kWords]);
     }
     EXPECT_LT(std::abs(correlation(here, right)), limit) << "word " << d;
     EXPECT_LT(std::abs(correlation(here, otherHalf)), limit) << "word " << d;
     EXPECT_LT(std::abs(correlation(here, otherSeed)), limit) << "word " << d;
     EXPECT_LT(std::abs(correlation(here, otherWord)), limit) << "word " << d;
   }
+}
+
+TEST(Sampling, LetsNoWordDependOnAnother) {
+  // Two words that are scramblings of one coordinate fill only some of the cells, however many samples there
+  // are, so that a picture of both would converge to a wrong one.
+  for (const std::uint32_t pixel : {0u, 99999u})
+    for (const std::uint32_t seed : {7u, 8u}) {
+      std::vector<std::vector<std::uint32_t>> draws;
+      for (std::uint32_t i = 0; i < 4096; ++i) draws.push_back(words(pixel, kScramblings * i, seed));
+      for (std::size_t a = 0; a < kWords; ++a)
+        for (std::size_t b = 0; b < a; ++b) {
+          std::map<std::uint32_t, int> cells;
+          for (const auto& w : draws) ++cells[(w[a] >> 29) * 8 + (w[b] >> 29)];
+          EXPECT_EQ(cells.size(), 64u) << a << " and " << b << ", pixel " << pixel;
+        }
+    }
 }
 
 TEST(Sampling, OfIndependentDrawsIsPlainCounting) {

@@ -18,6 +18,45 @@ constexpr Method kMethods[] = {Method::superposed, Method::cumulative, Method::s
                                Method::nDda,       Method::raymarch,   Method::hybrid};
 const glm::dvec3 kColor(0.8, 0.4, 0.2);
 
+/// A slab half of which is in the shadow of a wall, and whose silhouette halves the only pixel.
+struct HalfShadow {
+  std::shared_ptr<const Volume> volume;
+  Scene scene;
+  HalfShadow() {
+    const glm::ivec3 dims(24, 8, 20);
+    volume = volumeOf(gridOf(dims),
+                      channelOf<std::uint8_t>(
+                          dims, [](int x, int, int z) { return x >= 12 && x < 20 && z >= 5 && z < 15; }),
+                      channelOf<std::uint8_t>(dims, [](int x, int, int z) { return x < 2 && z >= 10; }));
+    scene = frontScene(*volume, 1, 1);
+    scene.camera.orthoHeight = 4;
+    scene.channels = {ramp(0, 1, 0.013), ramp(0, 1, 1e4)};
+    scene.lights = {{LightType::directional, {1, 0, 0}, glm::dvec3(1), 1}};
+    scene.shadows = true;
+  }
+};
+
+TEST(Light, InAPixelThatIsPartlyCoveredIsThatOfItsWholeArea) {
+  // The place in the pixel and the places that are lit must not depend on each other. Where they do, every
+  // seed converges to a picture of its own: some see the lit half of the slab only, and some the other.
+  const HalfShadow half;
+  const auto expected = reference::renderReference(*half.volume, half.scene, 48);
+  const double color = double(expected.image.pixels[0].r), alpha = double(expected.image.pixels[0].a);
+  ASSERT_GT(alpha, 0.03);
+  ASSERT_LT(alpha, 0.1);
+  for (const Method method : {Method::raymarch, Method::hybrid})
+    for (std::uint32_t seed = 0; seed < 8; ++seed) {
+      Scene scene = half.scene;
+      scene.method = method;
+      scene.step = 0.125;
+      scene.seed = seed;
+      const glm::vec4 found = renderSamples(half.volume, scene, 4096).pixels[0];
+      EXPECT_NEAR(double(found.a), alpha, 0.005 * alpha) << nameOf(method) << " seed " << seed;
+      // Independent samples would have a standard error of 0.7 alpha sqrt(1/8) / 64 = 0.004 alpha.
+      EXPECT_NEAR(double(found.r), color, 0.02 * alpha) << nameOf(method) << " seed " << seed;
+    }
+}
+
 /// A field of value dot(a, voxel) over the range [0, range], seen along +z with parallel rays.
 struct LinearField {
   glm::dvec3 a{0, 0, 1};
