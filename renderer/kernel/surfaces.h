@@ -52,9 +52,12 @@ class SurfaceWalk {
         channels_(channels),
         start_(start),
         cost_(cost),
-        walk_(scene, scene.surfaceCells, rays, inside, Word(channels), kInfinity, cost),
+        walk_(scene, scene.surfaceCells, rays, inside, Word(channels), longestIn(scene), cost),
         hit_{Float(kInfinity), Float(0.0f), Vec(0.0f), {Int(-1), Float(0.0f)}} {
     inCell_ = without(L::everywhere(), L::everywhere());
+    const glm::vec3 diagonal = scene.worldFromVoxel * glm::vec3(scene.dims);
+    const float extent = squareRoot(dot(diagonal, diagonal));
+    unit_ = maximum(scene.smallestSpacing * maximum(1.0f, extent * kFine), inside.enter * kFine);
     if (scene.hasNearest()) face_ = endOfFace();
   }
 
@@ -81,12 +84,22 @@ class SurfaceWalk {
   SCOLOPAX_LANES const SurfaceHit<L>& hit() const { return hit_; }
 
  private:
-  // Distances, in smallest spacings. Where a ray begins within rounding of a value, its side is the one on
-  // which it is kSoon further along.
-  // Where it begins at a surface, others within kSamePlace along the ray are taken to be at the same place.
-  // Parts of a ray that are shorter than kLevel are not level. Each is a few times the next, and the last one
-  // is above the rounding of points.
-  static constexpr float kSoon = 0x1p-9f, kLevel = 0x1p-11f, kSamePlace = 0x1p-13f;
+  // Distances, in units: a unit is the smallest spacing, but not less than kFine times the volume's extent or
+  // the distance to the eye. If a ray begins within rounding of a value, its side is the one on which it is
+  // kSoon further along. If it begins at a surface, others within kSamePlace along the ray are taken to be at
+  // the same place. Parts of a ray that are shorter than kLevel are not level. Each is a few times the next,
+  // and the last one is above the rounding of points.
+  static constexpr float kSoon = 0x1p-9f, kLevel = 0x1p-11f, kSamePlace = 0x1p-13f, kFine = 0x1p-10f;
+
+  /// Longest part of a ray on which scalars are taken to be cubics, in world units. The cubic B-spline is of
+  /// degree 9 in a cell: parts of 1/8 spacing are within 4e-5 of the voxels' differences even where voxels
+  /// alternate.
+  SCOLOPAX_LANES static float longestIn(const SceneView& scene) {
+    for (int n = 0; n < scene.channelCount; ++n)
+      if (scene.channels[n].surfaceCount > 0 && scene.channels[n].field.has(Filter::cubic))
+        return scene.smallestSpacing * 0.125f;
+    return kInfinity;
+  }
 
   /// Rounding error of the cubic's values: of interpolation between stored values, of the fit, and of where
   /// the ray meets the faces of cells.
@@ -129,7 +142,7 @@ class SurfaceWalk {
     const Mask first = without(finite, (known_ & bit) == bit);
     if (!any(first)) return;
     const Float atBegin = f.at(Float(-1.0f)), length = walk_.end() - walk_.start();
-    const float way = scene_.smallestSpacing * kSoon;
+    const Float way = unit_ * kSoon;
     Float soon = f.at(minimum(2.0f * way / length - 1.0f, 0.0f)), slack = slackOf(channel, boundsOf(f));
     const Mask starts = first & (start_.channel > Int(-1)) & (walk_.start() == enter_);
     const Mask brief = starts | (first & (length < way));  // the cell may be too short to tell
@@ -210,7 +223,7 @@ class SurfaceWalk {
                                      Mask above, Mask which, Float none) const {
     const Float ends[] = {turns.first, turns.second, Float(1.0f)};
     const Float half = 0.5f * (walk_.end() - walk_.start());
-    const float least = scene_.smallestSpacing * kLevel;
+    const Float least = unit_ * kLevel;
     Float begin = from_, atBegin = f.at(begin), low = begin, high = begin;
     Mask open = which, found = without(which, which), flat = found;
     for (const Float& end : ends) {
@@ -277,7 +290,7 @@ class SurfaceWalk {
 
   const SceneView& scene_;
   const RayOf<L>& rays_;
-  Float enter_, face_{0.0f};
+  Float enter_, unit_, face_{0.0f};
   std::uint32_t channels_;
   SurfaceStart<L> start_;
   CostOf<L>* cost_;

@@ -60,6 +60,65 @@ TEST(Surfaces, AreMetOnceInCellsOfAnySize) {
   }
 }
 
+TEST(Surfaces, OfSplinesAreMetOnTheSpline) {
+  // Between voxels that alternate, a cubic through four points of a cell is far off: it would meet a surface
+  // at 134, which the spline, below 132.2, does not reach.
+  const glm::ivec3 dims(12);
+  const auto checkers = [](int x, int y, int z) { return 255 * ((x + y + z) % 2); };
+  const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, checkers));
+  Scene scene = viewFrom(*volume, {-20, -17, -23}, {5.5, 5.5, 5.5}, 20, 24);
+  scene.crop = Crop{};
+  scene.crop->low = glm::dvec3(1.5);
+  scene.crop->high = glm::dvec3(9.5);
+  scene.channels = {surfaces({{134, 1, kRed}})};
+  scene.channels[0].interpolation = Interpolation::cubic;
+  scene.filter = PixelFilter::point;
+  scene.method = Method::raymarch;
+  scene.step = 0;
+  for (const glm::vec4& pixel : renderSamples(volume, scene, 1).pixels) EXPECT_EQ(pixel.a, 0);
+
+  scene.crop.reset();
+  for (const double value : {129.0, 125.3}) {
+    scene.channels[0].isovalues = {{value, 0.4, kRed}};
+    expectSame(volume, scene, 12);
+  }
+  const glm::ivec3 size(9, 8, 10);
+  const auto smooth = volumeOf(gridOf(size, {1, 0.6, 1.4}), channelOf<float>(size, lumps()));
+  scene = viewFrom(*smooth, {-9, -12, -20}, {4, 2, 6}, 30, 32);
+  scene.channels = {surfaces({{0.5, 0.3, kRed}, {0.7, 0.5, kGreen}})};
+  scene.channels[0].interpolation = Interpolation::cubic;
+  expectSame(smooth, scene, 6);
+}
+
+TEST(Surfaces, OnGridsOfAnyShapeDoNotShadowThemselves) {
+  // On long axes of wide spacing, the rounding of points is more than a small part of the smallest spacing.
+  const glm::ivec3 dims(8, 8, 512);
+  for (const double spacing : {1.0, 100.0, 1e4}) {
+    const auto volume =
+        volumeOf(gridOf(dims, {1, 1, spacing}), channelOf<float>(dims, [](int, int, int z) { return z; }));
+    for (const double value : {400.3, 77.9}) {
+      Scene scene =
+          viewFrom(*volume, {3.1, 3.3, -600 * spacing}, {3.5, 3.5, 255 * spacing}, 0.6 / spacing, 16);
+      scene.channels = {surfaces({{value, 1, kRed}})};
+      scene.channels[0].rangeHi = 512;
+      scene.channels[0].material = {0, 1, 0, 10};
+      scene.filter = PixelFilter::point;
+      scene.shadows = true;
+      scene.lights = {{LightType::directional, {0, 0, 1}, glm::dvec3(1), 1}};
+      for (const Method method : {Method::raymarch, Method::superposed}) {
+        scene.method = method;
+        int seen = 0, dark = 0;
+        for (const glm::vec4& pixel : renderSamples(volume, scene, 1).pixels) {
+          seen += pixel.a > 0.5f;
+          dark += pixel.a > 0.5f && pixel.r < 0.99f;
+        }
+        EXPECT_GT(seen, 50) << spacing << ' ' << value;
+        EXPECT_EQ(dark, 0) << spacing << ' ' << value << ' ' << nameOf(method);
+      }
+    }
+  }
+}
+
 TEST(Surfaces, ThroughSaddlesAreMetBeyondRounding) {
   // At 0.5 the field is a product of factors that change sign: two sheets cross, and rays near the crossing
   // meet both within rounding, or neither.
