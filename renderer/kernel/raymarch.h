@@ -17,12 +17,12 @@ struct Radiance {
   typename L::Float opacity;
 };
 
-/// Collisions on a segment. `pick`, in [0,1), is the place on the segment and, where extinctions add up,
-/// selects the channel.
+/// Collisions on a segment. `share`, in [0,1), is how much of what the segment absorbs is absorbed in front
+/// of them.
 template <class L>
 struct SegmentCollision {
   Segment<L> segment;
-  typename L::Float extinction, pick;
+  typename L::Float extinction, share;
   typename L::Mask which;
 };
 template <class L>
@@ -33,7 +33,9 @@ SCOLOPAX_LANES void keepNearer(FirstCollisionOf<L>* first, typename L::Mask whic
   first->channel = select(nearer, channel, first->channel);
 }
 
-/// Records collisions that are nearer than the rays' nearest so far.
+/// Records collisions that are nearer than the rays' nearest so far. The share chooses one of the channels'
+/// visible parts and, within it, the distance. Where the largest extinction hides the others, these parts
+/// have no weights: as for trackers, the channel is that of the largest extinction.
 template <class L, class Blend, class View, class Scalars>
 SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const Scalars& scalars,
                                Hidden<L, Blend::kSums>& hidden, const SegmentCollision<L>& collision,
@@ -41,20 +43,23 @@ SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const Scal
   using Float = typename L::Float;
   using Int = typename L::Int;
   using Mask = typename L::Mask;
-  Float left = collision.pick * collision.extinction, most(-1.0f);
+  Float left = collision.share * collision.extinction, share(0.0f), centre(0.5f);
   Int channel(0);
-  Mask open = L::everywhere();
-  visitParts<Detail::emission>(scene, blend, collision.segment, scalars, hidden,
-                               [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
-                                 const Mask seen = part.opacity > 0.0f;
-                                 const Mask better = seen & (blend.mixes ? part.opacity > most : open);
-                                 channel = select(better, Int(n), channel);
-                                 most = select(better, part.opacity, most);
-                                 left = select(seen, left - part.opacity, left);
-                                 open = without(open, seen & (left < 0.0f));
-                               });
-  keepNearer(first, collision.which, collision.segment.start + collision.pick * collision.segment.length(),
-             channel);
+  Mask open = collision.which;
+  Blend unweighted = blend;
+  unweighted.mixes = false;
+  visitParts<Detail::moment>(scene, unweighted, collision.segment, scalars, hidden,
+                             [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
+                               const Mask seen = open & (part.opacity > 0.0f);
+                               channel = select(seen, Int(n), channel);
+                               share = select(seen, left / part.opacity, share);
+                               centre = select(seen, part.moment / part.opacity, centre);
+                               left = select(seen, left - part.opacity, left);
+                               open = without(open, left < 0.0f);
+                             });
+  const Float length = collision.segment.length();
+  const Float along = placeOfAbsorption(collision.extinction * length, centre, clamp(share, 0.0f, 1.0f));
+  keepNearer(first, collision.which, collision.segment.start + length * along, channel);
 }
 
 /// What is known of rays when they meet surfaces.
@@ -171,7 +176,11 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
         emission = emission * where(some, absorbedHere / extinction);
         if constexpr (!Lighting::kAny) color = color + emission;
         if (first) [[unlikely]]
-          if (const Mask met = open & some & (opacity + solid > end); any(met)) {
+          // Where a ray ends because it is opaque, a tracker's ray would hardly have come further.
+          if (const Mask met = open & some &
+                               ((opacity + solid > end) |
+                                without(L::everywhere(), transmittance > scene.opaque.transmittance));
+              any(met)) {
             open = without(open, met);
             // A copy, so that the segment itself need not be in memory.
             SegmentCollision<L> collision{segment, extinction, (end - (before + solid)) / absorbedHere, met};

@@ -67,6 +67,45 @@ TEST(Aovs, OfAnOpaqueFrontAreItsFaceAndItsChannel) {
     }
 }
 
+TEST(Aovs, OfAnOpaqueFrontAreItsFaceAtAnyStep) {
+  for (const BlendMode blend : kBlends)
+    for (const double step : {0.0, 0.5, 3.0}) {
+      Halves halves(1e4, 1e4);
+      halves.scene.method = Method::raymarch;
+      halves.scene.blend = blend;
+      halves.scene.step = step;
+      const auto renderer = rendered(halves.volume, halves.scene, 4);
+      // Half of all light is absorbed in front of 0.7e-4.
+      for (const float depth : renderer->aov(Aov::depth).values)
+        EXPECT_NEAR(depth, halves.volume->grid().diagonal() - 2, 1e-3) << nameOf(blend) << " step " << step;
+    }
+}
+
+TEST(Aovs, OfTheChannelAreWithoutWeights) {
+  // In mix, weights are of colours only: a ray collides with the channel of the largest extinction.
+  const auto volume =
+      volumeOf(gridOf(glm::ivec3(4)), channelOf<std::uint8_t>(glm::ivec3(4), [](int, int, int) { return 1; }),
+               channelOf<std::uint8_t>(glm::ivec3(4), [](int, int, int) { return 1; }));
+  Scene scene = frontScene(*volume, 4, 4);
+  scene.blend = BlendMode::mix;
+  for (const auto& [front, back, expected] : {std::tuple{1.0, 0.5, 0}, {0.5, 1.0, 1}, {0.0, 1.0, 1}}) {
+    scene.channels[0] = solid(front);
+    scene.channels[1] = solid(back);
+    if (front == 0) scene.channels[0].opacity = {{0, 0}};
+    scene.channels[std::size_t(expected)].weight = front == 0 ? 0 : 0.1;
+    scene.channels[std::size_t(1 - expected)].weight = 5;
+    for (const Method method : kAllMethods) {
+      scene.method = method;
+      for (const double step : {0.0, 0.7}) {
+        scene.step = hasStep(method) ? step : 1;
+        const auto renderer = rendered(volume, scene, 8);
+        for (const float channel : renderer->aov(Aov::channel).values)
+          EXPECT_TRUE(channel == float(expected) || channel < 0) << nameOf(method) << ' ' << channel;
+      }
+    }
+  }
+}
+
 TEST(Aovs, OfAHomogeneousMediumAreTheMeanFreeFlightInIt) {
   // Extinction a over the length l: the mean depth of the rays that collide is 1/a - l / (e^(al) - 1). A
   // depth within l has a standard deviation below l / sqrt(12), and four fifths of 36 x 512 rays collide.
