@@ -12,6 +12,7 @@
 #include "renderer/core/short_text.h"
 #include "renderer/data/clip_view.h"
 #include "renderer/data/field_view.h"
+#include "renderer/data/resolution.h"
 #include "renderer/data/shared_macrocells.h"
 
 namespace scolopax {
@@ -119,10 +120,6 @@ void placeLights(const Scene& scene, const Grid& grid, kernel::SceneView* view) 
   }
 }
 }  // namespace
-
-kernel::OpacityLimit opacityLimit(double transmittance) {
-  return {float(transmittance), float(-std::log(transmittance))};
-}
 
 float stratumOf(Method method) { return method == Method::hybrid ? 1.0f / 8.0f : 1.0f / 64.0f; }
 
@@ -324,11 +321,7 @@ void RenderPlan::fillView(const kernel::CameraRays& rays, const std::optional<ke
   view_.nearest = std::any_of(channelViews_.begin(), channelViews_.end(), [](const auto& channel) {
     return channel.field.filter == kernel::Filter::nearest;
   });
-  view_.voxelwise = scene_.step == 0;
-  view_.step =
-      scene_.step == 0 ? std::numeric_limits<float>::infinity() : view_.smallestSpacing * float(scene_.step);
-  view_.thickest = float(kThickestSegment);
-  view_.opaque = opacityLimit(kOpaqueTransmittance);
+  setResolution(view_, resolutionOf(scene_));
   view_.stratum = stratumOf(scene_.method);
   view_.majorants = majorants_->view();
   view_.surfaces = surfaceCells_.has_value();

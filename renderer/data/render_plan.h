@@ -14,11 +14,6 @@
 
 namespace scolopax {
 
-/// Transmittance below which matter behind is invisible, even in float pictures of high contrast.
-inline constexpr double kOpaqueTransmittance = 1e-4;
-/// Optical depth above which segments in whole voxel cells are shortened.
-inline constexpr double kThickestSegment = 0.5;
-kernel::OpacityLimit opacityLimit(double transmittance);
 /// Share of a ray's light for which a method with a step computes lighting once.
 float stratumOf(Method method);
 /// Throws Error(badInput) if a side is not in 1..kMaxImageSide.

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "renderer/data/film.h"
-#include "renderer/engine/resolution.h"
+#include "renderer/data/resolution.h"
 
 namespace scolopax {
 

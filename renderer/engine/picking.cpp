@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "renderer/data/sampling.h"
-#include "renderer/engine/resolution.h"
+#include "renderer/data/resolution.h"
 
 namespace scolopax {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "renderer/data/render_plan.h"
-#include "renderer/engine/resolution.h"
+#include "renderer/data/resolution.h"
 #include "renderer/launcher.h"
 
 namespace scolopax {

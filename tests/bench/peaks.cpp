@@ -22,6 +22,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/data/render_plan.h"
+#include "renderer/data/resolution.h"
 #include "renderer/data/shared_macrocells.h"
 #include "renderer/io/image_file.h"
 #include "renderer/metrics/metrics.h"

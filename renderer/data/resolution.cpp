@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/engine/resolution.h"
+#include "renderer/data/resolution.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,6 +19,10 @@ Resolution resolutionOf(const Scene& scene) {
 
 double sceneStep(const Resolution& resolution) {
   return std::isfinite(resolution.step) ? resolution.step : 0;
+}
+
+kernel::OpacityLimit opacityLimit(double transmittance) {
+  return {float(transmittance), float(-std::log(transmittance))};
 }
 
 void setResolution(kernel::SceneView& view, const Resolution& resolution) {

@@ -3,9 +3,15 @@
 #pragma once
 #include <limits>
 
-#include "renderer/data/render_plan.h"
+#include "renderer/data/scene.h"
+#include "renderer/kernel/views.h"
 
 namespace scolopax {
+
+/// Transmittance below which matter behind is invisible, even in float pictures of high contrast.
+inline constexpr double kOpaqueTransmittance = 1e-4;
+/// Optical depth above which segments in whole voxel cells are shortened.
+inline constexpr double kThickestSegment = 0.5;
 
 /// How finely quadrature divides rays.
 struct Resolution {
@@ -29,7 +35,8 @@ inline constexpr int kResolutions = 15;  ///< the last has steps of 1/64, where 
 Resolution resolutionOf(const Scene& scene);
 /// As Scene::step: the longest segment, or 0 for whole voxel cells.
 double sceneStep(const Resolution& resolution);
-/// Makes kernels render the view at a resolution.
+kernel::OpacityLimit opacityLimit(double transmittance);
+/// Makes kernels render the view at a resolution. The view's spacing and filters must be set.
 void setResolution(kernel::SceneView& view, const Resolution& resolution);
 
 }  // namespace scolopax

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer/data/resolution.h"
+
+#include <gtest/gtest.h>
+
+#include "renderer/data/render_plan.h"
+#include "tests/support/volumes.h"
+
+namespace scolopax {
+namespace {
+
+using namespace test;
+
+TEST(Resolution, OfAPlanIsThatOfItsScene) {
+  // The bias of a picture is estimated at a view's resolution, and would be that of another picture.
+  const glm::ivec3 dims(4);
+  const auto volume =
+      volumeOf(gridOf(dims, {1, 2, 0.5}), channelOf<std::uint8_t>(dims, [](int x, int, int) { return x; }));
+  for (const Interpolation interpolation :
+       {Interpolation::trilinear, Interpolation::cubic, Interpolation::nearest})
+    for (const double step : {0.0, 0.25, 1.0, 8.0}) {
+      Scene scene = frontScene(*volume, 4, 4);
+      scene.method = Method::raymarch;
+      scene.step = step;
+      scene.channels[0].interpolation = interpolation;
+      const RenderPlan plan(volume, scene);
+      kernel::SceneView view = plan.view();
+      setResolution(view, resolutionOf(scene));
+      EXPECT_EQ(view.step, plan.view().step) << step;
+      EXPECT_EQ(view.voxelwise, plan.view().voxelwise) << step;
+      EXPECT_EQ(view.thickest, plan.view().thickest) << step;
+      EXPECT_EQ(view.opaque.transmittance, plan.view().opaque.transmittance) << step;
+      EXPECT_EQ(view.opaque.depth, plan.view().opaque.depth) << step;
+    }
+}
+
+TEST(Resolution, OfTheLadderBecomesFinerRungByRung) {
+  for (int i = 1; i < kResolutions; ++i) {
+    const Resolution before = resolutionAt(i - 1), here = resolutionAt(i);
+    EXPECT_EQ(here.voxelwise, i >= kEqualSteps);
+    if (i != kEqualSteps) {
+      EXPECT_LT(here.step, before.step) << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace scolopax
