@@ -38,7 +38,8 @@ class Launcher {
   virtual void run(const std::function<void()>& f) = 0;
   /// Renders the pixels of a pass that are not yet done, with the method, blend mode and lighting of `scene`;
   /// Method::automatic renders as superposed. Returns false if pixels are left because `cancel` became true
-  /// or the deadline passed; both are checked every few pixels. Runs in the caller's thread arena: call it
+  /// or the deadline passed. Rays end early once `cancel` is true; the deadline is looked at between rays, so
+  /// that one that takes longer than a turn is completed. Runs in the caller's thread arena: call it
   /// from run() to use the launcher's threads.
   virtual bool launch(const Scene& scene, const Pass& pass) = 0;
 };

@@ -27,7 +27,9 @@ class CpuLauncher final : public Launcher {
 
   void run(const std::function<void()>& f) override { arena_.execute(f); }
 
-  bool launch(const Scene& scene, const Pass& pass) override {
+  bool launch(const Scene& scene, const Pass& given) override {
+    Pass pass = given;
+    pass.scene.cancel = pass.cancel;
     const TileFunction renderTileAt = chooseTiles(scene, pass.scene);
     const int tilesX = (pass.scene.width + kTile - 1) / kTile;
     const int tilesY = (pass.scene.height + kTile - 1) / kTile;

@@ -45,7 +45,7 @@ SCOLOPAX_LANES_APART void renderPacket(const Pass& pass, const Blend& blend, int
   if (scene.channelCount > 0 && any(from.inside.enter < from.inside.exit))
     radiance = kernel::RayMarch<Steps>::template march<Lighting>(scene, blend, from.ray, from.inside, sampler,
                                                                  &cost, pass.first ? &met : nullptr);
-
+  if (scene.isCancelled()) return;
   if (pass.first) met.depth = scene.rays.depth(from.x, from.y, met.depth);
   for (; todo != 0; todo &= todo - 1) {
     const int i = std::countr_zero(todo), pixel = pixels[i];
@@ -66,13 +66,11 @@ template <class Steps, class Lighting, bool kSums, bool kSeparate, bool kMixes>
 void renderTilePackets(const Pass& pass, int tileX, int tileY) {
   const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
   const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
-  for (int y = tileY * kTile; y < endY; y += kPacketHeight) {
-    if (std::chrono::steady_clock::now() >= pass.deadline) return;
+  for (int y = tileY * kTile; y < endY; y += kPacketHeight)
     for (int x = tileX * kTile; x < endX; x += kPacketWidth) {
-      if (pass.cancel->load(std::memory_order_relaxed)) return;
+      if (pass.scene.isCancelled() || std::chrono::steady_clock::now() >= pass.deadline) return;
       renderPacket<Steps, Lighting>(pass, kernel::Blending<kSums>{kSeparate, kMixes}, x, y, endX, endY);
     }
-  }
 }
 
 inline TileFunction packetTiles(const Scene& scene, bool voxelwise) {

@@ -18,16 +18,23 @@ void renderTile(const Pass& pass, int tileX, int tileY) {
                                                                 pass.cost, pass.first};
   const int endX = std::min((tileX + 1) * kTile, pass.scene.width);
   const int endY = std::min((tileY + 1) * kTile, pass.scene.height);
+  using Clock = std::chrono::steady_clock;
+  // Reading the clock costs about a tenth of a ray, so it is read once per row if rows take no longer than
+  // this.
+  constexpr std::chrono::milliseconds kSlow{1};
+  bool slow = true;
   for (int y = tileY * kTile; y < endY; ++y) {
-    // The clock is read once per row: reading it costs about a tenth of a ray.
-    if (std::chrono::steady_clock::now() >= pass.deadline) return;
+    const Clock::time_point begin = Clock::now();
+    if (begin >= pass.deadline) return;
     for (int x = tileX * kTile; x < endX; ++x) {
       const int pixel = y * pass.scene.width + x;
       if (pass.done[pixel]) continue;
-      if (pass.cancel->load(std::memory_order_relaxed)) return;
+      if (slow && Clock::now() >= pass.deadline) return;
       render(pixel);
+      if (pass.scene.isCancelled()) return;
       pass.done[pixel] = 1;
     }
+    slow = Clock::now() - begin > kSlow;
   }
 }
 

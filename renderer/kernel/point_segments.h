@@ -39,7 +39,7 @@ class PointSegments {
   /// an empty segment.
   SCOLOPAX_LANES bool next(Segment<L>& segment) {
     settle();
-    for (++k_; any(live_); ++k_) {
+    for (++k_; any(live_) && !scene_.isCancelled(); ++k_) {
       const Float start = k_ > 0 ? endOf(k_ - 1) : inside_.enter, end = endOf(k_);
       if (!meetsSomething(start, end)) {
         const int first = firstSegment(select(walk_.full(), walk_.enter(), walk_.exit()));

@@ -47,6 +47,7 @@ struct RenderPixel {
     if (scene.channelCount > 0 && at.inside.enter < at.inside.exit)
       result = Integrator::template sample<Blend, Lighting>(scene, at.ray, at.inside, sampler, &spent,
                                                             first ? &met : nullptr);
+    if (scene.isCancelled()) return;
     pass[pixel] = result;
     if (first) first[pixel] = {scene.rays.depth(at.x, at.y, met.depth), met.channel};
     if (cost) {

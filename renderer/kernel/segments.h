@@ -87,7 +87,7 @@ class CellSegments {
   /// segment. A device compiler inlines all of this wherever it is called, so a kernel should contain only
   /// one call per kind of ray.
   SCOLOPAX_HD bool next(Segment<One>& segment) {
-    if (!find()) {
+    if (scene_.isCancelled() || !find()) {
       segment = {inside_.exit, inside_.exit, 0, false, false, 0};
       return false;
     }
@@ -164,7 +164,7 @@ class CellSegments {
           waiting_ = active_;
         }
       }
-      if (!cells_.advance()) return false;
+      if (!cells_.advance() || scene_.isCancelled()) return false;
       enterCell();
     }
   }

@@ -2,6 +2,7 @@
 // A scene as kernels see it: plain views of memory that a render plan (data/render_plan, which fills them) or
 // a device owns. Only visible channels are included.
 #pragma once
+#include <atomic>
 #include <cstdint>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
@@ -168,8 +169,9 @@ struct SceneView {
   LightView lights[kMaxLights];
   glm::mat3 worldFromVoxel;  ///< linear part, in units of the smallest spacing, so that lengths are near 1 at
                              ///< any scale
-  glm::mat3 gradientFromVoxel;  ///< its inverse transpose
-  float smallestSpacing;        ///< world units
+  glm::mat3 gradientFromVoxel;      ///< its inverse transpose
+  float smallestSpacing;            ///< world units
+  const std::atomic<bool>* cancel;  ///< null on devices: whether rays should end early, without a result
 
   static constexpr int kFactors = kMaxVisibleChannels;  ///< channels that may have one: length of arrays
   /// Whether the opacity of channel n depends on the gradient.
@@ -180,9 +182,12 @@ struct SceneView {
 #if defined(__CUDA_ARCH__)
   SCOLOPAX_HD static constexpr bool hasSurfaces() { return false; }
   SCOLOPAX_HD static constexpr bool hasNearest() { return false; }
+  SCOLOPAX_HD static constexpr bool isCancelled() { return false; }
 #else
   SCOLOPAX_HD bool hasSurfaces() const { return surfaces; }
   SCOLOPAX_HD bool hasNearest() const { return nearest; }
+  /// A single ray may take seconds, so loops along rays ask.
+  SCOLOPAX_HD bool isCancelled() const { return cancel && cancel->load(std::memory_order_relaxed); }
 #endif
 };
 

@@ -38,6 +38,7 @@ class VoxelWalk {
 
   /// Moves the rays in `which` to their next cells. Returns those of them that have one.
   SCOLOPAX_LANES Mask next(Mask which) {
+    if (scene_.isCancelled()) more_ = without(more_, more_);
     Mask seeking = which & more_;
     start_ = select(seeking, end_, start_);
     for (int idle = 0; any(seeking); ++idle) {

@@ -258,7 +258,7 @@ SCOLOPAX_HD CellOutcome trackCellClosely(const View& scene, const Ray& ray, cons
     }
     *depth -= total - passed;
     past += way;
-    if (++*tentative >= kMaxTentativeCollisions) return CellOutcome::exhausted;
+    if (++*tentative >= kMaxTentativeCollisions || scene.isCancelled()) return CellOutcome::exhausted;
   }
   return CellOutcome::nothing;
 }

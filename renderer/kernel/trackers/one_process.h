@@ -70,7 +70,7 @@ struct OneProcess {
         random = sampler.next();
         depth = opticalDepth(uniformOf(random.x));
         if (++tentative >= limit) {
-          if (tentative >= kMaxTentativeCollisions) {
+          if (tentative >= kMaxTentativeCollisions || scene.isCancelled()) {
             cost->truncated = 1;
             return std::nullopt;
           }

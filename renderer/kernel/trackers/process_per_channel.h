@@ -33,7 +33,7 @@ SCOLOPAX_HD CellOutcome trackCell(const View& scene, Channels channels, int n,
       return CellOutcome::hit;
     }
     if (++*tentative < limit) continue;
-    if (*tentative >= kMaxTentativeCollisions) return CellOutcome::exhausted;
+    if (*tentative >= kMaxTentativeCollisions || scene.isCancelled()) return CellOutcome::exhausted;
     limit = patienceAfter(*tentative);
     if (!(total - passed > kManyCollisions)) continue;
     if constexpr (!kClosely) {
