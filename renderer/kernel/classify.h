@@ -11,9 +11,17 @@ namespace scolopax::kernel {
 /// Index of the last knot at or before p, or -1 when p lies before the first.
 template <class Value>
 SCOLOPAX_HD int knotBefore(const CurveView<Value>& curve, float p) {
-  int i = curve.buckets[int(p * float(kCurveBuckets))];
-  while (i + 1 < curve.count && curve.positions[i + 1] <= p) ++i;
-  return p < curve.positions[i] ? -1 : i;
+  // Bisection, because all knots may lie in one bucket.
+  const int bucket = int(p * float(kCurveBuckets));
+  int low = curve.buckets[bucket], high = curve.buckets[bucket < kCurveBuckets ? bucket + 1 : bucket];
+  while (low < high) {
+    const int middle = (low + high + 1) / 2;
+    if (curve.positions[middle] <= p)
+      low = middle;
+    else
+      high = middle - 1;
+  }
+  return p < curve.positions[low] ? -1 : low;
 }
 
 /// Interpolates from a to b; the result lies between them even after rounding.

@@ -71,30 +71,16 @@ SCOLOPAX_LANES CurvePoint<L> pointOn(const OpticalCurveView& curve, typename L::
   using Int = typename L::Int;
   using Mask = typename L::Mask;
   const Mask above = position >= 0.0f, inside = above & (position < 1.0f);
-  Int k = gather(curve.buckets, truncated(where(inside, position) * float(kCurveBuckets)));
-  for (;;) {
-    const Int following = minimum(k + 1, Int(curve.count - 1));
-    const Mask on = inside & (knotPositions<L>(curve, following) <= position);
-    if (!any(on)) break;  // at the latest before the last knot, which is at 1
-    k = k + onesOf(on);
+  // Bisection, because all knots may lie in one bucket.
+  const Int bucket = truncated(where(inside, position) * float(kCurveBuckets));
+  Int low = gather(curve.buckets, bucket), high = gather(curve.buckets, bucket + Int(1));
+  for (Mask open = high > low; any(open); open = high > low) {
+    const Int middle = rightSigned<1>(low + high + Int(1));
+    const Mask behind = knotPositions<L>(curve, middle) <= position;
+    low = select(open & behind, middle, low);
+    high = select(without(open, behind), middle - Int(1), high);
   }
-  return {position, select(inside, k, select(above, Int(curve.count - 1), Int(-1)))};
-}
-/// pointOn(), searched from a known point: takes as many steps as there are knots in between. For lanes in
-/// `which`.
-template <class L>
-SCOLOPAX_LANES CurvePoint<L> pointFrom(const OpticalCurveView& curve, const CurvePoint<L>& from,
-                                       typename L::Float position, typename L::Mask which) {
-  using Int = typename L::Int;
-  using Mask = typename L::Mask;
-  const Int last(curve.count - 1);
-  Int k = from.piece;
-  for (;;) {
-    const Mask up = which & (last > k) & (knotPositions<L>(curve, minimum(k + Int(1), last)) <= position);
-    const Mask down = which & (k > Int(-1)) & (position < knotPositions<L>(curve, maximum(k, Int(0))));
-    if (!any(up | down)) return {position, k};
-    k = k + onesOf(up) - onesOf(down);
-  }
+  return {position, select(inside, low, select(above, Int(curve.count - 1), Int(-1)))};
 }
 template <class L>
 SCOLOPAX_LANES CurvePoint<L> select(typename L::Mask m, const CurvePoint<L>& a, const CurvePoint<L>& b) {
@@ -276,7 +262,6 @@ SCOLOPAX_LANES PartOf<L> meansOfProduct(const OpticalCurveView& curve, const Cur
   using Int = typename L::Int;
   using Mask = typename L::Mask;
   PartOf<L> all = noPart<L>();
-  CurvePoint<L> reached = p;
   const auto addPiece = [&](const Knots<L>& first, const Knots<L>& second, Int piece, Float from, Float to,
                             Float begin, Float end, Mask on) SCOLOPAX_LANES_LAMBDA {
     const Float u = opticalIn<Detail::extinction, L>(first, second, piece, from).opacity;
@@ -285,9 +270,8 @@ SCOLOPAX_LANES PartOf<L> meansOfProduct(const OpticalCurveView& curve, const Cur
     if (!any(on)) return;
     const Float width = end - begin, way = q.position - p.position;
     PartOf<L> means = noPart<L>();
-    const CurvePoint<L> x0 = pointFrom<L>(curve, reached, p.position + begin * way, on);
-    const CurvePoint<L> x1 = pointFrom<L>(curve, x0, p.position + end * way, on);
-    reached = select(on, x1, reached);
+    const CurvePoint<L> x0 = pointOn<L>(curve, p.position + begin * way);
+    const CurvePoint<L> x1 = pointOn<L>(curve, p.position + end * way);
     forEachPiece<L>(curve, x0, x1, on,
                     [&](const Knots<L>& a, const Knots<L>& b, Int k, Float x, Float y, Float s, Float e,
                         Mask lanes) SCOLOPAX_LANES_LAMBDA {

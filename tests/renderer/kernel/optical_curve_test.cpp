@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <random>
 
+#include "renderer/data/curve.h"
 #include "renderer/data/transfer_function.h"
 
 namespace scolopax {
@@ -121,6 +122,30 @@ TEST(OpticalCurve, HasTheMeansOfBothCurvesOverAnyStretch) {
       for (int c = 0; c < 3; ++c)
         ASSERT_NEAR(double(found.emission[c]), expected.emission[c], 2e-5) << p << " to " << q;
     }
+  }
+}
+
+TEST(OpticalCurve, FindsPiecesAmongAllKnotsInOneBucket) {
+  // 4000 knots within 1/8 of a bucket, of a sawtooth, and with jumps.
+  Curves curves;
+  for (int i = 0; i < 4000; ++i) {
+    const double p = double(float(0.5 + 0.0005 * (i / 2) / 2000));
+    curves.opacity.push_back({p, i % 4 == 0 ? 1.0 : 0.25 * (i % 4)});
+  }
+  curves.color = {{0, glm::dvec3(1)}};
+  const Made curve = made(curves);
+  Curve<float> plain = makeCurve(curves.opacity, "opacity");
+  std::mt19937 random(9);
+  for (int i = 0; i < 4000; ++i) {
+    const float p = i % 3 == 0   ? float(curves.opacity[random() % 4000].position)
+                    : i % 3 == 1 ? float(random() % 1001) / 1000
+                                 : 0.5f + 0.0005f * float(random() % 1001) / 1000;
+    int expected = -1;
+    for (int k = 0; k < curve.view.count && curve.view.knots[k].position <= p; ++k) expected = k;
+    ASSERT_EQ(kernel::pointOn<kernel::One>(curve.view, p).piece, p < 1 ? expected : curve.view.count - 1)
+        << p;
+    const auto next = std::upper_bound(plain.positions.begin(), plain.positions.end(), p);
+    ASSERT_EQ(kernel::knotBefore(plain.view(), p), int(next - plain.positions.begin()) - 1) << p;
   }
 }
 
