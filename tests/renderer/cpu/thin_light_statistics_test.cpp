@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "renderer/kernel/raymarch.h"
 #include "renderer/kernel/trackers/one_process.h"
 #include "tests/support/agreement.h"
 #include "tests/support/estimator_scenes.h"
@@ -103,6 +104,29 @@ struct LitAtPlacesApart {
   }
 };
 
+/// A defect of quadrature: a stratum is shaded at one place, but the light that reaches it is computed in the
+/// other slab of litAndShadowed().
+struct ShadowedElsewhere : kernel::EqualSteps {
+  struct Moved {
+    kernel::Ray own;
+  };
+  template <class L, class View>
+  struct Cuts : private Moved, public kernel::CellSegments<View> {
+    Cuts(kernel::SegmentEnds<L, View>& ends, const View& scene, const kernel::Ray& ray,
+         const kernel::Interval& inside, std::uint32_t channels, float offset, float step,
+         kernel::SampleCost* cost)
+        : Moved{ray},
+          kernel::CellSegments<View>(ends, scene, moved(ray, step > scene.step), inside, channels, offset,
+                                     step, cost) {}
+
+   private:
+    const kernel::Ray& moved(const kernel::Ray& ray, bool isShadowRay) {
+      if (isShadowRay) own.origin.z = 19 - ray.origin.z;
+      return own;
+    }
+  };
+};
+
 class ThinLight : public testing::TestWithParam<BlendMode> {
  protected:
   static void compare(const VolumeAndScene& made) {
@@ -156,6 +180,29 @@ TEST(ThinLightDefect, OfVisibilityAndShadingAtDifferentPlacesIsFound) {
     EXPECT_FALSE(haveMean(
         replicateKernel<LitAtPlacesApart, kernel::BlendDensity, kernel::Lit>(made.volume, scene, unspoilt),
         scene, expected));
+  }
+}
+
+TEST(ThinLightDefect, OfStrataLitInTheOtherSlabIsFound) {
+  for (const double density : {0.001, 0.06}) {
+    const VolumeAndScene made = litAndShadowed(density);
+    Scene scene = made.scene;
+    scene.shadows = true;
+    scene.method = Method::raymarch;
+    scene.step = 0.125;
+    auto expected = reference::renderReference(*made.volume, scene, 1);
+    float brightest = 0;
+    for (const glm::vec4& pixel : expected.image.pixels) brightest = std::max({brightest, pixel.r, pixel.a});
+    expected.maximumRayError += kBias * double(brightest);
+    const auto unspoilt = [](kernel::SceneView&) {};
+    EXPECT_TRUE(
+        haveMean(replicateKernel<kernel::RayMarch<kernel::EqualSteps>, kernel::BlendDensity, kernel::Lit>(
+                     made.volume, scene, unspoilt),
+                 scene, expected));
+    EXPECT_FALSE(
+        haveMean(replicateKernel<kernel::RayMarch<ShadowedElsewhere>, kernel::BlendDensity, kernel::Lit>(
+                     made.volume, scene, unspoilt),
+                 scene, expected));
   }
 }
 

@@ -5,16 +5,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <optional>
 #include <utility>
 
 #include "renderer/core/error.h"
 #include "renderer/engine/pilot.h"
+#include "renderer/io/format.h"
 #include "renderer/metrics/metrics.h"
 #include "renderer/reference/render.h"
 #include "renderer/renderer.h"
 #include "tests/support/orbitals.h"
 #include "tests/support/statistics.h"
+#include "tests/support/volumes.h"
 
 namespace scolopax {
 namespace {
@@ -81,6 +84,67 @@ TEST(Automatic, DrawsMatterOfWhichOnlyTheSurfaceIsSeen) {
   const auto [found, claimed] = errorAfter(64, volume, scene);
   EXPECT_LT(found, 1e-5);
   EXPECT_LT(found, 2 * claimed + 1e-6);
+}
+
+TEST(Automatic, SeesTheAlphaOfDarkMatterOverABrightGround) {
+  // In the colours alone, which are those of soot, no step has an error.
+  const auto path = std::filesystem::path(SCOLOPAX_DATA_DIR) / "scalar/neghip_64x64x64_uint8.derived.raw";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "the data set is absent from " << SCOLOPAX_DATA_DIR;
+  const auto datasets =
+      io::loadDatasets(std::vector{path}, io::defaultMemoryLimitBytes(), [](const std::string&) {});
+  const auto volume = datasets.at(0).volume;
+  for (const double soot : {0.0, 0.0052}) {  // sRGB #000000, #101010
+    Scene scene;
+    scene.width = scene.height = 32;
+    scene.filter = PixelFilter::point;
+    scene.camera = framingCamera(volume->grid(), 35, 1);
+    scene.background = {1, 1, 1};
+    scene.channels.resize(1);
+    scene.channels[0].rangeLo = 30;
+    scene.channels[0].rangeHi = 120;
+    scene.channels[0].density = 0.15;
+    scene.channels[0].color = {{0, glm::dvec3(soot)}};
+    const auto expected = reference::renderReference(*volume, scene, 1).image;
+    const auto renderer = makeCpuRenderer(volume, 2);
+    renderer->setScene(scene);
+    while (renderer->samples() < 2 || (renderer->estimatedError() > 0.001 && renderer->samples() < 4096))
+      renderer->renderSample(kNever);
+    const Image found = renderer->image();
+    EXPECT_LT(compareImages(found, expected).rmse, 0.002) << soot;
+    const Image8 shown = toSrgb8(found, scene.background), right = toSrgb8(expected, scene.background);
+    double squares = 0;
+    for (std::size_t i = 0; i < shown.rgb.size(); ++i)
+      squares += std::pow(double(shown.rgb[i]) - double(right.rgb[i]), 2);
+    EXPECT_LT(std::sqrt(squares / double(shown.rgb.size())), 2) << soot;  // levels
+  }
+}
+
+TEST(Automatic, KnowsItsErrorInLightOnAFewVoxels) {
+  // Four channels of noise on 4 x 2 x 4 voxels, shaded: highlights narrower than voxels.
+  std::uint32_t state = 3;
+  const auto noise = [&](int, int, int) { return (state = state * 1664525u + 1013904223u) >> 24; };
+  const glm::ivec3 dims(4, 2, 4);
+  double found = 0, claimed = 0;
+  for (int round = 0; round < 6; ++round) {
+    const auto volume =
+        volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, noise), channelOf<std::uint8_t>(dims, noise),
+                 channelOf<std::uint8_t>(dims, noise), channelOf<std::uint8_t>(dims, noise));
+    Scene scene;
+    scene.width = scene.height = 16;
+    scene.filter = PixelFilter::point;
+    scene.camera = framingCamera(volume->grid(), 35, 1);
+    scene.channels.resize(4);
+    for (std::size_t i = 0; i < 4; ++i) {
+      scene.channels[i].rangeHi = 255;
+      scene.channels[i].density = 0.8;
+      scene.channels[i].color = {{0, glm::dvec3(i != 0, i != 1, i != 2)}};
+    }
+    scene.shading = true;
+    const auto [one, estimate] = errorAfter(64, volume, scene);
+    found += one * one / 6;
+    claimed += estimate * estimate / 6;
+  }
+  EXPECT_LT(std::sqrt(found), 2 * std::sqrt(claimed) + 1e-4);
 }
 
 TEST(Automatic, WorksOutLightAtFewPlacesWhereThereAreShadows) {
