@@ -54,7 +54,7 @@ check: test check-bench check-hostile check-format check-tidy check-asan-ubsan c
 # Benchmarks are built for a report only: this shows that they still can be.
 check-bench: test-deps
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null
-	cmake --build --preset release -j $(JOBS) --target bench_rebuild bench_layout bench_peaks
+	cmake --build --preset release -j $(JOBS) --target bench_rebuild bench_layout bench_resolutions bench_peaks
 
 check-hostile: test-deps
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null

@@ -4,7 +4,8 @@
 gate.py compare OLD.json NEW.json
 
 `record` hashes float pictures of every scene in every blend mode, light and method, on every instruction set that this
-processor has; `compare` lists the pictures that differ. Reads SCOLOPAX, SCOLOPAX_DATA_DIR."""
+processor has; `compare` lists the pictures that differ. The scene `features` has every field that the scenes of the
+report leave alone. Reads SCOLOPAX, SCOLOPAX_DATA_DIR; fails if a scene's data is missing."""
 import argparse
 import hashlib
 import http.client
@@ -20,7 +21,8 @@ import serving  # noqa: E402
 from common import LIGHTS, SCENES, Bench, scratch  # noqa: E402
 
 BLENDS = ("density", "max", "mix", "composite")
-INSTRUCTIONS = ("baseline", "avx2", "avx512")
+# Each with the flag of /proc/cpuinfo without which the program would quietly take the one before it.
+INSTRUCTIONS = {"baseline": None, "avx2": "avx2", "avx512": "avx512f"}
 SIZE = {"width": 40, "height": 31}  # not a multiple of tiles or packets
 
 
@@ -47,6 +49,12 @@ def hashes(name, files, instructions, methods):
     return found
 
 
+def present_instructions():
+    with open("/proc/cpuinfo", encoding="utf-8") as file:
+        flags = next(line.split() for line in file if line.startswith("flags"))
+    return [name for name, flag in INSTRUCTIONS.items() if flag is None or flag in flags]
+
+
 def methods_of(files):
     with serving.Server(paths=files) as server:
         connection = http.client.HTTPConnection("127.0.0.1", server.port)
@@ -60,10 +68,10 @@ def record(out, scenes):
         bench = Bench(folder, None, quick=False)
         methods = methods_of(bench.orbitals())
         for name in scenes:
-            files = bench.data(name)
+            files = bench.orbitals(size=48) if name == "features" else bench.data(name)
             if files is None:
-                continue
-            for instructions in INSTRUCTIONS:
+                sys.exit(f"{name} cannot be recorded; leave it out with --scenes")
+            for instructions in present_instructions():
                 result[f"{name} {instructions}"] = hashes(name, files, instructions, methods)
                 print(f"{name} {instructions}: {len(result[f'{name} {instructions}'])} pictures", file=sys.stderr)
     with open(out, "w", encoding="utf-8") as file:
@@ -89,7 +97,7 @@ def main():
     commands = parser.add_subparsers(dest="command", required=True)
     recording = commands.add_parser("record", help="hash the pictures of a program")
     recording.add_argument("out")
-    recording.add_argument("--scenes", default=",".join(SCENES), help="names, separated by commas")
+    recording.add_argument("--scenes", default=",".join((*SCENES, "features")), help="names, separated by commas")
     comparing = commands.add_parser("compare", help="list the pictures that differ")
     comparing.add_argument("before")
     comparing.add_argument("after")
