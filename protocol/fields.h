@@ -233,11 +233,11 @@ struct Table<Integrator> {
       field("method", &Integrator::method, "What follows the rays.", {.names = &Lists::methods}),
       field("macrocell", &Integrator::macrocell, "Edge of the cells that bound the extinction.",
             {.unit = "voxels", .atLeast = 1, .atMost = 64}),
-      field("step", &Integrator::step,
-            "Step of raymarch and hybrid, at least 0.01; 0: from one face of voxel cells to the next, "
-            "between which "
-            "curves are integrated exactly. auto finds its own.",
-            {.unit = "smallest voxel spacing", .atLeast = 0, .atMost = 100}),
+      field(
+          "step", &Integrator::step,
+          "Step of raymarch and hybrid, at least 0.01; 0: from one face of voxel cells to the next, between "
+          "which trilinear scalars are cubics. auto finds its own.",
+          {.unit = "smallest voxel spacing", .atLeast = 0, .atMost = 100}),
       field("sampling", &Integrator::sampling, "How the numbers of a pixel's samples are drawn.",
             {.names = &Lists::samplings}),
       field("seed", &Integrator::seed, "Same scene, seed and sample count: the same picture, bit for bit.",
