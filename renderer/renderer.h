@@ -14,21 +14,13 @@
 #include "renderer/data/aov.h"
 #include "renderer/data/image.h"
 #include "renderer/data/pick.h"
+#include "renderer/data/rebuild_stats.h"
 #include "renderer/data/scene.h"
 #include "renderer/data/volume.h"
 
 namespace scolopax {
 
 class Launcher;
-
-/// What setScene had to rebuild.
-struct RebuildStats {
-  int macrocellChannels = 0;      ///< channels whose macrocells were measured again
-  int majorantChannels = 0;       ///< channels whose table of bounds was rebuilt
-  std::size_t majorantCells = 0;  ///< macrocells whose majorant was recomputed
-  bool filmReset = false;         ///< false: the new scene gives the same picture, so the samples are kept
-  double rebuildMs = 0;           ///< including the trial plan on which method and step are chosen
-};
 
 /// Counts over all samples since the film was reset. Trackers give the same counts on every machine. For
 /// quadrature, `fetches` and `cellSteps` depend on how many rays the processor marches at once.

@@ -8,6 +8,7 @@
 #include "renderer/cpu/sample_lanes.h"
 #include "renderer/cpu/tile_function.h"
 #include "renderer/data/instances.h"
+#include "renderer/kernel/blend_modes.h"
 #include "renderer/kernel/raymarch.h"
 #include "renderer/kernel/render_pixel.h"
 

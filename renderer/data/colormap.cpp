@@ -82,17 +82,43 @@ std::vector<ColorKnot> fromOpenImageIo(std::string_view name) {
   return knots;
 }
 
+/// Leaves out knots that the others give as well: the tables of these maps are in 8-bit sRGB, so that half of
+/// its levels is all that they say. A segment of a ray takes as long as it has knots.
+std::vector<ColorKnot> simplified(const std::vector<ColorKnot>& table) {
+  const auto isGiven = [&](std::size_t first, std::size_t last, std::size_t knot) {
+    const ColorKnot &a = table[first], &b = table[last], &k = table[knot];
+    const glm::dvec3 line =
+        a.color + (k.position - a.position) / (b.position - a.position) * (b.color - a.color);
+    for (int c = 0; c < 3; ++c)
+      if (std::abs(srgbFromLinear(float(line[c])) - srgbFromLinear(float(k.color[c]))) > 0.5f / 255)
+        return false;
+    return true;
+  };
+  std::vector<ColorKnot> knots{table.front()};
+  for (std::size_t first = 0, last = 1; first + 1 < table.size(); first = last) {
+    const auto reaches = [&](std::size_t to) {
+      for (std::size_t knot = first + 1; knot < to; ++knot)
+        if (!isGiven(first, to, knot)) return false;
+      return true;
+    };
+    last = first + 1;
+    while (last + 1 < table.size() && reaches(last + 1)) ++last;
+    knots.push_back(table[last]);
+  }
+  return knots;
+}
+
 }  // namespace
 
 std::span<const NamedValue> colormaps() { return kColormaps; }
 
 std::vector<ColorKnot> colormapKnots(std::string_view name) {
-  if (name == "gray") return gray();
+  if (name == "gray") return simplified(gray());
   if (name == "fire") return fromSrgb8(kFire);
-  if (name == "hot") return hot();
+  if (name == "hot") return simplified(hot());
   std::string known;
   for (const NamedValue& map : kColormaps) {
-    if (map.name == name) return fromOpenImageIo(name);
+    if (map.name == name) return simplified(fromOpenImageIo(name));
     known += (known.empty() ? "" : ", ") + std::string(map.name);
   }
   throw Error(ErrorCode::notFound,

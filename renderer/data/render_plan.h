@@ -10,7 +10,9 @@
 
 #include "renderer/data/bound_columns.h"
 #include "renderer/data/majorant_grid.h"
-#include "renderer/renderer.h"
+#include "renderer/data/rebuild_stats.h"
+#include "renderer/data/scene.h"
+#include "renderer/data/volume.h"
 
 namespace scolopax {
 

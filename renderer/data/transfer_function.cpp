@@ -8,7 +8,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/data/field_view.h"
-#include "renderer/kernel/segment_cubics.h"
+#include "renderer/kernel/optical_curve.h"
 
 namespace scolopax {
 
@@ -32,10 +32,10 @@ void setPlaces(OpticalCurve& curve, const kernel::ChannelView& channel) {
   linear.gamma = 1;
   for (kernel::OpticalKnot& knot : curve.knots) {
     const double position = std::pow(double(knot.position), 1.0 / double(channel.gamma));
-    const double place = (position - double(channel.offset)) / std::abs(double(channel.scale));
+    const double stored = (position - double(channel.offset)) / std::abs(double(channel.scale));
     // With a gamma, all places before the range have the position 0.
     const kernel::ChannelView& compared = knot.position > 0 ? channel : linear;
-    knot.place = leastThat(float(place), [&](float at) {
+    knot.stored = leastThat(float(stored), [&](float at) {
       return kernel::positionAt<kernel::One>(compared, at) >= knot.position;
     });
   }

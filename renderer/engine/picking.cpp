@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "renderer/data/sampling.h"
 #include "renderer/data/resolution.h"
+#include "renderer/data/sampling.h"
 
 namespace scolopax {
 namespace {

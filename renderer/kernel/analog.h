@@ -4,6 +4,7 @@
 #pragma once
 #include "renderer/kernel/shade.h"
 #include "renderer/kernel/surfaces.h"
+#include "renderer/kernel/trackers/process_per_channel.h"
 
 namespace scolopax::kernel {
 

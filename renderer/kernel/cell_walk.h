@@ -6,6 +6,10 @@
 
 namespace scolopax::kernel {
 
+/// Maximum number of segments, or of cells, that quadrature visits along a ray. A ray with more stops there
+/// and counts as truncated.
+inline constexpr int kMaxSegments = 1 << 20;
+
 /// Visits the cells along a ray one after another. Where blocks of cells are empty, one step covers many
 /// cells, from the entry of the first to the exit of the last, and the last becomes the current cell. Cells
 /// that are not empty are visited exactly as without such leaps, to the last bit.

@@ -43,7 +43,7 @@ SCOLOPAX_LANES typename L::Float sideOf(const ClipPlaneView& plane, const typena
 }
 template <class Vec>
 SCOLOPAX_LANES auto sumOfMagnitudes(const Vec& v) {
-  return maximum(v[0], -v[0]) + maximum(v[1], -v[1]) + maximum(v[2], -v[2]);
+  return magnitude(v[0]) + magnitude(v[1]) + magnitude(v[2]);
 }
 /// Rounding error of a slope or side, relative to the sum of the magnitudes that it is computed from.
 inline constexpr float kAlongPlane = 0x1p-21f;

@@ -30,7 +30,7 @@ SCOLOPAX_LANES Cubic<L> partOf(const Cubic<L>& f, typename L::Float middle, type
           half * half * (f.c2 + 3.0f * middle * f.c3), half * half * half * f.c3};
 }
 
-/// Where a cubic is sampled: inside the interval, as the voxels at its ends belong to two cells.
+/// Sample points of a cubic, strictly inside the interval: its ends lie on faces shared by two cells.
 inline constexpr int kCubicNodes = 4;
 SCOLOPAX_HD constexpr float cubicNode(int i) { return 0.5f * float(i) - 0.75f; }
 
@@ -71,8 +71,7 @@ SCOLOPAX_LANES Turns<L> turnsOf(const Cubic<L>& f) {
   using Mask = typename L::Mask;
   // Roots of a y^2 + 2 b y + c, without cancellation.
   // Divided by the largest coefficient, as squares of it may overflow or underflow.
-  const auto size = [](Float v) SCOLOPAX_LANES_LAMBDA { return maximum(v, -v); };
-  const Float largest = maximum(size(f.c1), maximum(size(f.c2), size(f.c3)));
+  const Float largest = maximum(magnitude(f.c1), maximum(magnitude(f.c2), magnitude(f.c3)));
   const Float scale = 1.0f / maximum(largest, Float(kLeastNormal));
   const Float a = 3.0f * (f.c3 * scale), b = f.c2 * scale, c = f.c1 * scale;
   const Float discriminant = b * b - a * c;

@@ -112,7 +112,8 @@ SCOLOPAX_RARE inline void sampleFiltered(const FieldView& field, glm::ivec3 dims
   *stored = splineValue(field, splineAxesAt(field, dims, point));
 }
 
-/// Gradient of the cubic B-spline, per voxel along each axis. Not finite if one of the 64 voxels is not.
+/// Gradient of the cubic B-spline, per voxel along each axis. Not finite if any of the 64 voxels is not
+/// finite.
 SCOLOPAX_RARE inline void findSplineGradient(const FieldView& field, glm::ivec3 dims, const glm::vec3& point,
                                              glm::vec3* perVoxel) {
   const SplineAxes axes = splineAxesAt(field, dims, point);

@@ -16,7 +16,7 @@ SCOLOPAX_LANES typename L::Vec product(const glm::mat3& m, const typename L::Vec
 
 template <class Vec>
 SCOLOPAX_LANES auto largestComponent(const Vec& v) {
-  return maximum(maximum(maximum(v[0], -v[0]), maximum(v[1], -v[1])), maximum(v[2], -v[2]));
+  return maximum(maximum(magnitude(v[0]), magnitude(v[1])), magnitude(v[2]));
 }
 
 template <class L>

@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // The places on a segment at which a channel's curves jump. Where channels hide each other, quadrature takes
-// extinctions to be linear between two places, and so must not step over a jump.
+// extinctions to be linear between two points, and so must not step over a jump.
 #pragma once
 #include "renderer/kernel/point_segments.h"
 #include "renderer/kernel/voxel_segments.h"
 
 namespace scolopax::kernel {
 
-/// What channel n's knots are compared with at a place in [0,1] of a segment, and a knot's.
+/// The coordinate in which channel n and its knots are compared, at a fraction `along` of a segment and at a
+/// knot: the position on the curves or, for cubics, the stored value.
 template <class L, class View>
 SCOLOPAX_LANES typename L::Float coordinateOn(const SegmentEnds<L, View>& ends, int n,
-                                              typename L::Float place) {
+                                              typename L::Float along) {
   const auto p = ends.from[n].position, q = ends.to[n].position;
   const auto known = isFinite(p), other = isFinite(q);
   const auto from = select(known, p, q);
-  return from + place * (select(other, q, p) - from);
+  return from + along * (select(other, q, p) - from);
 }
 template <class L, class View>
 SCOLOPAX_LANES typename L::Float coordinateOf(const SegmentEnds<L, View>&, const Knots<L>& knot) {
@@ -22,12 +23,12 @@ SCOLOPAX_LANES typename L::Float coordinateOf(const SegmentEnds<L, View>&, const
 }
 template <class L, class View>
 SCOLOPAX_LANES typename L::Float coordinateOn(const SegmentCubics<L, View>& scalars, int n,
-                                              typename L::Float place) {
-  return scalars.place[n].at(2.0f * place - 1.0f);
+                                              typename L::Float along) {
+  return scalars.stored[n].at(2.0f * along - 1.0f);
 }
 template <class L, class View>
 SCOLOPAX_LANES typename L::Float coordinateOf(const SegmentCubics<L, View>&, const Knots<L>& knot) {
-  return knot.place;
+  return knot.stored;
 }
 
 /// Piece of channel n's curves at a coordinate.
@@ -42,18 +43,19 @@ SCOLOPAX_LANES typename L::Int pieceOf(const ChannelView& channel, const Segment
   return pieceAt<L>(channel, coordinate);
 }
 
-/// Where channel n's coordinate takes a value between two places.
+/// Fraction of the segment, between two fractions, at which channel n's coordinate takes a value.
 template <class L, class View>
-SCOLOPAX_LANES typename L::Float placeOf(const SegmentEnds<L, View>& ends, int n, typename L::Float begin,
-                                         typename L::Float end, typename L::Float value, typename L::Mask) {
+SCOLOPAX_LANES typename L::Float fractionOf(const SegmentEnds<L, View>& ends, int n, typename L::Float begin,
+                                            typename L::Float end, typename L::Float value,
+                                            typename L::Mask) {
   const auto from = coordinateOn<L>(ends, n, begin), to = coordinateOn<L>(ends, n, end);
   return begin + (end - begin) * clamp((value - from) / (to - from), 0.0f, 1.0f);
 }
 template <class L, class View>
-SCOLOPAX_LANES typename L::Float placeOf(const SegmentCubics<L, View>& scalars, int n,
-                                         typename L::Float begin, typename L::Float end,
-                                         typename L::Float value, typename L::Mask which) {
-  const Cubic<L>& f = scalars.place[n];
+SCOLOPAX_LANES typename L::Float fractionOf(const SegmentCubics<L, View>& scalars, int n,
+                                            typename L::Float begin, typename L::Float end,
+                                            typename L::Float value, typename L::Mask which) {
+  const Cubic<L>& f = scalars.stored[n];
   const auto low = 2.0f * begin - 1.0f, high = 2.0f * end - 1.0f;
   return clamp(0.5f * (crossing(f, low, high, f.at(low), f.at(high), value, which) + 1.0f), begin, end);
 }
@@ -75,7 +77,7 @@ class Jumps {
       if (!(segment.channels >> n & 1) || !scene.channels[n].optical.jumps || !any(which & segment.of(n)))
         continue;
       channels_ |= 1u << n;
-      piece_[n] = pieceAtPlace(n, Float(0.0f));
+      piece_[n] = pieceAlong(n, Float(0.0f));
     }
   }
   /// Shortens the parts of the rays in `on` that begin at `begin`, to the first jump up to `*end`. After
@@ -85,14 +87,14 @@ class Jumps {
     if (++parts_ > kMostCuts) return;
     for (std::uint32_t left = channels_; left != 0; left &= left - 1) {
       const int n = std::countr_zero(left);
-      const Int to = pieceAtPlace(n, *end);
+      const Int to = pieceAlong(n, *end);
       const Mask here = on & segment_.of(n), up = here & (to > piece_[n]), down = here & (piece_[n] > to);
       if (!any(up | down)) continue;
       Int knot = select(up, piece_[n] + Int(1), piece_[n]);
       const Mask jumps = find(scene_.channels[n].optical, up, down, to, &knot);
       if (!any(jumps)) continue;
       const Knots<L> at = knotsAt<L>(scene_.channels[n].optical, maximum(knot, Int(0)));
-      const Float y = placeOf<L>(scalars_, n, begin, *end, coordinateOf<L>(scalars_, at), jumps);
+      const Float y = fractionOf<L>(scalars_, n, begin, *end, coordinateOf<L>(scalars_, at), jumps);
       const Mask first = jumps & (y <= *end);
       *end = select(first, y, *end);
       channel_ = select(first, Int(n), channel_);
@@ -118,13 +120,13 @@ class Jumps {
       const int n = std::countr_zero(left);
       // The two knots of a jump have a piece between them.
       const Int beyond = knot_ + select(rises_ > Int(0), Int(1), Int(-2));
-      piece_[n] = select(at(n), beyond, pieceAtPlace(n, end));
+      piece_[n] = select(at(n), beyond, pieceAlong(n, end));
     }
   }
 
  private:
-  SCOLOPAX_LANES Int pieceAtPlace(int n, Float place) const {
-    return pieceOf<L>(scene_.channels[n], scalars_, coordinateOn<L>(scalars_, n, place));
+  SCOLOPAX_LANES Int pieceAlong(int n, Float along) const {
+    return pieceOf<L>(scene_.channels[n], scalars_, coordinateOn<L>(scalars_, n, along));
   }
   /// Moves `*knot` to the first knot of a jump, up or down, before piece `to`. Returns where there is one.
   SCOLOPAX_LANES Mask find(const OpticalCurveView& curve, Mask up, Mask down, Int to, Int* knot) const {

@@ -8,7 +8,10 @@
 
 namespace scolopax::kernel {
 
-SCOLOPAX_HD inline float magnitude(float x) { return maximum(x, -x); }
+template <class Float>
+SCOLOPAX_LANES Float magnitude(Float x) {
+  return maximum(x, -x);
+}
 SCOLOPAX_HD inline int clampInt(int x, int lo, int hi) { return x < lo ? lo : (x > hi ? hi : x); }
 
 namespace detail {

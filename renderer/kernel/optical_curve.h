@@ -19,10 +19,20 @@ SCOLOPAX_LANES Float stretchPosition(const ChannelView& channel, Float stored) {
   return select(isFinite(stored), position, Float(kNaN));
 }
 
+/// Position on the curves of a stored value, as in OpticalKnot.
+template <class L>
+SCOLOPAX_LANES typename L::Float positionAt(const ChannelView& channel, typename L::Float stored) {
+  using Float = typename L::Float;
+  const float scale = magnitude(channel.scale);
+  Float position = clamp(stored * scale + channel.offset, -kFarPosition, kFarPosition);
+  if (channel.gamma != 1.0f) position = power(clamp(position, 0.0f, 1.0f), channel.gamma);
+  return position;
+}
+
 /// One knot per lane.
 template <class L>
 struct Knots {
-  typename L::Float position, inverseWidth, place, opacity;
+  typename L::Float position, inverseWidth, stored, opacity;
   typename L::Vec color;
 };
 
@@ -31,13 +41,13 @@ template <class L>
 SCOLOPAX_LANES Knots<L> knotsAt(const OpticalCurveView& curve, typename L::Int index) {
   if constexpr (L::kLanes == 1) {
     const OpticalKnot& knot = curve.knots[index];
-    return {knot.position, knot.inverseWidth, knot.place, knot.opacity, knot.color};
+    return {knot.position, knot.inverseWidth, knot.stored, knot.opacity, knot.color};
   } else {
     const auto at = index * kKnotFloats;
     const OpticalKnot& knot = curve.knots[0];
     return {gather(&knot.position, at),
             gather(&knot.inverseWidth, at),
-            gather(&knot.place, at),
+            gather(&knot.stored, at),
             gather(&knot.opacity, at),
             {gather(&knot.color.x, at), gather(&knot.color.y, at), gather(&knot.color.z, at)}};
   }
@@ -47,7 +57,7 @@ template <class L>
 SCOLOPAX_LANES Knots<L> knotAt(const OpticalCurveView& curve, int index) {
   using Float = typename L::Float;
   const OpticalKnot& knot = curve.knots[index];
-  return {Float(knot.position), Float(knot.inverseWidth), Float(knot.place), Float(knot.opacity),
+  return {Float(knot.position), Float(knot.inverseWidth), Float(knot.stored), Float(knot.opacity),
           typename L::Vec(knot.color)};
 }
 template <class L>

@@ -5,7 +5,6 @@
 // of 5.2-5.3 takes one point instead). Lighting is computed once per stratum of absorbed light. Biased; the
 // error is of second order in the segments' length.
 #pragma once
-#include "renderer/kernel/collision.h"
 #include "renderer/kernel/strata.h"
 
 namespace scolopax::kernel {
@@ -62,7 +61,7 @@ SCOLOPAX_LANES_APART void meet(const View& scene, const Blend& blend, const Scal
   keepNearer(first, collision.which, collision.segment.start + length * along, channel);
 }
 
-/// What is known of rays when they meet surfaces.
+/// State of the rays at a surface.
 template <class L>
 struct Marched {
   typename L::Float transmittance;

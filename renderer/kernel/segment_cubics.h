@@ -8,24 +8,15 @@
 
 namespace scolopax::kernel {
 
-/// The channels' scalars along a segment of every ray, for y from -1 at its start to 1 at its end: as places
-/// (OpticalKnot::place) and, for channels with a gradient factor, as positions of |gradient| on the factor's
-/// curve. NaN where a value is not finite. As with SegmentEnds, arrays that are indexed by variables.
+/// The channels' scalars along a segment of every ray, for y from -1 at its start to 1 at its end: as stored
+/// values (OpticalKnot::stored) and, for channels with a gradient factor, as positions of |gradient| on the
+/// factor's curve. NaN where a value is not finite. As with SegmentEnds, arrays that are indexed by
+/// variables.
 template <class L, class View>
 struct SegmentCubics {
-  Cubic<L> place[kMaxVisibleChannels];
+  Cubic<L> stored[kMaxVisibleChannels];
   Cubic<L> factorPosition[View::kFactors];
 };
-
-/// Position of a place on the curves.
-template <class L>
-SCOLOPAX_LANES typename L::Float positionAt(const ChannelView& channel, typename L::Float place) {
-  using Float = typename L::Float;
-  const float scale = maximum(channel.scale, -channel.scale);
-  Float position = clamp(place * scale + channel.offset, -kFarPosition, kFarPosition);
-  if (channel.gamma != 1.0f) position = power(clamp(position, 0.0f, 1.0f), channel.gamma);
-  return position;
-}
 
 /// A cubic that moves along a curve, from piece to piece.
 template <class L>
@@ -46,11 +37,11 @@ class CurveWalk {
     Float end = select(turns_.first > from, turns_.first, select(turns_.second > from, turns_.second, last));
     atEnd_ = f_.at(end);
     knotsOf<L>(curve_, piece_, which, &a_, &b_);
-    above_ = which & (Int(curve_.count - 1) > piece_) & (atEnd_ > b_.place);
-    below_ = which & (piece_ > Int(-1)) & (atEnd_ < a_.place);
+    above_ = which & (Int(curve_.count - 1) > piece_) & (atEnd_ > b_.stored);
+    below_ = which & (piece_ > Int(-1)) & (atEnd_ < a_.stored);
     const Mask meets = above_ | below_;
     if (any(meets)) {
-      const Float knot = select(above_, b_.place, a_.place);
+      const Float knot = select(above_, b_.stored, a_.stored);
       end = select(meets, crossing(f_, from, end, at_, atEnd_, knot, meets), end);
       atEnd_ = select(meets, knot, atEnd_);
     }
@@ -99,19 +90,19 @@ SCOLOPAX_LANES void addCubicPiece(typename L::Float from, typename L::Float to, 
   }
 }
 
-/// Piece of the channel's curves at a place.
+/// Piece of the channel's curves at a stored value, as in OpticalKnot.
 template <class L>
-SCOLOPAX_LANES typename L::Int pieceAt(const ChannelView& channel, typename L::Float place) {
+SCOLOPAX_LANES typename L::Int pieceAt(const ChannelView& channel, typename L::Float stored) {
   using Int = typename L::Int;
   const OpticalCurveView& curve = channel.optical;
-  Int piece = pointOn<L>(curve, positionAt<L>(channel, place)).piece;
+  Int piece = pointOn<L>(curve, positionAt<L>(channel, stored)).piece;
   if (channel.gamma == 1.0f) return piece;
   // The position is rounded, and it is 0 at all places before the range.
   Knots<L> a, b;
   knotsOf<L>(curve, piece, L::everywhere(), &a, &b);
-  piece = piece + onesOf((Int(curve.count - 1) > piece) & (place >= b.place)) -
-          onesOf((piece > Int(-1)) & (place < a.place));
-  return select(place < curve.knots[0].place, Int(-1), piece);
+  piece = piece + onesOf((Int(curve.count - 1) > piece) & (stored >= b.stored)) -
+          onesOf((piece > Int(-1)) & (stored < a.stored));
+  return select(stored < curve.knots[0].stored, Int(-1), piece);
 }
 
 /// Means over a segment on which the scalar is the cubic `f`; 0 in lanes that are not in `which`.
@@ -175,7 +166,7 @@ SCOLOPAX_LANES PartOf<L> partAlone(const View& scene, const SegmentCubics<L, Vie
   using Mask = typename L::Mask;
   const ChannelView& channel = scene.channels[n];
   const OpticalCurveView& curve = channel.optical;
-  const Cubic<L>& f = scalars.place[n];
+  const Cubic<L>& f = scalars.stored[n];
   const CubicBounds<L> bounds = boundsOf(f);
   const Mask outside = (positionAt<L>(channel, bounds.upper) <= curve.first) |
                        (positionAt<L>(channel, bounds.lower) >= curve.last);
@@ -201,30 +192,30 @@ SCOLOPAX_LANES_RARE void multiplyByFactorAt(const ChannelView& channel, const ty
   *opacity = *opacity * opticalAt<Detail::extinction, L>(curve, pointOn<L>(curve, position), which).opacity;
 }
 
-/// Extinction of channel n at a place in [0,1] of a segment, where its curve has the given opacity.
+/// Extinction of channel n at a fraction `along` of a segment, where its curve has the given opacity.
 template <class L, class View>
 SCOLOPAX_LANES typename L::Float extinctionOn(const View& scene, const SegmentCubics<L, View>& scalars, int n,
-                                              typename L::Float place, typename L::Mask which,
+                                              typename L::Float along, typename L::Mask which,
                                               typename L::Float opacity) {
   const ChannelView& channel = scene.channels[n];
-  typename L::Mask known = isFinite(scalars.place[n].c0);
+  typename L::Mask known = isFinite(scalars.stored[n].c0);
   if (scene.hasFactor(n)) [[unlikely]] {
     const Cubic<L>& g = scalars.factorPosition[n];
     known = known & isFinite(g.c0);
-    multiplyByFactorAt<L>(channel, g.at(2.0f * place - 1.0f), which, &opacity);
+    multiplyByFactorAt<L>(channel, g.at(2.0f * along - 1.0f), which, &opacity);
   }
   return where(known, opacity * channel.density);
 }
 
-/// Extinction (as `opacity`) and colour of channel n at a place in [0,1] of a segment. Undefined for rays
+/// Extinction (as `opacity`) and colour of channel n at a fraction `along` of a segment. Undefined for rays
 /// that are not in `which`.
 template <Detail kDetail, class L, class View>
 SCOLOPAX_LANES Optical<L> opticalOn(const View& scene, const SegmentCubics<L, View>& scalars, int n,
-                                    typename L::Float place, typename L::Mask which) {
+                                    typename L::Float along, typename L::Mask which) {
   const ChannelView& channel = scene.channels[n];
-  const auto position = positionAt<L>(channel, scalars.place[n].at(2.0f * place - 1.0f));
+  const auto position = positionAt<L>(channel, scalars.stored[n].at(2.0f * along - 1.0f));
   Optical<L> optical = opticalAt<kDetail, L>(channel.optical, pointOn<L>(channel.optical, position), which);
-  optical.opacity = extinctionOn(scene, scalars, n, place, which, optical.opacity);
+  optical.opacity = extinctionOn(scene, scalars, n, along, which, optical.opacity);
   return optical;
 }
 

@@ -8,9 +8,6 @@
 
 namespace scolopax::kernel {
 
-/// Maximum number of segments of a ray. A ray with more stops there and counts as truncated.
-inline constexpr int kMaxSegments = 1 << 20;
-
 /// Positions of the channels at a segment's two ends: on their curves and, for channels with a gradient
 /// factor, of |gradient| on the factor's curve. NaN where the value is not finite. Objects like this one hold
 /// arrays that are indexed by variables, and nothing else: a device keeps such an object in memory as a

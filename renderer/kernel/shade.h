@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lighting at a point of a ray: gradient shading and shadows (renderer section 4.6).
 #pragma once
-#include "renderer/kernel/trackers/process_per_channel.h"
+#include "renderer/kernel/clip.h"
+#include "renderer/kernel/gradient.h"
 
 namespace scolopax::kernel {
 

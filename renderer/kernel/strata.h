@@ -69,8 +69,8 @@ struct StratumPlaces {
   typename L::Vec color[kMaxVisibleChannels];
 };
 
-/// Computes the lit radiance of a unit of absorbed light at such points, for lanes in `which`. `surface`: on
-/// which they lie, if they do.
+/// Computes the lit radiance of a unit of absorbed light at such points, for lanes in `which`. `surface`: the
+/// surface on which the points lie, if any.
 template <class Steps, class L, class Blend, class View>
 SCOLOPAX_LANES_APART void findLight(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                     std::uint32_t channels, const StratumPlaces<L>& places,

@@ -104,7 +104,7 @@ class SurfaceWalk {
   /// Rounding error of the cubic's values: of interpolation between stored values, of the fit, and of where
   /// the ray meets the faces of cells.
   SCOLOPAX_LANES Float slackOf(const ChannelView& channel, const CubicBounds<L>& bounds) const {
-    const float origin = maximum(channel.origin, -channel.origin);
+    const float origin = magnitude(channel.origin);
     const Float length = maximum(walk_.end() - walk_.start(), scene_.smallestSpacing * 0.015625f);
     const Float slope = (bounds.upper - bounds.lower) / length;
     return (maximum(bounds.upper, -bounds.lower) + origin) * roundingOf(channel.field.filter) +
@@ -150,7 +150,7 @@ class SurfaceWalk {
       const Vec point = rays_.origin + (walk_.start() + way) * rays_.direction;
       const Float away = sampleStored<L>(channel.field, scene_.dims, point) - channel.origin;
       soon = select(brief & isFinite(away), channel.dataFalls ? -away : away, soon);
-      const Float change = maximum(soon - atBegin, atBegin - soon) * (kSamePlace / kSoon);
+      const Float change = magnitude(soon - atBegin) * (kSamePlace / kSoon);
       slack = select(starts, maximum(slack, change), slack);
     }
     Word above(0u);
@@ -215,10 +215,10 @@ class SurfaceWalk {
     return found;
   }
 
-  /// Where the cubic next comes to the other side of the value, for lanes in `which`; `none` for others and
-  /// if it does not. Between its turns it is monotone, so that the values at their ends tell. An end within
-  /// `slack` of the value, as at a face of a cell whose voxels all have it, tells nothing: the next part
-  /// does. A part all of which has the value, and is long enough to tell, is above it.
+  /// First point at which the cubic changes sides of the value, for lanes in `which`; `none` for others and
+  /// if it does not. Between turning points it is monotone, so that the values at their ends decide. An end
+  /// within `slack` of the value, as at a face of a cell whose voxels all have it, is inconclusive: the next
+  /// interval decides. An interval that has the value throughout, and is not too short, is above it.
   SCOLOPAX_LANES Float crossingAfter(const Cubic<L>& f, const Turns<L>& turns, Float value, Float slack,
                                      Mask above, Mask which, Float none) const {
     const Float ends[] = {turns.first, turns.second, Float(1.0f)};
@@ -261,8 +261,8 @@ class SurfaceWalk {
     return found;
   }
 
-  /// Up to where rays that begin at a surface may meet the face between nearest voxels at which they begin:
-  /// rounding may have put their origins on either side of it.
+  /// End of the interval in which a ray that begins on a face between nearest voxels may meet that face
+  /// again: rounding may have put its origin on either side of it.
   SCOLOPAX_LANES Float endOfFace() const {
     const int longest = maximum(maximum(scene_.dims.x, scene_.dims.y), scene_.dims.z);
     const float rounding = float(longest) * 0x1p-20f;  // voxels
@@ -271,7 +271,7 @@ class SurfaceWalk {
       const Float at = rays_.origin[axis] + enter_ * rays_.direction[axis];
       const Float away = at - (toFloat(truncated(at)) + 0.5f);
       const Mask onFace = (away < rounding) & (away > -rounding);
-      const Float speed = maximum(rays_.direction[axis], -rays_.direction[axis]);
+      const Float speed = magnitude(rays_.direction[axis]);
       end = select(onFace, maximum(end, 2.0f * rounding / speed), end);
     }
     // Rays almost along a face are on one of its sides for long.

@@ -28,8 +28,8 @@ struct CurveView {
 struct OpticalKnot {
   float position;
   float inverseWidth;  ///< 1 / distance to the next knot, or 0
-  float place;  ///< where the position is reached: stored value less the channel's origin, negated where
-                ///< positions fall as stored values rise
+  float stored;        ///< stored value at this knot, less the channel's origin; negated where
+                       ///< positions fall as stored values rise
   float opacity;
   glm::vec3 color;  ///< linear RGB
 };

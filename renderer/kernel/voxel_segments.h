@@ -86,7 +86,7 @@ class VoxelSegments {
                       Float own[kCubicNodes];
                       for (int i = 0; i < kCubicNodes; ++i)
                         own[i] = channel.scale < 0.0f ? -values[i] : values[i];
-                      cell_.place[n] = select<L>(which, cubicThrough<L>(own), cell_.place[n]);
+                      cell_.stored[n] = select<L>(which, cubicThrough<L>(own), cell_.stored[n]);
                       fetches += cubicFetches(channel.field);
                       if (scene_.hasFactor(n)) [[unlikely]] {
                         for (int i = 0; i < kCubicNodes; ++i)
@@ -109,7 +109,7 @@ class VoxelSegments {
     const Float middle = 0.5f * (from_ + to_), half = 0.5f * way_;
     for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
       const int n = std::countr_zero(left);
-      scalars_.place[n] = partOf<L>(cell_.place[n], middle, half);
+      scalars_.stored[n] = partOf<L>(cell_.stored[n], middle, half);
       if (scene_.hasFactor(n)) [[unlikely]]
         scalars_.factorPosition[n] = partOf<L>(cell_.factorPosition[n], middle, half);
     }

@@ -5,7 +5,6 @@
 #include "renderer/kernel/cubic.h"
 #include "renderer/kernel/filters.h"
 #include "renderer/kernel/point_walk.h"
-#include "renderer/kernel/segments.h"
 
 namespace scolopax::kernel {
 
@@ -87,8 +86,8 @@ class VoxelWalk {
     more_ = without(more_, which);
   }
 
-  /// Where each ray meets the next plane through voxel centres after t; with fields of which the nearest
-  /// voxel counts, also of those between.
+  /// Where each ray meets the next plane through voxel centres after t; with
+  /// nearest-voxel interpolation, also the next plane between them.
   SCOLOPAX_LANES Float faceAfter(Float t) const {
     Float face(kInfinity);
     for (int axis = 0; axis < 3; ++axis) {

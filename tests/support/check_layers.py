@@ -17,7 +17,10 @@ MAY_INCLUDE = {
 FORBIDDEN = [
     ("renderer/reference/", r"renderer/(kernel|cpu)/"),
     ("renderer/kernel/", r"renderer/(?!kernel/|core/)"),
-    ("renderer/data/", r"renderer/(io|cpu|reference)/"),
+    ("renderer/data/", r"renderer/(io|cpu|engine|reference)/|renderer/(renderer|launcher)\.h"),
+    ("renderer/kernel/trackers/", r"renderer/kernel/(analog|shade|raymarch|strata)\.h"),
+    ("renderer/kernel/segment", r"renderer/kernel/trackers/"),
+    ("renderer/kernel/shade.h", r"renderer/kernel/trackers/"),
     ("renderer/io/", r"renderer/(kernel|cpu|reference)/"),
     ("server/net/", r"(renderer|protocol)/"),
 ]
