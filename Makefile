@@ -107,10 +107,11 @@ check-cuda: test-deps
 	$(call run-tests,cuda,-L cuda)
 
 # clang 14 supports coroutines but does not define their feature macro, which Boost and libstdc++ test.
-TIDY := clang-tidy --quiet -p build/release --extra-arg=-D__cpp_impl_coroutine=201902L \
+TIDY := clang-tidy --quiet -p build/tidy --extra-arg=-D__cpp_impl_coroutine=201902L \
   --extra-arg=-DBOOST_ASIO_HAS_CO_AWAIT=1 --extra-arg=-DBOOST_ASIO_HAS_STD_COROUTINE=1
 
 check-tidy: build test-deps
+	cmake --preset tidy > /dev/null
 	git ls-files 'renderer/*.cpp' 'cuda/*.cpp' 'protocol/*.cpp' 'server/*.cpp' | xargs -P $(JOBS) -n 4 $(TIDY)
 
 check-format: test-deps

@@ -9,8 +9,6 @@
 namespace scolopax::protocol {
 namespace {
 
-using nlohmann::json;
-
 /// Reads a list index: "0", "7", "12". nullopt for "", "-1", "07", "1e3" and more than 9 digits.
 std::optional<std::size_t> indexOf(std::string_view key) {
   if (key.empty() || key.size() > 9 || (key.size() > 1 && key[0] == '0')) return std::nullopt;
@@ -28,32 +26,34 @@ std::size_t indexBelow(const std::string& key, std::size_t count, const Path& li
 }
 
 /// Patches a value without a table: replaces it or, in a list, replaces single entries that already exist.
-void patchLeaf(json& target, const json& patch, const Path& path) {
+void patchLeaf(nlohmann::json& target, const nlohmann::json& patch, const Path& path) {
   if (!patch.is_object()) {
     target = patch;
     return;
   }
   if (!target.is_array()) fail(path, "an object patches the entries of a list, but no list is set here");
   for (const auto& [key, value] : patch.items()) {
-    json& entry = target[indexBelow(key, target.size(), path)];
+    nlohmann::json& entry = target[indexBelow(key, target.size(), path)];
     if (value.is_null()) fail(path / key, "an entry of this list has no default");
     patchLeaf(entry, value, path / key);
   }
 }
 
 template <Described T>
-void patchStruct(json& target, const json& patch, const Path& path, std::size_t channelCount);
+void patchStruct(nlohmann::json& target, const nlohmann::json& patch, const Path& path,
+                 std::size_t channelCount);
 
 template <class T>
 struct PatchValue {
-  static void apply(json& target, const json& patch, const Path& path, const Traits&, std::size_t) {
+  static void apply(nlohmann::json& target, const nlohmann::json& patch, const Path& path, const Traits&,
+                    std::size_t) {
     patchLeaf(target, patch, path);
   }
 };
 
 template <Described T>
 struct PatchValue<T> {
-  static void apply(json& target, const json& patch, const Path& path, const Traits&,
+  static void apply(nlohmann::json& target, const nlohmann::json& patch, const Path& path, const Traits&,
                     std::size_t channelCount) {
     patchStruct<T>(target, patch, path, channelCount);
   }
@@ -65,17 +65,17 @@ struct PatchValue<std::optional<T>> : PatchValue<T> {};
 
 template <Described T>
 struct PatchValue<std::vector<T>> {
-  static void apply(json& target, const json& patch, const Path& path, const Traits& traits,
-                    std::size_t channelCount) {
+  static void apply(nlohmann::json& target, const nlohmann::json& patch, const Path& path,
+                    const Traits& traits, std::size_t channelCount) {
     std::size_t room = traits.maxItems;
     if constexpr (std::is_same_v<T, Channel>) room = std::min(room, channelCount);
     if (patch.is_array()) {
-      target = json::array();
+      target = nlohmann::json::array();
       if (patch.size() > room)
         fail(path / room, "the list has room for " + std::to_string(room) + " entries");
       for (std::size_t i = 0; i < patch.size(); ++i) patchEntry(target, i, patch[i], path / i, channelCount);
     } else if (patch.is_object()) {
-      if (!target.is_array()) target = json::array();
+      if (!target.is_array()) target = nlohmann::json::array();
       for (const auto& [key, value] : patch.items()) {
         patchEntry(target, indexBelow(key, room, path), value, path / key, channelCount);
       }
@@ -84,11 +84,11 @@ struct PatchValue<std::vector<T>> {
     }
   }
 
-  static void patchEntry(json& list, std::size_t index, const json& patch, const Path& path,
-                         std::size_t channelCount) {
-    while (list.size() <= index) list.push_back(json::object());
+  static void patchEntry(nlohmann::json& list, std::size_t index, const nlohmann::json& patch,
+                         const Path& path, std::size_t channelCount) {
+    while (list.size() <= index) list.push_back(nlohmann::json::object());
     if (patch.is_null())
-      list[index] = json::object();
+      list[index] = nlohmann::json::object();
     else
       patchStruct<T>(list[index], patch, path, channelCount);
   }
@@ -96,7 +96,7 @@ struct PatchValue<std::vector<T>> {
 
 /// Of two fields that exclude each other, a patch that sets only one removes the other.
 template <Described T>
-void removeExcluded(json& target, const json& patch) {
+void removeExcluded(nlohmann::json& target, const nlohmann::json& patch) {
   const auto sets = [&](std::string_view key) {
     const auto found = patch.find(key);
     return found != patch.end() && !found->is_null();
@@ -108,10 +108,11 @@ void removeExcluded(json& target, const json& patch) {
 }
 
 template <Described T>
-void patchStruct(json& target, const json& patch, const Path& path, std::size_t channelCount) {
+void patchStruct(nlohmann::json& target, const nlohmann::json& patch, const Path& path,
+                 std::size_t channelCount) {
   if (!patch.is_object()) failExpected(path, "an object", patch);
   refuseUnknown<T>(patch, path);
-  if (!target.is_object()) target = json::object();
+  if (!target.is_object()) target = nlohmann::json::object();
   removeExcluded<T>(target, patch);
   forEachField<T>([&]<class Value>(const Field<T, Value>& field) {
     const auto found = patch.find(field.name);
@@ -125,16 +126,18 @@ void patchStruct(json& target, const json& patch, const Path& path, std::size_t 
 }
 
 template <Described T>
-json between(const json& from, const json& to);
+nlohmann::json between(const nlohmann::json& from, const nlohmann::json& to);
 
 template <class T>
 struct Between {
-  static json of(const json&, const json& to) { return to; }
+  static nlohmann::json of(const nlohmann::json&, const nlohmann::json& to) { return to; }
 };
 
 template <Described T>
 struct Between<T> {
-  static json of(const json& from, const json& to) { return between<T>(from, to); }
+  static nlohmann::json of(const nlohmann::json& from, const nlohmann::json& to) {
+    return between<T>(from, to);
+  }
 };
 
 template <Described T>
@@ -142,12 +145,12 @@ struct Between<std::optional<T>> : Between<T> {};
 
 template <Described T>
 struct Between<std::vector<T>> {
-  static json of(const json& from, const json& to) {
+  static nlohmann::json of(const nlohmann::json& from, const nlohmann::json& to) {
     if (to.size() < from.size()) return to;  // only a whole list can shorten a list
-    json patch = json::object();
+    nlohmann::json patch = nlohmann::json::object();
     for (std::size_t i = 0; i < to.size(); ++i) {
-      const json none = json::object();
-      const json& before = i < from.size() ? from[i] : none;
+      const nlohmann::json none = nlohmann::json::object();
+      const nlohmann::json& before = i < from.size() ? from[i] : none;
       if (i >= from.size() || before != to[i]) patch[std::to_string(i)] = between<T>(before, to[i]);
     }
     return patch;
@@ -155,8 +158,8 @@ struct Between<std::vector<T>> {
 };
 
 template <Described T>
-json between(const json& from, const json& to) {
-  json patch = json::object();
+nlohmann::json between(const nlohmann::json& from, const nlohmann::json& to) {
+  nlohmann::json patch = nlohmann::json::object();
   forEachField<T>([&]<class Value>(const Field<T, Value>& field) {
     const std::string name(field.name);
     const auto before = from.find(name), after = to.find(name);
@@ -183,12 +186,15 @@ json between(const json& from, const json& to) {
 
 }  // namespace
 
-json applyPatch(const json& sparse, const json& patch, std::size_t channelCount) {
-  json result = sparse;
+nlohmann::json applyPatch(const nlohmann::json& sparse, const nlohmann::json& patch,
+                          std::size_t channelCount) {
+  nlohmann::json result = sparse;
   patchStruct<Scene>(result, patch, Path(), channelCount);
   return result;
 }
 
-json mergePatchBetween(const json& from, const json& to) { return between<Scene>(from, to); }
+nlohmann::json mergePatchBetween(const nlohmann::json& from, const nlohmann::json& to) {
+  return between<Scene>(from, to);
+}
 
 }  // namespace scolopax::protocol

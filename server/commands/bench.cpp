@@ -32,7 +32,7 @@ using bench::Setting;
 using nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
-struct Options {
+struct BenchOptions {
   SceneArguments scene;
   std::vector<std::string> methods;
   std::vector<std::uint32_t> samples{1, 4, 16, 64};
@@ -60,7 +60,7 @@ std::vector<Number> ordered(std::vector<Number> numbers) {
 }
 
 /// All settings requested, without numbers of samples; those of one method are adjacent.
-std::vector<Setting> settingsOf(const Options& options) {
+std::vector<Setting> settingsOf(const BenchOptions& options) {
   std::vector<Setting> settings;
   for (std::size_t i = 0; i < std::size(kMethods); ++i) {
     const auto method = Method(i);
@@ -86,7 +86,7 @@ Scene sceneOf(Scene scene, const Setting& setting) {
 /// One renderer for every number of threads.
 using Renderers = std::map<int, std::unique_ptr<Renderer>>;
 
-Renderers renderersFor(const std::shared_ptr<const Volume>& volume, const Options& options) {
+Renderers renderersFor(const std::shared_ptr<const Volume>& volume, const BenchOptions& options) {
   Renderers renderers;
   for (const int threads : options.threads) renderers[threads] = makeCpuRenderer(volume, threads);
   return renderers;
@@ -95,7 +95,7 @@ Renderers renderersFor(const std::shared_ptr<const Volume>& volume, const Option
 /// The settings with every number of samples that stays within the longest time, as predicted by one sample,
 /// which also warms up. The smallest number is always kept. Costs are counted by separate renderers, since
 /// counting slows them down.
-std::vector<Point> pointsOf(const Options& options, const Renderers& renderers, const Renderers& counting,
+std::vector<Point> pointsOf(const BenchOptions& options, const Renderers& renderers, const Renderers& counting,
                             const Scene& scene) {
   std::vector<Point> points;
   const std::vector<std::uint32_t> samples = ordered(options.samples);
@@ -183,7 +183,7 @@ ordered_json memoryOf(const std::shared_ptr<const Volume>& volume, Scene scene, 
           {"film", grown(withMajorants, heapBytes())}};
 }
 
-std::optional<Image> truthOf(const Options& options, const Volume& volume, const Scene& scene) {
+std::optional<Image> truthOf(const BenchOptions& options, const Volume& volume, const Scene& scene) {
   if (options.timesOnly) return std::nullopt;
   if (options.truth.empty()) {
     fmt::print(stderr, "scolopax: rendering the reference\n");
@@ -198,7 +198,7 @@ std::optional<Image> truthOf(const Options& options, const Volume& volume, const
   return truth;
 }
 
-void run(Options options) {
+void run(BenchOptions options) {
   for (const std::string& method : options.methods)
     if (std::none_of(std::begin(kMethods), std::end(kMethods),
                      [&](const NamedValue& known) { return known.name == method; }))
@@ -246,7 +246,7 @@ void run(Options options) {
 CLI::App* addBenchCommand(CLI::App& root) {
   CLI::App* command =
       root.add_subcommand("bench", "Measure speed against error of the methods on one scene, in one run");
-  const auto o = std::make_shared<Options>();
+  const auto o = std::make_shared<BenchOptions>();
   addSceneArguments(*command, o->scene);
   command
       ->add_option("--methods", o->methods, "Methods to measure, separated by commas; default: all but auto")

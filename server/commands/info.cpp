@@ -31,14 +31,14 @@ void printText(const server::Dataset& dataset) {
 }  // namespace
 
 CLI::App* addInfoCommand(CLI::App& root) {
-  struct Options {
+  struct InfoOptions {
     std::vector<std::filesystem::path> paths;
     bool json = false;
   };
   CLI::App* command = root.add_subcommand(
       "info",
       "Print what volume files contain: dimensions, spacing, and each channel's name, type and range");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<InfoOptions>();
   command->add_option("PATH", options->paths, "Volume files; files with the same grid form one data set")
       ->required();
   command->add_flag("--json", options->json,

@@ -15,7 +15,7 @@
 namespace scolopax {
 namespace {
 
-struct Options {
+struct ReferenceOptions {
   SceneArguments scene;
   std::filesystem::path out;
   int samplesPerAxis = 4;
@@ -27,7 +27,7 @@ double rootMeanSquare(const std::vector<glm::vec4>& values) {
   return std::sqrt(sum / (4 * double(values.size())));
 }
 
-void renderTruth(const Options& options) {
+void renderTruth(const ReferenceOptions& options) {
   io::checkImageName(options.out);
   io::checkWritable(options.out);
   checkOutputs({options.out}, options.scene);
@@ -44,7 +44,7 @@ void renderTruth(const Options& options) {
 CLI::App* addReferenceCommand(CLI::App& root) {
   CLI::App* command =
       root.add_subcommand("reference", "Render a scene in double precision: slow, the reference for errors");
-  const auto o = std::make_shared<Options>();
+  const auto o = std::make_shared<ReferenceOptions>();
   addSceneArguments(*command, o->scene);
   command
       ->add_option("-o,--output", o->out,

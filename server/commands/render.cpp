@@ -27,7 +27,7 @@ namespace {
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-struct Options {
+struct RenderOptions {
   SceneArguments scene;
   std::filesystem::path out;
   std::optional<std::uint32_t> samples;
@@ -112,7 +112,7 @@ void writeStats(const std::filesystem::path& path, const Renderer& renderer, con
   io::writeFile(path, stats.dump(2) + '\n');
 }
 
-void render(const Options& options) {
+void render(const RenderOptions& options) {
   // Checked before minutes are spent on a picture that cannot be written.
   io::checkImageName(options.out);
   io::checkWritable(options.out);
@@ -168,7 +168,7 @@ void render(const Options& options) {
 
 CLI::App* addRenderCommand(CLI::App& root) {
   CLI::App* command = root.add_subcommand("render", "Render a scene into a picture file");
-  const auto o = std::make_shared<Options>();
+  const auto o = std::make_shared<RenderOptions>();
   addSceneArguments(*command, o->scene);
   command
       ->add_option("-o,--output", o->out,

@@ -63,13 +63,13 @@ std::vector<double> drag(ResolutionPolicy& policy, std::uint64_t pixels, int pic
   return divisors;
 }
 
-const RenderPolicy kPolicy;  // 25 ms
+const RenderPolicy kDefaults;  // 25 ms
 constexpr std::uint64_t kPixels = 944 * 770;
 /// Seconds of a pass: 274 ns a ray at 61 x 50 and 99 ns at 944 x 770.
 double measured(std::uint64_t pixels) { return 5.3e-4 + 0.98e-7 * double(pixels); }
 
 TEST(Resolution, ComesFromASmallPictureToTheOneThatFits) {
-  ResolutionPolicy policy(kPolicy);
+  ResolutionPolicy policy(kDefaults);
   policy.passDone(true, 61 * 50, measured(61 * 50));
   const auto divisors = drag(policy, kPixels, 20, [](std::uint64_t pixels, int) { return measured(pixels); });
   for (std::size_t i = 6; i < divisors.size(); ++i) EXPECT_LE(divisors[i], 2) << i;
@@ -78,7 +78,7 @@ TEST(Resolution, ComesFromASmallPictureToTheOneThatFits) {
 TEST(Resolution, IsNotSmallInVainWhereOthersUseTheProcessors) {
   // A pass of any size spends 18 or 30 ms waiting for a processor.
   for (const double waiting : {0.018, 0.030}) {
-    ResolutionPolicy policy(kPolicy);
+    ResolutionPolicy policy(kDefaults);
     drag(policy, kPixels, 40, [](std::uint64_t pixels, int) { return 0.1 + 1e-5 * double(pixels); });
     const auto divisors =
         drag(policy, kPixels, 100, [&](std::uint64_t pixels, int) { return waiting + measured(pixels); });
@@ -87,7 +87,7 @@ TEST(Resolution, IsNotSmallInVainWhereOthersUseTheProcessors) {
 }
 
 TEST(Resolution, TriesFinerPicturesSeldomWhereTheyDoNotFit) {
-  ResolutionPolicy policy(kPolicy);
+  ResolutionPolicy policy(kDefaults);
   const auto divisors =
       drag(policy, kPixels, 600, [](std::uint64_t pixels, int) { return measured(pixels); });
   EXPECT_LE(std::count_if(divisors.begin() + 12, divisors.end(), [](double d) { return d < 2; }), 14);
@@ -95,7 +95,7 @@ TEST(Resolution, TriesFinerPicturesSeldomWhereTheyDoNotFit) {
 }
 
 TEST(Resolution, IsBackWithinTwoPicturesOfADisturbance) {
-  ResolutionPolicy policy(kPolicy);
+  ResolutionPolicy policy(kDefaults);
   drag(policy, kPixels, 12, [](std::uint64_t pixels, int) { return measured(pixels); });
   policy.passGivenUp(true, kPixels / 4, 0.075);
   const auto divisors = drag(policy, kPixels, 12, [](std::uint64_t pixels, int) { return measured(pixels); });
@@ -104,7 +104,7 @@ TEST(Resolution, IsBackWithinTwoPicturesOfADisturbance) {
 }
 
 TEST(Resolution, DoesNotAnswerSinglePassesThatWereDisturbed) {
-  ResolutionPolicy policy(kPolicy);
+  ResolutionPolicy policy(kDefaults);
   drag(policy, kPixels, 12, [](std::uint64_t pixels, int) { return measured(pixels); });
   const auto divisors = drag(policy, kPixels, 60, [](std::uint64_t pixels, int i) {
     return measured(pixels) * (i % 5 == 4 ? 3 : 1);
@@ -114,7 +114,7 @@ TEST(Resolution, DoesNotAnswerSinglePassesThatWereDisturbed) {
 }
 
 TEST(Resolution, FollowsTheSceneWhenItCostsTenTimesAsMuchAndBack) {
-  ResolutionPolicy policy(kPolicy);
+  ResolutionPolicy policy(kDefaults);
   const auto divisors = drag(policy, kPixels, 40, [](std::uint64_t pixels, int i) {
     return measured(pixels) * (i >= 10 && i < 20 ? 10 : 1);
   });
@@ -123,7 +123,7 @@ TEST(Resolution, FollowsTheSceneWhenItCostsTenTimesAsMuchAndBack) {
 }
 
 TEST(Resolution, BeginsWithASmallPictureAndWithAWholeOneWhereNobodyEdits) {
-  ResolutionPolicy policy(kPolicy);
+  ResolutionPolicy policy(kDefaults);
   EXPECT_EQ(policy.atRest(kPixels, std::nullopt), 1);
   EXPECT_EQ(policy.whileEdited(kPixels, 0), 4);
   policy.passDone(false, kPixels, 0.39);  // another kind of pass serves as a first guess
@@ -136,7 +136,7 @@ TEST(Resolution, BeginsWithASmallPictureAndWithAWholeOneWhereNobodyEdits) {
 }
 
 TEST(Resolution, GetsFinerWithEveryStepAtRest) {
-  ResolutionPolicy policy(kPolicy);
+  ResolutionPolicy policy(kDefaults);
   policy.passDone(false, 1000, 1000 * 1e-4);  // 12 s for the whole picture of 120000
   const double first = policy.atRest(120'000, 16);
   EXPECT_EQ(first, 8);  // within 0.3 s
