@@ -21,6 +21,8 @@ using nlohmann::json;
 using protocol::ProtocolError;
 using protocol::shortened;
 
+constexpr std::string_view kSessionsPrefix = "/api/v1/sessions/";
+
 /// Calls f with each part between separators.
 template <class F>
 void forEachPart(std::string_view text, char separator, F&& f) {
@@ -229,6 +231,14 @@ json openApi(const std::vector<Route>& routes) {
           {"paths", std::move(paths)}};
 }
 
+std::string flowOf(const SessionStore& sessions, const net::Request& request) {
+  std::string_view rest = request.path;
+  if (!rest.starts_with(kSessionsPrefix)) return "";
+  rest.remove_prefix(kSessionsPrefix.size());
+  const auto session = sessions.find(rest.substr(0, rest.find('/')));
+  return session ? session->id() : "";
+}
+
 void addApi(net::Server& server, ApiContext& context) {
   std::vector<Route> routes;
   for (auto family : {datasetRoutes, renderRoutes, sessionRoutes, operationRoutes})
@@ -240,15 +250,16 @@ void addApi(net::Server& server, ApiContext& context) {
   for (const Route& route : routes)
     server.route(route.method, regexOf(route.path), guarded(context, route.handler), route.kind);
 
-  static constexpr std::string_view kPrefix = "/api/v1/sessions/", kSuffix = "/stream";
+  static constexpr std::string_view kSuffix = "/stream";
   server.upgrade([&context](const net::Request& request, const std::shared_ptr<net::WebSocket>& socket)
                      -> std::variant<net::WebSocketEvents, net::Response> {
     try {
       const std::string_view path = request.path;
-      if (path.size() <= kPrefix.size() + kSuffix.size() || !path.starts_with(kPrefix) ||
+      if (path.size() <= kSessionsPrefix.size() + kSuffix.size() || !path.starts_with(kSessionsPrefix) ||
           !path.ends_with(kSuffix))
         throw ProtocolError(404, "", "expected the stream of a session, found " + shortened(request.path));
-      const auto id = path.substr(kPrefix.size(), path.size() - kPrefix.size() - kSuffix.size());
+      const auto id =
+          path.substr(kSessionsPrefix.size(), path.size() - kSessionsPrefix.size() - kSuffix.size());
       const auto session = context.sessions.find(id);
       if (!session)
         throw ProtocolError(404, "", "there is no session " + shortened(id) + "; it may have ended");

@@ -63,6 +63,10 @@ std::vector<Route> operationRoutes(ApiContext& context);
 /// OpenAPI 3.1 description of the routes.
 nlohmann::json openApi(const std::vector<Route>& routes);
 
+/// net::Options::flowOf: a session's id for all requests and streams at its address, else "". A name that no
+/// session has makes no flow, so that clients cannot make more flows than there are sessions.
+std::string flowOf(const SessionStore& sessions, const net::Request& request);
+
 /// Registers all routes and the stream's upgrade.
 void addApi(net::Server& server, ApiContext& context);
 

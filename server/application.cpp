@@ -152,6 +152,7 @@ struct Application::Impl {
     if (std::filesystem::is_directory(config.webRoot)) options.staticRoot = config.webRoot;
     options.authorize = [this](const net::Request& request) { return authorizer(request); };
     options.knows = [this](const net::Request& request) { return authorizer.knows(request); };
+    options.flowOf = [this](const net::Request& request) { return flowOf(sessions, request); };
     options.problem = [](int status, const std::string& detail) {
       return errorResponse(protocol::ProtocolError(status, "", detail));
     };

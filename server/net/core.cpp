@@ -6,14 +6,14 @@
 namespace scolopax::net {
 
 namespace {
-constexpr std::size_t kBulkThreads = 2;
+constexpr int kBulkThreads = 2;
 }  // namespace
 
 Core::Core(Options given)
     : options(std::move(given)),
       files(options.staticRoot),
       tls(loadTls(options.certificateFile, options.keyFile)),
-      workers(static_cast<std::size_t>(std::max(1, options.workers))),
+      workers(std::max(1, options.workers)),
       bulkWorkers(kBulkThreads),
       slowWorkers(static_cast<std::size_t>(std::max(1, options.longRequests))) {}
 

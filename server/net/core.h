@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "server/net/fair_pool.h"
 #include "server/net/router.h"
 #include "server/net/server.h"
 #include "server/net/static_files.h"
@@ -42,6 +43,10 @@ class Core {
   /// Runs a handler and turns an exception into a log line and a 500.
   Response guarded(const Handler& handler, const Request& request) const;
 
+  std::string flowOf(const Request& request) const {
+    return options.flowOf ? options.flowOf(request) : std::string();
+  }
+
   /// From here until leave() the server waits for this connection when it stops.
   void enter(const std::shared_ptr<Connection>& connection);
   /// The connection's client is known: the connection is no longer cut to make room.
@@ -68,10 +73,10 @@ class Core {
   std::shared_ptr<asio::io_context> io = std::make_shared<asio::io_context>();
   /// Bytes of texts that wait to be sent; shared as well.
   std::shared_ptr<std::atomic<std::size_t>> unsentTexts = std::make_shared<std::atomic<std::size_t>>(0);
-  asio::thread_pool workers;
-  asio::thread_pool bulkWorkers;
+  FairPool workers;
+  FairPool bulkWorkers;
   /// The pool for quick work on so many bytes: large requests queue only behind each other.
-  asio::thread_pool& workersFor(std::size_t bytes) { return bytes > kBulkBytes ? bulkWorkers : workers; }
+  FairPool& workersFor(std::size_t bytes) { return bytes > kBulkBytes ? bulkWorkers : workers; }
   asio::thread_pool slowWorkers;
   std::atomic<int> slowRunning{0};
   std::atomic<int> quickRunningSlowly{0};  ///< of these, requests of quick routes
@@ -94,12 +99,13 @@ class Core {
   bool cutting_ = false;
 };
 
-/// Runs `work` on the pool and resumes the awaiting coroutine on its own executor with the result.
-template <typename Result, typename Work>
-asio::awaitable<Result> runOn(asio::thread_pool& pool, Work work) {
+/// Runs `work` in a job that `post` hands to another thread, and resumes the awaiting coroutine on its own
+/// executor with the result.
+template <typename Result, typename Post, typename Work>
+asio::awaitable<Result> runBy(Post post, Work work) {
   return asio::async_initiate<const asio::use_awaitable_t<>, void(Result)>(
-      [&pool](auto completion, Work task) {
-        asio::post(pool, [completion = std::move(completion), task = std::move(task)]() mutable {
+      [post = std::move(post)](auto completion, Work task) {
+        post([completion = std::move(completion), task = std::move(task)]() mutable {
           auto executor = asio::get_associated_executor(completion);
           asio::post(executor, [completion = std::move(completion), result = task()]() mutable {
             std::move(completion)(std::move(result));
@@ -107,6 +113,17 @@ asio::awaitable<Result> runOn(asio::thread_pool& pool, Work work) {
         });
       },
       asio::use_awaitable, std::move(work));
+}
+
+template <typename Result, typename Work>
+asio::awaitable<Result> runOn(asio::thread_pool& pool, Work work) {
+  return runBy<Result>([&pool](auto job) { asio::post(pool, std::move(job)); }, std::move(work));
+}
+
+template <typename Result, typename Work>
+asio::awaitable<Result> runOn(FairPool& pool, const std::string& flow, Work work) {
+  return runBy<Result>([&pool, flow](auto job) { pool.post(flow, FairPool::Job(std::move(job))); },
+                       std::move(work));
 }
 
 }  // namespace scolopax::net

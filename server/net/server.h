@@ -33,7 +33,7 @@ struct Options {
   TextLimits unsentTexts;
   /// Beyond: 503. At most half of them may be strangers, whose client is not known yet (`knows`).
   std::size_t maxConnections = 512;
-  int workers = 4;        ///< threads for ordinary handlers and WebSocket events
+  int workers = 4;        ///< threads for ordinary handlers and WebSocket events, which flows share fairly
   int longRequests = 16;  ///< long requests at once, at most a quarter from quick routes; beyond: 503
 
   std::chrono::milliseconds headTimeout{5'000};   ///< from the first byte of a head to its end
@@ -53,6 +53,10 @@ struct Options {
   std::function<std::optional<Response>(const Request&)> authorize;
   /// Whether a request that passed `authorize` comes from a known client; if not set, every one does.
   std::function<bool(const Request&)> knows;
+  /// The flow that a request, or the messages of the WebSocket that it opens, belong to: handlers of one flow
+  /// run one at a time, and flows take turns (FairPool). Called as `authorize` is. Requests without a flow of
+  /// their own belong to the flow "", as all do if this is not set.
+  std::function<std::string(const Request&)> flowOf;
   /// Formats the server's own refusals (404, 405, 413, ...).
   std::function<Response(int status, const std::string& detail)> problem;
   /// Called last on every response, e.g. to add security headers.

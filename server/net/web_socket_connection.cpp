@@ -41,8 +41,11 @@ class WebSocketConnection : public PreparedWebSocket,
                             public Connection,
                             public std::enable_shared_from_this<WebSocketConnection> {
  public:
-  explicit WebSocketConnection(Core& core)
-      : io_(core.io), core_(core), outbox_(core.options.unsentTexts, core.unsentTexts) {}
+  WebSocketConnection(Core& core, std::string flow)
+      : io_(core.io),
+        core_(core),
+        flow_(std::move(flow)),
+        outbox_(core.options.unsentTexts, core.unsentTexts) {}
 
   // The handle, from any thread.
 
@@ -148,11 +151,11 @@ class WebSocketConnection : public PreparedWebSocket,
     }
     std::string text = beast::buffers_to_string(buffer_.data());
     buffer_.consume(buffer_.size());
-    asio::thread_pool& workers = core_.workersFor(text.size());
-    asio::post(workers, [self = shared_from_this(), text = std::move(text)]() mutable {
-      self->deliver(std::move(text));
-      asio::post(*self->strand_, [self] { self->read(); });
-    });
+    FairPool& workers = core_.workersFor(text.size());
+    workers.post(flow_, FairPool::Job([self = shared_from_this(), text = std::move(text)]() mutable {
+                   self->deliver(std::move(text));
+                   asio::post(*self->strand_, [self] { self->read(); });
+                 }));
   }
 
   void deliver(std::string text) {
@@ -235,20 +238,21 @@ class WebSocketConnection : public PreparedWebSocket,
       outbox_.clear();
     }
     stream_.reset();
-    asio::post(core_.workers, [self = shared_from_this()] {
-      try {
-        if (self->events_.onClose) self->events_.onClose();
-      } catch (const std::exception& error) {
-        self->core_.log(std::string("WebSocket close: ") + error.what());
-      }
-      self->events_ = {};
-      self->core_.leave(self.get());
-    });
+    core_.workers.post(flow_, FairPool::Job([self = shared_from_this()] {
+                         try {
+                           if (self->events_.onClose) self->events_.onClose();
+                         } catch (const std::exception& error) {
+                           self->core_.log(std::string("WebSocket close: ") + error.what());
+                         }
+                         self->events_ = {};
+                         self->core_.leave(self.get());
+                       }));
   }
 
   std::shared_ptr<asio::io_context>
       io_;      ///< first: handles outlive the server, and timers need it for their destruction
   Core& core_;  ///< valid until leave()
+  const std::string flow_;
 
   mutable std::mutex mutex_;
   Outbox outbox_;
@@ -271,8 +275,8 @@ class WebSocketConnection : public PreparedWebSocket,
 
 }  // namespace
 
-std::shared_ptr<PreparedWebSocket> prepareWebSocket(Core& core) {
-  auto connection = std::make_shared<WebSocketConnection>(core);
+std::shared_ptr<PreparedWebSocket> prepareWebSocket(Core& core, std::string flow) {
+  auto connection = std::make_shared<WebSocketConnection>(core, std::move(flow));
   core.enter(connection);
   core.trust(connection.get());
   return connection;

@@ -22,6 +22,7 @@ class PreparedWebSocket : public WebSocket {
   virtual void abandon() = 0;
 };
 
-std::shared_ptr<PreparedWebSocket> prepareWebSocket(Core& core);
+/// `flow`: see Options::flowOf.
+std::shared_ptr<PreparedWebSocket> prepareWebSocket(Core& core, std::string flow);
 
 }  // namespace scolopax::net

@@ -58,6 +58,22 @@ TEST(Api, ListsAndDescribesDatasets) {
   EXPECT_EQ(api.errorOf("GET", "/api/v1/datasets/small/probe?x=nan&y=0&z=0").first, 422);
 }
 
+TEST(Api, MakesOneFlowOfASessionAndOneOfAllElse) {
+  Api api;
+  const std::string id = api.workshop.store.create(json::object())->id();
+  const auto flow = [&](const std::string& path) {
+    net::Request request;
+    request.path = path;
+    return flowOf(api.workshop.store, request);
+  };
+  for (const char* path : {"", "/scene", "/frame", "/stream"})
+    EXPECT_EQ(flow("/api/v1/sessions/" + id + path), id);
+  for (const std::string& path :
+       {std::string("/"), std::string("/api/v1/sessions"), "/api/v1/sessions/no" + id,
+        "/api/v1/datasets/" + id, std::string("/api/v1/sessions//scene")})
+    EXPECT_EQ(flow(path), "");
+}
+
 constexpr const char* kSmallRender = R"({"image": {"width": 20, "height": 10}, "stop": {"samples": 3}})";
 
 TEST(Api, RendersToTheTypeThatIsAskedFor) {

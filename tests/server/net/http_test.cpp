@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // HTTP from the view of well-behaved and other clients.
 #include <atomic>
-#include <condition_variable>
 #include <mutex>
 
 #include "server/net/server.h"
+#include "tests/server/net/gate.h"
 #include "tests/server/net/test_client.h"
 
 namespace scolopax::net {
 namespace {
 
 using std::chrono::milliseconds;
+
+Response passed(Gate& gate) {
+  gate.pass();
+  return {};
+}
 
 class HttpTest : public testing::Test {
  protected:
@@ -399,34 +404,6 @@ TEST_F(HttpTest, NamesAHostThatItCannotBind) {
   EXPECT_THROW(server.start(), NetError);
 }
 
-/// Blocks handlers until it is opened.
-class Gate {
- public:
-  ~Gate() { open(); }
-  Response pass() {
-    std::unique_lock lock(mutex_);
-    ++waiting_;
-    changed_.notify_all();
-    changed_.wait(lock, [this] { return open_; });
-    return {};
-  }
-  void open() {
-    const std::lock_guard lock(mutex_);
-    open_ = true;
-    changed_.notify_all();
-  }
-  void waitFor(int count) {
-    std::unique_lock lock(mutex_);
-    ASSERT_TRUE(changed_.wait_for(lock, kPatience, [&] { return waiting_ >= count; }));
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  int waiting_ = 0;
-  bool open_ = false;
-};
-
 TEST_F(HttpTest, LongRequestsNeitherDelayOthersNorGrowWithoutBound) {
   Options options = quickOptions();
   options.workers = 1;
@@ -434,7 +411,7 @@ TEST_F(HttpTest, LongRequestsNeitherDelayOthersNorGrowWithoutBound) {
   Gate gate;
   Server server(options);
   server.route(
-      "GET", "/poll", [&](const Request&) { return gate.pass(); }, RouteKind::slow);
+      "GET", "/poll", [&](const Request&) { return passed(gate); }, RouteKind::slow);
   server.route("GET", "/quick", [](const Request&) { return Response{}; });
   server.start();
   TestClient first(server.port());
@@ -483,7 +460,7 @@ TEST_F(HttpTest, QuickRequestsThatTakeLongHaveAQuarterOfTheSlots) {
   Server server(options);
   server.route("GET", "/measure", [&](const Request& request) {
     if (!request.mayWait) throw TakesLong();
-    return gate.pass();
+    return passed(gate);
   });
   server.route(
       "GET", "/poll", [](const Request&) { return Response{}; }, RouteKind::slow);
@@ -498,6 +475,30 @@ TEST_F(HttpTest, QuickRequestsThatTakeLongHaveAQuarterOfTheSlots) {
   EXPECT_EQ(first.answer().status, 200);
   EXPECT_EQ(second.answer().status, 200);
   EXPECT_EQ(other.request("GET /measure HTTP/1.1").status, 200);
+}
+
+TEST_F(HttpTest, RequestsOfOneFlowThatTakeLongDelayNoOther) {
+  Options options = quickOptions();
+  options.workers = 4;
+  options.flowOf = [](const Request& request) { return request.path; };
+  std::atomic<int> heads{0};
+  options.authorize = [&](const Request&) -> std::optional<Response> { return ++heads, std::nullopt; };
+  Gate gate;
+  Server server(options);
+  server.route("GET", "/slow", [&](const Request&) { return passed(gate); });
+  server.route("GET", "/other", [](const Request&) { return Response{}; });
+  server.start();
+  std::vector<std::unique_ptr<TestClient>> many;
+  for (int i = 0; i < 40; ++i) {
+    many.push_back(std::make_unique<TestClient>(server.port()));
+    many.back()->send("GET /slow HTTP/1.1\r\nHost: a\r\n\r\n");
+  }
+  EXPECT_TRUE(eventually([&] { return heads == 40; }));
+  TestClient other(server.port());
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(other.request("GET /other HTTP/1.1").status, 200);
+  EXPECT_EQ(gate.arrived(), 1);
+  gate.open();
+  for (const auto& client : many) EXPECT_EQ(client->answer().status, 200);
 }
 
 TEST_F(HttpTest, TellsALongRequestThatItsClientHasGone) {
@@ -535,7 +536,7 @@ TEST_F(HttpTest, StopLetsARequestFinishWithinTheGrace) {
   Gate gate;
   Server server(quickOptions());
   server.route(
-      "GET", "/poll", [&](const Request&) { return gate.pass(); }, RouteKind::slow);
+      "GET", "/poll", [&](const Request&) { return passed(gate); }, RouteKind::slow);
   server.start();
   TestClient idle(server.port());
   TestClient busy(server.port());

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "server/net/server.h"
+#include "tests/server/net/gate.h"
 #include "tests/server/net/test_client.h"
 
 namespace scolopax::net {
@@ -324,6 +325,38 @@ TEST_F(WebSocketTest, TextFloodWithoutReadingEndsTheFloodersConnectionOnly) {
   }));
   other->sendText("still here");
   EXPECT_EQ(other->message().data, "got still here");
+}
+
+TEST_F(WebSocketTest, StreamsOfOneFlowThatTakeLongDelayNoOther) {
+  Options options = quickOptions();
+  options.flowOf = [](const Request& request) { return request.path; };
+  Gate gate;
+  Server server(options);
+  server.upgrade([&](const Request& request, const std::shared_ptr<WebSocket>& socket) {
+    const bool slow = request.path == "/slow";
+    return WebSocketEvents{[&gate, slow, weak = std::weak_ptr(socket)](const std::string& text) {
+                             if (slow) gate.pass();
+                             if (const auto open = weak.lock()) open->sendText("got " + text);
+                           },
+                           {}};
+  });
+  server.start();
+  std::vector<std::unique_ptr<TestClient>> slow;
+  for (int i = 0; i < 8; ++i) {
+    slow.push_back(std::make_unique<TestClient>(server.port()));
+    EXPECT_EQ(slow.back()->upgrade("/slow").status, 101);
+  }
+  TestClient other(server.port());
+  EXPECT_EQ(other.upgrade("/other").status, 101);
+  for (const auto& client : slow) client->sendText("edit");
+  gate.waitFor(1);
+  for (int i = 0; i < 3; ++i) {
+    other.sendText("edit");
+    EXPECT_EQ(other.message().data, "got edit");
+  }
+  EXPECT_EQ(gate.arrived(), 1);
+  gate.open();
+  for (const auto& client : slow) EXPECT_EQ(client->message().data, "got edit");
 }
 
 TEST_F(WebSocketTest, SurvivesAbruptEndsWhileFramesAreOffered) {
