@@ -17,6 +17,7 @@ std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene) {
                                            resolver_->replaceNow(scene), hooks_);
   expire();
   const std::lock_guard lock(mutex_);
+  if (closed_) throw protocol::ProtocolError(503, "", *closed_);
   if (sessions_.size() >= options_.maxSessions)
     throw protocol::ProtocolError(
         503, "",
@@ -73,9 +74,13 @@ std::optional<TimePoint> SessionStore::expire() {
 }
 
 void SessionStore::closeAll(const std::string& reason) {
-  for (const auto& session : all()) session->close(reason);
-  const std::lock_guard lock(mutex_);
-  sessions_.clear();
+  std::vector<std::shared_ptr<Session>> sessions;
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = reason;
+    sessions = std::exchange(sessions_, {});
+  }
+  for (const auto& session : sessions) session->close(reason);
 }
 
 }  // namespace scolopax::server

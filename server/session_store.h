@@ -22,8 +22,8 @@ class SessionStore {
   };
   SessionStore(std::shared_ptr<const SceneResolver> resolver, Options options, SessionHooks hooks);
 
-  /// Throws ProtocolError: 503 if the maximum number of sessions is reached, 422 for an invalid scene; and
-  /// Unmeasured until the data that the scene needs has been measured.
+  /// Throws ProtocolError: 503 if the maximum number of sessions is reached or all have been closed, 422 for
+  /// an invalid scene; and Unmeasured until the data that the scene needs has been measured.
   std::shared_ptr<Session> create(const nlohmann::json& scene);
   /// nullptr if there is none.
   std::shared_ptr<Session> find(std::string_view id) const;
@@ -34,6 +34,7 @@ class SessionStore {
   std::vector<std::shared_ptr<Session>> all() const;
   /// Ends the sessions that have expired; returns when the next one may expire.
   std::optional<TimePoint> expire();
+  /// Ends all sessions; create() refuses from then on, with this reason.
   void closeAll(const std::string& reason);
 
  private:
@@ -42,6 +43,7 @@ class SessionStore {
   const SessionHooks hooks_;
   mutable std::mutex mutex_;
   std::vector<std::shared_ptr<Session>> sessions_;
+  std::optional<std::string> closed_;  ///< why, after closeAll()
 };
 
 }  // namespace scolopax::server

@@ -95,8 +95,8 @@ class SlowSlot {
   bool quick_, taken_;
 };
 
-/// While this object lives, notices within kWatchInterval that the client has closed its end. It polls the
-/// system, since reading would consume bytes of the next request.
+/// While this object lives, notices within kWatchInterval that the client has closed the connection, or the
+/// server has. It polls the system, since reading would consume bytes of the next request.
 class ClientWatch {
  public:
   explicit ClientWatch(tcp::socket& socket) : state_(std::make_shared<State>(socket)) { State::wait(state_); }
@@ -116,7 +116,7 @@ class ClientWatch {
       state->timer.async_wait([state](const error_code&) {
         if (!state->alive) return;
         pollfd asked{state->socket.native_handle(), POLLRDHUP, 0};
-        if (poll(&asked, 1, 0) > 0)
+        if (!state->socket.is_open() || poll(&asked, 1, 0) > 0)
           state->gone.request_stop();
         else
           wait(state);

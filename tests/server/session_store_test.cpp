@@ -75,6 +75,21 @@ TEST(SessionStore, RefusesOneSessionTooManyWith503) {
   EXPECT_NE(workshop.store.create(json::object()), nullptr);
 }
 
+TEST(SessionStore, BeginsNoSessionOnceAllHaveBeenClosed) {
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
+  workshop.store.closeAll("the server is stopping");
+  EXPECT_EQ(session->waitForFrame({}, 1h), nullptr);  // at once
+  try {
+    workshop.store.create(json::object());
+    FAIL() << "no error";
+  } catch (const protocol::ProtocolError& error) {
+    EXPECT_EQ(error.status, 503);
+    EXPECT_STREQ(error.what(), "the server is stopping");
+  }
+  EXPECT_TRUE(workshop.store.all().empty());
+}
+
 TEST(SessionStore, RefusesASceneThatIsNone) {
   Workshop workshop;
   EXPECT_THROW(workshop.store.create({{"nonsense", 1}}), protocol::ProtocolError);

@@ -552,6 +552,27 @@ TEST_F(HttpTest, StopLetsARequestFinishWithinTheGrace) {
   EXPECT_FALSE(TestClient(server.port()).connected());
 }
 
+TEST_F(HttpTest, StopTellsLongRequestsThatTheirClientsHaveGone) {
+  Gate entered;
+  entered.open();
+  std::atomic<bool> gone{false};
+  Server server(quickOptions());
+  server.route(
+      "GET", "/poll",
+      [&](const Request& request) {
+        entered.pass();
+        gone = eventually([&] { return request.gone.stop_requested(); });
+        return Response{};
+      },
+      RouteKind::slow);
+  server.start();
+  TestClient waiting(server.port());
+  waiting.send("GET /poll HTTP/1.1\r\nHost: a\r\n\r\n");
+  entered.waitFor(1);
+  server.stop(milliseconds(0));
+  EXPECT_TRUE(gone);
+}
+
 TEST_F(HttpTest, StopCutsClientsThatStall) {
   start();
   TestClient halfHead(port());
