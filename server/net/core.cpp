@@ -38,12 +38,12 @@ Response Core::guarded(const Handler& handler, const Request& request) const {
   return problem(500, "The server failed; see its log for the cause.");
 }
 
-void Core::enter(const std::shared_ptr<Connection>& connection) {
+void Core::enter(const std::shared_ptr<Connection>& connection, const std::string& address) {
   bool stop = false;
   bool cut = false;
   {
     const std::lock_guard lock(mutex_);
-    connections_.emplace(connection.get(), Entry{connection, arrivals_++});
+    connections_.emplace(connection.get(), Entry{connection, address});
     stop = stopping_;
     cut = cutting_;
   }
@@ -65,27 +65,30 @@ void Core::trust(Connection* connection) {
 }
 
 bool Core::makeRoom() {
-  std::shared_ptr<Connection> oldest;
-  std::size_t taken = 0;
+  std::shared_ptr<Connection> unlucky;
+  std::size_t taken = 0, strangers = 0;
   {
     const std::lock_guard lock(mutex_);
-    std::size_t strangers = 0;
-    Entry* first = nullptr;
+    std::map<std::string_view, std::vector<Entry*>> byAddress;
     for (auto& [key, entry] : connections_) {
       if (entry.leaving) continue;
       ++taken;
       if (!entry.stranger) continue;
       ++strangers;
-      if (!first || entry.arrival < first->arrival) first = &entry;
+      byAddress[entry.address].push_back(&entry);
     }
     const std::size_t most = options.maxConnections;
-    if (first && (taken >= most || strangers >= std::max<std::size_t>(most / 2, 1))) {
-      first->leaving = true;
-      oldest = first->connection.lock();
+    if (strangers > 0 && (taken >= most || strangers >= std::max<std::size_t>(most / 2, 1))) {
+      const auto& [address, theirs] =
+          *std::max_element(byAddress.begin(), byAddress.end(),
+                            [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
+      Entry* entry = theirs[std::uniform_int_distribution<std::size_t>(0, theirs.size() - 1)(random_)];
+      entry->leaving = true;
+      unlucky = entry->connection.lock();
       --taken;
     }
   }
-  if (oldest) oldest->cut();
+  if (unlucky) unlucky->cut();
   return taken < options.maxConnections;
 }
 

@@ -12,6 +12,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -47,12 +48,15 @@ class Core {
     return options.flowOf ? options.flowOf(request) : std::string();
   }
 
-  /// From here until leave() the server waits for this connection when it stops.
-  void enter(const std::shared_ptr<Connection>& connection);
+  /// From here until leave() the server waits for this connection when it stops. `address`: the client's, for
+  /// makeRoom().
+  void enter(const std::shared_ptr<Connection>& connection, const std::string& address);
   /// The connection's client is known: the connection is no longer cut to make room.
   void trust(Connection* connection);
   /// Whether there is room for one more connection. Strangers, whose client is not known yet, have at most
-  /// half of the places: when they fill that half, or all places are taken, the oldest stranger is cut.
+  /// half of the places: when they fill that half, or all places are taken, one of them is cut, at random
+  /// among those of the address that has the most. So a flood from one address cuts only itself, and one from
+  /// many cannot choose whom it cuts.
   bool makeRoom();
   /// Must be a connection's last call to its core.
   void leave(Connection* connection);
@@ -84,7 +88,7 @@ class Core {
  private:
   struct Entry {
     std::weak_ptr<Connection> connection;
-    std::uint64_t arrival;  ///< number of connections that entered before
+    std::string address;
     bool stranger = true;
     bool leaving = false;  ///< was cut to make room
   };
@@ -94,7 +98,7 @@ class Core {
   mutable std::mutex mutex_;
   std::condition_variable left_;
   std::map<Connection*, Entry> connections_;
-  std::uint64_t arrivals_ = 0;
+  std::mt19937 random_{std::random_device()()};
   std::atomic<bool> stopping_{false};
   bool cutting_ = false;
 };

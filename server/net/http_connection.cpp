@@ -136,11 +136,12 @@ bool isSafeHeader(const std::string& name, const std::string& value) {
 
 class HttpConnection : public Connection, public std::enable_shared_from_this<HttpConnection> {
  public:
-  HttpConnection(Core& core, tcp::socket socket, bool full)
+  HttpConnection(Core& core, tcp::socket socket, std::string remoteAddress, bool full)
       : core_(core),
         transport_(std::move(socket), core.tls.get()),
         executor_(transport_.get_executor()),
         buffer_(core.options.headerLimit + kBufferSlack),
+        remoteAddress_(std::move(remoteAddress)),
         full_(full) {}
 
   void beginStop() override {
@@ -154,9 +155,6 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
   static awaitable<void> run(std::shared_ptr<HttpConnection> self) {
     try {
-      error_code ignored;
-      const auto peer = self->transport_.socket().remote_endpoint(ignored);
-      self->remoteAddress_ = peer.address().to_string();
       Milliseconds patience = self->core_.options.headTimeout;
       if (co_await self->secure()) {
         while (co_await self->exchange(patience)) patience = self->core_.options.idleTimeout;
@@ -409,7 +407,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
   Transport transport_;
   asio::any_io_executor executor_;  ///< a copy: cut() may come after the socket has been moved away
   boost::beast::flat_buffer buffer_;
-  std::string remoteAddress_;
+  const std::string remoteAddress_;
   bool full_;
   bool idle_ = false;  ///< between requests: a server that stops need not wait
   bool linger_ = false;
@@ -422,8 +420,10 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
 void serveHttp(Core& core, tcp::socket socket, bool full) {
   const auto executor = socket.get_executor();
-  auto connection = std::make_shared<HttpConnection>(core, std::move(socket), full);
-  core.enter(connection);
+  error_code ignored;
+  const std::string address = socket.remote_endpoint(ignored).address().to_string();
+  auto connection = std::make_shared<HttpConnection>(core, std::move(socket), address, full);
+  core.enter(connection, address);
   asio::co_spawn(executor, HttpConnection::run(std::move(connection)), asio::detached);
 }
 

@@ -277,7 +277,7 @@ class WebSocketConnection : public PreparedWebSocket,
 
 std::shared_ptr<PreparedWebSocket> prepareWebSocket(Core& core, std::string flow) {
   auto connection = std::make_shared<WebSocketConnection>(core, std::move(flow));
-  core.enter(connection);
+  core.enter(connection, "");
   core.trust(connection.get());
   return connection;
 }

@@ -51,7 +51,8 @@ struct Message {
 
 class TestClient {
  public:
-  explicit TestClient(std::uint16_t port, int receiveBuffer = 0)
+  /// `from`: the client's own address, of 127.0.0.0/8.
+  explicit TestClient(std::uint16_t port, int receiveBuffer = 0, const char* from = "127.0.0.1")
       : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
     if (receiveBuffer > 0) setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receiveBuffer, sizeof receiveBuffer);
     const timeval patience{kPatience.count(), 0};
@@ -59,6 +60,8 @@ class TestClient {
     setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
     sockaddr_in address{};
     address.sin_family = AF_INET;
+    inet_pton(AF_INET, from, &address.sin_addr);
+    ::bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address);
     address.sin_port = htons(port);
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     connected_ = ::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
