@@ -2,6 +2,7 @@
 #include "server/net/http_connection.h"
 
 #include <poll.h>
+#include <sys/socket.h>
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
@@ -33,6 +34,7 @@ using Parser = http::request_parser<http::string_body>;
 constexpr std::size_t kBufferSlack = 64 << 10;
 constexpr Milliseconds kLingerTime{2'000};
 constexpr Milliseconds kWatchInterval{100};
+constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
 
 auto into(error_code& error) { return asio::redirect_error(asio::use_awaitable, error); }
 
@@ -95,11 +97,15 @@ class SlowSlot {
   bool quick_, taken_;
 };
 
-/// While this object lives, notices within kWatchInterval that the client has closed the connection, or the
-/// server has. It polls the system, since reading would consume bytes of the next request.
+/// While this object lives, notices within a few kWatchInterval that the client has closed the connection, or
+/// the server has. It polls the system, since reading would consume bytes of the next request. A client may
+/// also close only its sending side and wait for the answer. `mayAsk`: plain HTTP/1.1, where the two can be
+/// told apart.
 class ClientWatch {
  public:
-  explicit ClientWatch(tcp::socket& socket) : state_(std::make_shared<State>(socket)) { State::wait(state_); }
+  ClientWatch(tcp::socket& socket, bool mayAsk) : state_(std::make_shared<State>(socket, mayAsk)) {
+    State::wait(state_);
+  }
   ~ClientWatch() {
     state_->alive = false;
     state_->timer.cancel();
@@ -110,20 +116,31 @@ class ClientWatch {
 
  private:
   struct State {
-    explicit State(tcp::socket& s) : socket(s), timer(s.get_executor()) {}
+    State(tcp::socket& s, bool ask) : socket(s), timer(s.get_executor()), mayAsk(ask) {}
     static void wait(const std::shared_ptr<State>& state) {
       state->timer.expires_after(kWatchInterval);
       state->timer.async_wait([state](const error_code&) {
         if (!state->alive) return;
-        pollfd asked{state->socket.native_handle(), POLLRDHUP, 0};
-        if (!state->socket.is_open() || poll(&asked, 1, 0) > 0)
+        if (state->closed())
           state->gone.request_stop();
         else
           wait(state);
       });
     }
+    bool closed() {
+      if (!socket.is_open()) return true;
+      pollfd polled{socket.native_handle(), POLLRDHUP, 0};
+      if (poll(&polled, 1, 0) <= 0) return false;
+      if (polled.revents != POLLRDHUP || !mayAsk) return true;
+      // Whoever has closed the connection resets it when an interim response arrives; others ignore that.
+      if (std::exchange(asked, true)) return false;
+      return send(socket.native_handle(), kContinue.data(), kContinue.size(), MSG_NOSIGNAL | MSG_DONTWAIT) !=
+             ssize_t(kContinue.size());
+    }
     tcp::socket& socket;
     asio::steady_timer timer;
+    const bool mayAsk;
+    bool asked = false;
     bool alive = true;
     std::stop_source gone;
   };
@@ -254,7 +271,6 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     error_code error;
     const Deadline deadline(transport_.socket(), core_.options.bodyTimeout);
     if (request.header("Expect") && version_ >= 11 && buffer_.size() == 0) {
-      static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
       co_await asio::async_write(transport_, asio::buffer(kContinue), into(error));
     }
     if (!error) co_await http::async_read(transport_, buffer_, parser, into(error));
@@ -317,7 +333,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     const SlowSlot slot(core_, route.kind);
     if (!slot.taken())
       co_return withRetry(core_.problem(503, "Too many long requests at once; retry later."));
-    const ClientWatch watch(transport_.socket());
+    const ClientWatch watch(transport_.socket(), version_ >= 11 && !transport_.tls());
     request.mayWait = true;
     request.gone = watch.gone();
     co_return co_await runOn<Response>(core_.slowWorkers,

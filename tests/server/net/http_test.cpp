@@ -568,6 +568,35 @@ TEST_F(HttpTest, TellsALongRequestThatItsClientHasGone) {
   EXPECT_EQ(gone, 2);
 }
 
+TEST_F(HttpTest, AClientThatOnlyStopsSendingIsNotGone) {
+  Server server(quickOptions());
+  std::atomic<bool> release{false}, gone{false};
+  server.route(
+      "GET", "/long",
+      [&](const Request& request) {
+        eventually([&] { return release || request.gone.stop_requested(); });
+        gone = request.gone.stop_requested();
+        return Response{};
+      },
+      RouteKind::slow);
+  server.start();
+  TestClient client(server.port());
+  client.send("GET /long HTTP/1.1\r\nHost: a\r\n\r\n");
+  client.finishSending();
+  // The server sends an interim response, since a client that has closed the connection would reset it then.
+  EXPECT_EQ(client.answer(true).status, 100);
+  release = true;
+  EXPECT_EQ(client.answer().status, 200);
+  EXPECT_FALSE(gone);
+  // HTTP/1.0 has no interim responses.
+  release = false;
+  TestClient old(server.port());
+  old.send("GET /long HTTP/1.0\r\n\r\n");
+  old.finishSending();
+  EXPECT_EQ(old.answer().status, 200);
+  EXPECT_TRUE(gone);
+}
+
 TEST_F(HttpTest, StopLetsARequestFinishWithinTheGrace) {
   Gate gate;
   Server server(quickOptions());

@@ -82,6 +82,9 @@ class TestClient {
     return true;
   }
 
+  /// Closes the sending side only.
+  void finishSending() { ::shutdown(socket_, SHUT_WR); }
+
   /// Closes the connection with a reset instead of an orderly shutdown.
   void reset() {
     const linger hard{1, 0};
