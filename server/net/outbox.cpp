@@ -8,18 +8,16 @@ namespace scolopax::net {
 
 bool Outbox::pushText(std::string text) {
   if (closing()) return true;
-  if (!hasRoomFor(text.size())) return false;
+  if (texts_.size() >= limits_.count) return false;
   unsent_ += text.size();
-  *unsentByAll_ += text.size();
+  const std::size_t all = unsentByAll_->fetch_add(text.size()) + text.size();
+  const bool mineFit = texts_.empty() || unsent_ <= limits_.bytes;
+  if (unsent_ > limits_.fairBytes && !(mineFit && all <= limits_.bytesOfAll)) {
+    release(text.size());
+    return false;
+  }
   texts_.push_back(std::move(text));
   return true;
-}
-
-bool Outbox::hasRoomFor(std::size_t bytes) const {
-  if (texts_.size() >= limits_.count) return false;
-  if (texts_.empty()) return true;  // a single text may have any size
-  const std::size_t mine = unsent_ + bytes;
-  return mine <= limits_.fairBytes || (mine <= limits_.bytes && *unsentByAll_ + bytes <= limits_.bytesOfAll);
 }
 
 void Outbox::release(std::size_t bytes) {

@@ -51,7 +51,6 @@ class Outbox {
   const WebSocketStats& stats() const { return stats_; }
 
  private:
-  bool hasRoomFor(std::size_t bytes) const;
   void dropTexts();
   void release(std::size_t bytes);
 

@@ -26,7 +26,7 @@ struct Frame {
 struct TextLimits {
   std::size_t count = 256;            ///< texts for one client
   std::size_t bytes = 4 << 20;        ///< of the texts for one client; a single text may be longer
-  std::size_t bytesOfAll = 64 << 20;  ///< of the texts for all clients together
+  std::size_t bytesOfAll = 64 << 20;  ///< of the texts for all clients together, even single ones
   std::size_t fairBytes = 256 << 10;  ///< for one client, even when all together exceed bytesOfAll
 };
 

@@ -91,7 +91,7 @@ TEST(Outbox, RefusesMoreTextsThanItsLimit) {
 
 TEST(Outbox, RefusesMoreBytesOfTextThanItsLimitButForASingleText) {
   Outbox outbox(texts(9));
-  EXPECT_TRUE(outbox.pushText(std::string(5000, 'x')));
+  EXPECT_TRUE(outbox.pushText(std::string(900, 'x')));
   EXPECT_FALSE(outbox.pushText("y"));
   outbox.next();
   EXPECT_TRUE(outbox.pushText("y"));  // one more may wait while the large one is being sent
@@ -100,6 +100,19 @@ TEST(Outbox, RefusesMoreBytesOfTextThanItsLimitButForASingleText) {
   EXPECT_TRUE(outbox.pushText(std::string(50, 'x')));
   EXPECT_TRUE(outbox.pushText(std::string(49, 'x')));
   EXPECT_FALSE(outbox.pushText("y"));
+}
+
+TEST(Outbox, HoldsToTheLimitOfAllTogetherAlsoWithTextsThatAreAlone) {
+  const auto all = std::make_shared<std::atomic<std::size_t>>(0);
+  Outbox first(texts(9), all), second(texts(9), all);
+  EXPECT_TRUE(first.pushText(std::string(900, 'x')));
+  EXPECT_FALSE(second.pushText(std::string(101, 'x')));
+  EXPECT_TRUE(second.pushText(std::string(100, 'x')));
+  first.next();
+  EXPECT_FALSE(first.pushText(std::string(101, 'x')));  // the first is still being sent
+  EXPECT_EQ(*all, 1000U);
+  first.next();
+  EXPECT_EQ(*all, 100U);
 }
 
 TEST(Outbox, LeavesAFairShareToEachWhenAllTogetherHaveMoreThanTheyMay) {
