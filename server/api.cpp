@@ -58,7 +58,8 @@ net::Handler guarded(const ApiContext& context, const net::Handler& handler) {
     try {
       net::Response response = handler(request);
       // Whatever changes something is answered: its client would take a refusal to mean that nothing changed.
-      return request.method == "GET" ? charged(context.memory, std::move(response)) : response;
+      const bool changes = request.method != "GET" && request.method != "HEAD";
+      return changes ? std::move(response) : charged(context.memory, std::move(response));
     } catch (const ProtocolError& error) {
       return errorResponse(error);
     } catch (const Error& error) {

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole server over its network, with fake renderers.
+#include "server/application.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "tests/server/fakes.h"
+#include "tests/server/net/gate.h"
+#include "tests/server/net/test_client.h"
+
+namespace scolopax::server {
+namespace {
+
+using namespace std::chrono_literals;
+using net::Answer;
+using net::eventually;
+using net::Gate;
+using net::TestClient;
+using nlohmann::json;
+
+/// A server whose renderers are all controlled by what the test puts into `building`.
+class ApplicationTest : public ::testing::Test {
+ protected:
+  void start() {
+    config_.port = 0;
+    config_.token = kToken;
+    config_.maxRenders = 1;
+    std::vector<Dataset> datasets;
+    datasets.push_back({"small", "small.nrrd", {"small.nrrd"}, testing::smallVolume()});
+    const auto make = [this](const std::shared_ptr<const Volume>&) {
+      const auto control = std::make_shared<testing::FakeControl>();
+      control->building = building_;
+      return std::make_unique<testing::FakeRenderer>(control);
+    };
+    application_.emplace(config_, std::move(datasets), make, memory_, [](const std::string&) {});
+    application_->start();
+  }
+  static std::string head(const std::string& request) {
+    return request + " HTTP/1.1\r\nAuthorization: Bearer " + kToken + "\r\nContent-Type: application/json";
+  }
+  /// Sends a request without waiting for its answer.
+  static void send(TestClient& client, const std::string& request, const std::string& body = "") {
+    client.send(head(request) + "\r\nHost: localhost\r\nContent-Length: " + std::to_string(body.size()) +
+                "\r\n\r\n" + body);
+  }
+  Answer call(const std::string& request, const std::string& body = "") {
+    return TestClient(application_->port()).request(head(request), body);
+  }
+  std::string newSession(const std::string& body = "{}") {
+    const Answer answer = call("POST /api/v1/sessions", body);
+    EXPECT_EQ(answer.status, 201) << answer.body;
+    return "/api/v1/sessions/" + json::parse(answer.body)["id"].get<std::string>();
+  }
+
+  static constexpr const char* kToken = "0123456789abcdef";
+  Config config_;
+  std::function<void(std::stop_token)> building_;
+  std::shared_ptr<MemoryBudget> memory_;
+  std::optional<Application> application_;  ///< last: ends before what its renderers use
+};
+
+TEST_F(ApplicationTest, ChargesTheAnswersToHeadAsThoseToGet) {
+  memory_ = std::make_shared<MemoryBudget>(256 << 10);
+  start();
+  json points = json::array();
+  for (int i = 0; i < 4096; ++i) points.push_back({i / 4096.0, 0.123456789});
+  const std::string session = newSession(
+      json{{"scene", {{"channels", {{"0", {{"opacity", points}}}, {"1", {{"opacity", points}}}}}}}}.dump());
+  const auto full = MemoryBudget::takeShared(memory_, MemoryUse::answers, 128 << 10);
+  EXPECT_EQ(call("GET " + session + "/scene").status, 503);
+  EXPECT_EQ(call("HEAD " + session + "/scene").status, 503);
+}
+
+}  // namespace
+}  // namespace scolopax::server
