@@ -179,14 +179,26 @@ void ProgressiveRender::sceneTaken(PassResult& result) {
   rebuildUs_ = microseconds(result.rebuildSeconds);
 }
 
-void ProgressiveRender::addSample(bool urgent, bool othersUrgent, PassResult& result) {
+/// The longest turn of a first picture after an edit. While other sessions are edited, it is their pictures
+/// that wait: a pass then gets the time that it was planned for and, if that is not enough, short turns, as
+/// do the passes after it until one is completed.
+std::chrono::microseconds ProgressiveRender::urgentSlice(int editedOthers) const {
+  constexpr double kMargin = 1.5;  // so that a pass as long as planned needs a single turn
+  const RenderPolicy& policy = context_.policy;
+  if (editedOthers == 0) return policy.tooLate;
+  if (film_.unfinished || film_.abandoned) return policy.politeSlice;
+  return std::chrono::duration_cast<std::chrono::microseconds>(kMargin * targetOfPass(policy, editedOthers));
+}
+
+void ProgressiveRender::addSample(const RenderRequest& request, const Others& others, PassResult& result) {
+  const bool urgent = film_.firstOfEdit(request), othersWait = others.urgent || request.pick;
+  const RenderPolicy& policy = context_.policy;
+  const auto slice = urgent ? urgentSlice(others.edited) : othersWait ? policy.politeSlice : policy.slice;
   const TimePoint begin = context_.now();
   if (!film_.unfinished) film_.passBegan = begin, film_.passSeconds = 0;
   // A turn between two urgent ones is short but not interrupted, so it makes progress however fast edits
   // come.
-  const bool whole = urgent || othersUrgent;
-  const RenderPolicy& policy = context_.policy;
-  const auto slice = urgent ? policy.tooLate : othersUrgent ? policy.politeSlice : policy.slice;
+  const bool whole = urgent || othersWait;
   const bool complete = renderer_->renderPixels(whole ? kNever : interrupted_, slice);
   result.cancelled = !complete && !whole && interrupted_;
   film_.passSeconds += secondsBetween(begin, context_.now());
@@ -273,8 +285,7 @@ void ProgressiveRender::turn(const RenderRequest& request, const Others& others,
   if (took && pickIn(request)) return;  // so the pick need not wait for a pass
   // A sample added in the background is shown before the next pass begins.
   if (collected && !film_.unfinished && showDue(request)) return show(request, result);
-  const bool othersWait = others.urgent || request.pick;
-  if (!finished(request)) addSample(film_.firstOfEdit(request), othersWait, result);
+  if (!finished(request)) addSample(request, others, result);
   if (!job_ && !film_.unfinished && showDue(request)) show(request, result);
 }
 

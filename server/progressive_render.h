@@ -98,7 +98,8 @@ class ProgressiveRender {
   void collect(PassResult& result);
   void takeScene(const RenderRequest& request, const Others& others, PassResult& result);
   void sceneTaken(PassResult& result);
-  void addSample(bool urgent, bool othersUrgent, PassResult& result);
+  std::chrono::microseconds urgentSlice(int editedOthers) const;
+  void addSample(const RenderRequest& request, const Others& others, PassResult& result);
   void sampleAdded(PassResult& result);
   void show(const RenderRequest& request, PassResult& result);
   void pictureMade(PassResult& result);

@@ -26,6 +26,10 @@ double secondsOf(std::chrono::microseconds time) { return std::chrono::duration<
 
 }  // namespace
 
+std::chrono::microseconds targetOfPass(const RenderPolicy& policy, int editedOthers) {
+  return std::max(2 * policy.frameTarget / std::max(2, 1 + editedOthers), policy.leastTarget);
+}
+
 double divisorForTarget(std::uint64_t pixels, const PassCost& cost, double targetSeconds, double current) {
   targetSeconds = std::max(targetSeconds, kOverFixed * cost.fixedSeconds());
   const double most = kLargestStep * cost.largestPixels();
@@ -64,10 +68,8 @@ bool ResolutionPolicy::probes(const PassCost& cost) {
 double ResolutionPolicy::whileEdited(std::uint64_t pixels, int editedOthers) {
   const PassCost& cost = costOf(true);
   if (!cost.known()) return kProbeDivisor;
-  // All edited sessions together have two targets a round, so that the picture stays sharp while they are
-  // few.
-  const auto target = std::max(2 * policy_.frameTarget / std::max(2, 1 + editedOthers), policy_.leastTarget);
-  const double divisor = divisorForTarget(pixels, cost, secondsOf(target), current_);
+  const double target = secondsOf(targetOfPass(policy_, editedOthers));
+  const double divisor = divisorForTarget(pixels, cost, target, current_);
   if (divisor < current_) untilProbe_ = probeWait_ = kLeastWait;
   if (divisor == current_ && probes(cost)) return finerThan(current_);
   return current_ = divisor;

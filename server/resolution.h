@@ -24,6 +24,10 @@ struct RenderPolicy {
   std::chrono::milliseconds shield{300};     ///< for so long a pass with a stale scene continues
 };
 
+/// The time for one session's pass while edits arrive at it and at `editedOthers` other sessions. All edited
+/// sessions together have two frame targets a round, so that the picture stays sharp while they are few.
+std::chrono::microseconds targetOfPass(const RenderPolicy& policy, int editedOthers);
+
 /// The largest divisor of width and height.
 inline constexpr double kMostDivisor = 16;
 

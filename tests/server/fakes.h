@@ -35,10 +35,11 @@ struct FakeControl {
   double secondsPerPixel = 0;        ///< how far a pass advances the clock
   std::function<void()> duringPass;  ///< called in the middle of each pass
   std::function<double(std::uint32_t samples)> error = [](std::uint32_t) { return 1.0; };
-  std::string failure;                     ///< if set, setScene throws an Error with this message
-  int incompletePasses = 0;                ///< calls that use up their budget before the pass is complete
-  std::vector<std::uint32_t> passes;       ///< the scene's seed in each pass that was not cancelled
-  std::vector<std::pair<int, int>> sizes;  ///< width and height in each such pass
+  std::string failure;       ///< if set, setScene throws an Error with this message
+  int incompletePasses = 0;  ///< calls that use up their budget before the pass is complete
+  std::vector<std::chrono::nanoseconds> budgets;  ///< of each call
+  std::vector<std::uint32_t> passes;              ///< the scene's seed in each pass that was not cancelled
+  std::vector<std::pair<int, int>> sizes;         ///< width and height in each such pass
   int renderersMade = 0;
   bool takesLong = false;                         ///< what takesLong() returns, for every scene
   std::function<void(std::stop_token)> building;  ///< called in setScene
@@ -110,6 +111,7 @@ class FakeRenderer : public Renderer {
   }
   bool takesLong(const Scene&) const override { return control_->takesLong; }
   bool renderPixels(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
+    control_->budgets.push_back(budget);
     if (control_->incompletePasses > 0) {
       if (control_->clock)
         control_->clock->advance(std::chrono::duration_cast<std::chrono::microseconds>(budget));

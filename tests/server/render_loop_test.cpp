@@ -305,6 +305,46 @@ TEST(RenderLoop, SharesTheTimeForAPassBetweenTheSessionsThatAreEdited) {
   EXPECT_EQ(viewers[1]->frames.back().width, 100);  // 10 ms: one of four sessions, which share 50 ms
 }
 
+/// The time that each turn gets when none suffices and `edited` sessions have been edited, over three rounds.
+std::vector<std::chrono::nanoseconds> turnsOfSlowPasses(int edited) {
+  Workshop workshop;
+  std::vector<std::shared_ptr<Session>> sessions;
+  for (int i = 0; i < edited; ++i) {
+    sessions.push_back(workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}}));
+    sessions.back()->addViewer(std::make_shared<FakeViewer>());
+  }
+  workshop.steps(2 * edited);
+  for (const auto& session : sessions) session->patch(seedPatch(1), {});
+  workshop.control->incompletePasses = 3 * edited;
+  workshop.control->budgets.clear();
+  workshop.steps(3 * edited);
+  return workshop.control->budgets;
+}
+
+TEST(RenderLoop, GivesAnEditsPictureOnlyItsShareOfTheTimeWhileOtherSessionsAreEdited) {
+  using Times = std::vector<std::chrono::nanoseconds>;
+  EXPECT_EQ(turnsOfSlowPasses(1), (Times{75ms, 75ms, 75ms}));  // each begins coarser
+  EXPECT_EQ(turnsOfSlowPasses(2), (Times{37500us, 37500us, 8ms, 8ms, 8ms, 8ms}));
+  EXPECT_EQ(turnsOfSlowPasses(3), (Times{24999us, 24999us, 24999us, 8ms, 8ms, 8ms, 8ms, 8ms, 8ms}));
+}
+
+TEST(RenderLoop, BeginsThePictureOfAnEditAnewCoarserWhenItsShortTurnsTakeTooLong) {
+  Workshop workshop;
+  const json scene = {{"image", {{"width", 400}, {"height", 300}}}};
+  const auto slow = workshop.store.create(scene);
+  slow->addViewer(std::make_shared<FakeViewer>());
+  workshop.steps(2);
+  const auto other = workshop.store.create(scene);
+  other->addViewer(std::make_shared<FakeViewer>());
+  workshop.steps(2);
+  for (const auto& session : {slow, other}) session->patch(seedPatch(1), {});
+  const int turns = 1 + 5;  // of 37.5 and 8 ms: more than 75
+  workshop.control->incompletePasses = 2 * turns;
+  workshop.steps(2 * turns + 1);
+  EXPECT_EQ(workshop.control->sizes.back(), std::pair(160, 120));
+  EXPECT_EQ(workshop.control->budgets.back(), 8ms);  // it has taken too much before
+}
+
 TEST(RenderLoop, LetsSessionsTakeTurns) {
   Workshop workshop;
   std::vector<std::shared_ptr<FakeViewer>> viewers;
