@@ -47,6 +47,14 @@ void ProgressiveRender::dropRenderer() {
   renderer_.reset();
 }
 
+/// Until an edit has been shown, speed still counts more than quality: if its picture is late because others
+/// had their turns, a finer one would be much later.
+RenderRequest ProgressiveRender::request() const {
+  RenderRequest request = session_->request();
+  if (film_.shown.revision < request.edit) request.interactive = true;
+  return request;
+}
+
 /// Whether there is a pick and the renderer has its scene and is not building another.
 bool ProgressiveRender::pickable(const RenderRequest& request) const {
   return request.pick && film_.scene && !taking_ && film_.revision == request.revision;
@@ -61,7 +69,7 @@ bool ProgressiveRender::showDue(const RenderRequest& request) const {
 }
 
 ProgressiveRender::Work ProgressiveRender::work() const {
-  const RenderRequest request = session_->request();
+  const RenderRequest request = this->request();
   if (pickable(request)) return Work::urgent;
   if (job_ && !job_->done()) return Work::none;
   if (job_) return film_.firstOfEdit(request) ? Work::urgent : Work::still;
@@ -70,13 +78,13 @@ ProgressiveRender::Work ProgressiveRender::work() const {
 }
 
 bool ProgressiveRender::edited() const {
-  const RenderRequest request = session_->request();
+  const RenderRequest request = this->request();
   return request.wanted && request.interactive;
 }
 
 std::optional<TimePoint> ProgressiveRender::dueAt() const {
   if (job_) return std::nullopt;  // its end wakes the loop
-  const RenderRequest request = session_->request();
+  const RenderRequest request = this->request();
   if (!request.wanted || request.retryAt) return request.retryAt;
   // Even if the end has just passed, between work() and here: it is then due at once.
   if (request.interactive || film_.shown.interactive) return request.interactiveEnd;
@@ -126,7 +134,7 @@ void ProgressiveRender::collect(PassResult& result) {
 
 void ProgressiveRender::supervise() {
   if (!job_ || job_->done()) return;
-  const RenderRequest request = session_->request();
+  const RenderRequest request = this->request();
   const bool useless = taking_ ? taking_->uselessFor(request) : showing_ && film_.stale(request);
   if (!request.wanted || useless) job_->cancel();
 }
@@ -291,7 +299,7 @@ void ProgressiveRender::turn(const RenderRequest& request, const Others& others,
 
 PassResult ProgressiveRender::run(const Others& others) {
   PassResult result;
-  const RenderRequest request = session_->request();
+  const RenderRequest request = this->request();
   try {
     turn(request, others, result);
     return result;

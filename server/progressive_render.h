@@ -82,6 +82,7 @@ class ProgressiveRender {
  private:
   using Next = void (ProgressiveRender::*)(PassResult&);
 
+  RenderRequest request() const;
   bool finished(const RenderRequest& request) const;
   bool showDue(const RenderRequest& request) const;
   bool pickable(const RenderRequest& request) const;

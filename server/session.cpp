@@ -60,6 +60,7 @@ Session::SceneState Session::edit(std::shared_ptr<const ResolvedScene> next, con
   lastUsed_ = hooks_.now();
   if (pictureChanges) {
     lastEdit_ = lastUsed_;
+    editRevision_ = revision_;
     hooks_.interruptRender();
   }
   for (auto& [id, viewer] : viewers_) {
@@ -221,6 +222,7 @@ RenderRequest Session::request() const {
   if (seen && lastEdit_) {
     request.interactiveEnd = *lastEdit_ + kInteractiveTime;
     request.interactive = hooks_.now() < request.interactiveEnd;
+    request.edit = editRevision_;
   }
   return request;
 }

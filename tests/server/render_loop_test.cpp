@@ -345,6 +345,24 @@ TEST(RenderLoop, BeginsThePictureOfAnEditAnewCoarserWhenItsShortTurnsTakeTooLong
   EXPECT_EQ(workshop.control->budgets.back(), 8ms);  // it has taken too much before
 }
 
+TEST(RenderLoop, ShowsTheSmallPictureOfAnEditHoweverLateItIs) {
+  Workshop workshop;
+  workshop.control->secondsPerPixel = 1e-6;
+  const auto session = workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.step();
+  session->patch(seedPatch(1), {});
+  workshop.control->incompletePasses = 1;
+  workshop.step();
+  workshop.clock.advance(Session::kInteractiveTime);
+  workshop.step();
+  EXPECT_LT(viewer->frames.back().width, 400);
+  EXPECT_EQ(viewer->frames.back().info.revision, 2u);
+  workshop.step();
+  EXPECT_EQ(viewer->frames.back().width, 400);
+}
+
 TEST(RenderLoop, LetsSessionsTakeTurns) {
   Workshop workshop;
   std::vector<std::shared_ptr<FakeViewer>> viewers;
