@@ -159,6 +159,9 @@ void ProgressiveRender::takeScene(const RenderRequest& request, const Others& ot
   taking_->record = request.aovs && !film_.recording;
   taking_->renderer = renderer_;
   taking_->inBackground = !renderer_ || renderer_->takesLong(taking_->scene);
+  Scene chosen = taking_->scene;
+  if (chosen.method == Method::automatic) chosen.method = Method::hybrid;
+  taking_->onlyChooses = taking_->inBackground && renderer_ && !renderer_->takesLong(chosen);
   const auto build = [taking = taking_, volume, make = context_.makeRenderer](const std::stop_token& stop) {
     if (!taking->renderer) taking->renderer = make(volume);
     taking->stats = taking->renderer->setScene(taking->scene, stop);

@@ -26,12 +26,14 @@ struct SceneTaking {
   Scene scene;
   bool record = false;  ///< AOVs are recorded from this scene on
   bool inBackground = false;
+  bool onlyChooses = false;  ///< what takes long is only the automatic choice of the method
   std::shared_ptr<Renderer> renderer;
   RebuildStats stats;
 
   /// Whether the expensive part of this build is useless for `other`.
   bool uselessFor(const RenderRequest& other) const {
-    return other.scene->dataset->volume != request.scene->dataset->volume ||
+    return (onlyChooses && other.edit != request.edit) ||
+           other.scene->dataset->volume != request.scene->dataset->volume ||
            other.scene->render.macrocell != scene.macrocell;
   }
 };

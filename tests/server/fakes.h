@@ -42,6 +42,7 @@ struct FakeControl {
   std::vector<std::pair<int, int>> sizes;         ///< width and height in each such pass
   int renderersMade = 0;
   bool takesLong = false;                         ///< what takesLong() returns, for every scene
+  bool choosingTakesLong = false;                 ///< the same, for scenes with the automatic method
   std::function<void(std::stop_token)> building;  ///< called in setScene
   std::shared_ptr<MemoryBudget> memory;           ///< from which films take a byte per pixel
   std::uint32_t longErrorFrom =
@@ -109,7 +110,9 @@ class FakeRenderer : public Renderer {
     scene_ = scene;
     return stats;
   }
-  bool takesLong(const Scene&) const override { return control_->takesLong; }
+  bool takesLong(const Scene& scene) const override {
+    return control_->takesLong || (control_->choosingTakesLong && scene.method == Method::automatic);
+  }
   bool renderPixels(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
     control_->budgets.push_back(budget);
     if (control_->incompletePasses > 0) {

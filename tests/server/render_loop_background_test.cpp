@@ -133,6 +133,31 @@ TEST(RenderLoop, SleepsWhileThereIsNothingButABuild) {
   EXPECT_GE(*workshop.render.step(), workshop.hooks.now() + 300s);
 }
 
+TEST(RenderLoop, EndsTheChoiceOfAMethodForASceneThatIsEdited) {
+  Workshop workshop;
+  workshop.control->secondsPerPixel = 1e-6;
+  const auto session = workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.control->choosingTakesLong = true;
+  workshop.step();
+  session->patch(seedPatch(1), {});
+  workshop.step();
+  workshop.background.atOnce = false;
+  workshop.clock.advance(Session::kInteractiveTime);
+  workshop.step();
+  ASSERT_EQ(workshop.background.waiting.size(), 1u);
+  session->patch(seedPatch(2), {});
+  workshop.step();
+  bool stopped = false;
+  workshop.control->building = [&](const std::stop_token& stop) { stopped = stop.stop_requested(); };
+  workshop.background.finish();
+  EXPECT_TRUE(stopped);
+  workshop.control->building = nullptr;
+  workshop.step();
+  EXPECT_EQ(viewer->frames.back().red, 2);
+}
+
 TEST(RenderLoop, GivesUpABuildThatNobodyWaitsForAnyMore) {
   Workshop workshop;
   workshop.background.atOnce = false;
