@@ -51,4 +51,8 @@ nlohmann::json parseJson(std::string_view text, const Limits& limits) {
   }
 }
 
+std::string jsonText(const nlohmann::json& json) {
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 }  // namespace scolopax::protocol

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parses untrusted text as JSON. All JSON text from clients comes in here; the limits are checked before it
-// is parsed.
+// JSON as text. All JSON text from clients comes in here; the limits are checked before it is parsed.
 #pragma once
 #include <cstddef>
 #include <nlohmann/json_fwd.hpp>
+#include <string>
 #include <string_view>
 
 namespace scolopax::protocol {
@@ -17,5 +17,7 @@ struct Limits {
 /// that is not JSON in UTF-8, and for a number outside the range of a double. If an object repeats a key, the
 /// last value counts.
 nlohmann::json parseJson(std::string_view text, const Limits& limits = {});
+/// Compact text. Bytes that are not UTF-8 are replaced.
+std::string jsonText(const nlohmann::json& json);
 
 }  // namespace scolopax::protocol

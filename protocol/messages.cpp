@@ -115,8 +115,9 @@ std::string helloText(const nlohmann::json& capabilities, std::string_view sessi
                   {"capabilities", capabilities}});
 }
 
-std::string sceneText(std::uint32_t revision, const nlohmann::json& patch) {
-  return written({{"type", "scene"}, {"revision", revision}, {"patch", patch}});
+std::string sceneText(std::uint32_t revision, std::string_view patch) {
+  std::string text = R"({"type":"scene","revision":)" + std::to_string(revision) + R"(,"patch":)";
+  return text.append(patch).append("}");
 }
 
 std::string errorText(const ProtocolError& error, std::uint32_t patchId) {

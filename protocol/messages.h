@@ -47,9 +47,9 @@ using ClientMessage =
 ClientMessage parseClientMessage(std::string_view text, const Limits& limits = {});
 
 std::string helloText(const nlohmann::json& capabilities, std::string_view session, std::string_view token);
-/// For the viewers that did not send the edit: `patch` turns the resolved scene before the edit into the one
-/// after it.
-std::string sceneText(std::uint32_t revision, const nlohmann::json& patch);
+/// For the viewers that did not send the edit: `patch`, as JSON text, turns the resolved scene before the
+/// edit into the one after it.
+std::string sceneText(std::uint32_t revision, std::string_view patch);
 /// `patchId`: id of the refused patch; 0 if the error is about something else.
 std::string errorText(const ProtocolError& error, std::uint32_t patchId = 0);
 std::string noticeText(std::string_view text);

@@ -109,7 +109,7 @@ int statusOf(ErrorCode code) {
 }
 
 net::Response jsonResponse(int status, const json& body) {
-  return {status, "application/json", body.dump(-1, ' ', false, json::error_handler_t::replace), {}};
+  return {status, "application/json", protocol::jsonText(body), {}};
 }
 
 net::Response charged(const std::shared_ptr<MemoryBudget>& memory, net::Response response) {

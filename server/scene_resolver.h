@@ -55,6 +55,7 @@ class SceneResolver {
     std::size_t maxIntervals = 1 << 25;    ///< macrocells x channels, for macrocells below the default size
   };
   SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options);
+  virtual ~SceneResolver() = default;
 
   using Resolved = std::shared_ptr<const ResolvedScene>;
   /// Resolves a whole scene. Automatic values (the view and the ranges of gradients) are chosen from its
@@ -68,8 +69,8 @@ class SceneResolver {
   Resolved patch(const ResolvedScene& base, const nlohmann::json& patch,
                  const std::stop_token& stop = {}) const;
   /// The same for callers that must not wait: throw Unmeasured instead.
-  Resolved replaceNow(const nlohmann::json& scene) const;
-  Resolved patchNow(const ResolvedScene& base, const nlohmann::json& patch) const;
+  virtual Resolved replaceNow(const nlohmann::json& scene) const;
+  virtual Resolved patchNow(const ResolvedScene& base, const nlohmann::json& patch) const;
   const protocol::Lists& lists() const { return lists_; }
 
  private:

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "protocol/json_text.h"
+#include "protocol/messages.h"
 #include "protocol/patch.h"
 #include "protocol/problem.h"
 
@@ -31,15 +33,11 @@ Session::SceneState Session::scene() const {
 }
 
 Session::SceneState Session::patch(const nlohmann::json& patch, const EditOrigin& origin) {
-  const std::lock_guard lock(mutex_);
-  checkRevision(origin);
-  return edit(resolver_->patchNow(*scene_, patch), origin);
+  return edit(origin, [&](const ResolvedScene& before) { return resolver_->patchNow(before, patch); });
 }
 
 Session::SceneState Session::replace(const nlohmann::json& scene, const EditOrigin& origin) {
-  const std::lock_guard lock(mutex_);
-  checkRevision(origin);
-  return edit(resolver_->replaceNow(scene), origin);
+  return edit(origin, [&](const ResolvedScene&) { return resolver_->replaceNow(scene); });
 }
 
 void Session::checkRevision(const EditOrigin& origin) const {
@@ -50,11 +48,24 @@ void Session::checkRevision(const EditOrigin& origin) const {
                                       ", found revision " + std::to_string(revision_));
 }
 
-Session::SceneState Session::edit(std::shared_ptr<const ResolvedScene> next, const EditOrigin& origin) {
-  const bool pictureChanges = next->picture != scene_->picture;
-  nlohmann::json change;  // for other viewers; most sessions have only one
-  if (viewers_.size() > viewers_.count(origin.viewer))
-    change = protocol::mergePatchBetween(scene_->resolved, next->resolved);
+Session::SceneState Session::edit(const EditOrigin& origin, const Resolve& resolve) {
+  const std::lock_guard editing(editing_);
+  std::shared_ptr<const ResolvedScene> before;  // released without the mutex, as that may take time
+  std::unique_lock lock(mutex_);
+  checkRevision(origin);
+  before = scene_;
+  // Whatever takes time is done without the mutex.
+  lock.unlock();
+  auto next = resolve(*before);
+  const bool pictureChanges = next->picture != before->picture;
+  lock.lock();
+  std::optional<std::string> change;  // for other viewers; most sessions have only one
+  while (!change && viewers_.size() > viewers_.count(origin.viewer)) {
+    lock.unlock();
+    change = protocol::jsonText(protocol::mergePatchBetween(before->resolved, next->resolved));
+    lock.lock();
+  }
+  checkRevision(origin);  // a query for AOVs may have begun one, or the session have ended
   scene_ = std::move(next);
   ++revision_;
   lastUsed_ = hooks_.now();
@@ -63,9 +74,10 @@ Session::SceneState Session::edit(std::shared_ptr<const ResolvedScene> next, con
     editRevision_ = revision_;
     hooks_.interruptRender();
   }
+  const std::string message = change ? protocol::sceneText(revision_, *change) : std::string();
   for (auto& [id, viewer] : viewers_) {
     if (id != origin.viewer) {
-      viewer.sink->sceneChanged(revision_, change);
+      viewer.sink->sceneChanged(message);
       continue;
     }
     viewer.pending.push_back({origin.patchId, revision_});
@@ -126,7 +138,8 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
     // The picture starts over, so it must not be confused with the one before.
     aovs_ = true;
     ++revision_;
-    for (auto& [id, viewer] : viewers_) viewer.sink->sceneChanged(revision_, nlohmann::json::object());
+    const std::string message = protocol::sceneText(revision_, "{}");
+    for (auto& [id, viewer] : viewers_) viewer.sink->sceneChanged(message);
   }
   retryIfBusy();
   const std::uint32_t revision = revision_;

@@ -5,7 +5,8 @@
 // Threads and locks:
 //  1. Network threads edit, read, poll, join and leave; one render thread and one encoder thread serve all
 //     sessions.
-//  2. Everything that they share is in Session, guarded by its one mutex; each public function locks it once.
+//  2. Everything that they share is in Session, guarded by its mutex, which is never held for long: the loops
+//     need it for every session in every step.
 //  3. The mutex is never held while rendering or encoding: both work on snapshots (shared_ptr to const).
 //  4. The renderer and its film belong to the render thread (ProgressiveRender) or, while there is one, to
 //     the background job that it started; no lock guards them. While a job runs that does not build a scene,
@@ -16,7 +17,8 @@
 //     queues: it neither blocks nor calls back.
 //  7. An edit interrupts the running pass after it has changed the scene. RenderLoop clears the interruption
 //     before it looks at any scene, so no edit is lost between the two.
-//  8. No thread measures data with the mutex held: an edit that needs a measurement throws Unmeasured and
+//  8. Edits of a session wait for each other: one that resolves a scene holds a mutex of its own, which no
+//     loop takes. No thread measures data meanwhile: an edit that needs a measurement throws Unmeasured and
 //     changes nothing.
 //  9. Waking a loop locks that loop's own mutex, which is the innermost. The store's mutex is never held
 //     together with a session's.
@@ -45,9 +47,9 @@ class ViewerSink {
   virtual ~ViewerSink() = default;
   /// `patch`: id of this viewer's last patch that the frame contains, 0 for none.
   virtual void offerFrame(const EncodedFrame& frame, std::uint32_t patch) = 0;
-  /// Another client edited the scene, or a query for AOVs began a revision: `patch` turns the previous
-  /// resolved scene into that of `revision`.
-  virtual void sceneChanged(std::uint32_t revision, const nlohmann::json& patch) = 0;
+  /// Another client edited the scene, or a query for AOVs began a revision. `message` is protocol::sceneText
+  /// of the change, written once for all viewers.
+  virtual void sceneChanged(const std::string& message) = 0;
   /// The scene cannot be rendered, or not at present.
   virtual void renderFailed(const Error& error) = 0;
   /// The session has ended.
@@ -140,8 +142,8 @@ class Session {
   std::shared_ptr<const EncodedFrame> latestFrame() const;
   /// Requests what is visible in the current scene or a newer one. `answered` is called once, on any thread
   /// and with the session's mutex held, so it must only queue; it is never called if the session is closed
-  /// first. Throws ProtocolError: 404 if the session has ended, 422 as areaOf(), 429 if too many picks wait
-  /// already; and the renderer's Error if the scene cannot be rendered.
+  /// first. Throws ProtocolError: 404 if the session has ended, 422 as areaOf(),
+  /// 429 if too many picks wait already; and the renderer's Error if the scene cannot be rendered.
   PickId pick(const PickQuery& query, OnPicked answered);
   /// The same, but waits for the answer; nullopt if none came in time or the session was closed. Throws what
   /// made the pick fail.
@@ -185,7 +187,8 @@ class Session {
     std::deque<PendingPatch> pending;  ///< patches newer than the last frame offered
   };
 
-  SceneState edit(std::shared_ptr<const ResolvedScene> next, const EditOrigin& origin);
+  using Resolve = std::function<SceneResolver::Resolved(const ResolvedScene& before)>;
+  SceneState edit(const EditOrigin& origin, const Resolve& resolve);
   void checkRevision(const EditOrigin& origin) const;
   void retryIfBusy();
   PickId addPick(const PickQuery& query, OnPicked answered);
@@ -198,6 +201,7 @@ class Session {
   const std::shared_ptr<const SceneResolver> resolver_;
   const SessionHooks hooks_;
 
+  std::mutex editing_;  ///< held while an edit is made; taken before mutex_
   mutable std::mutex mutex_;
   std::condition_variable_any frameCame_;  ///< a frame, a pick's answer, a failure, an edit or the end
   std::shared_ptr<const ResolvedScene> scene_;

@@ -84,9 +84,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
     out.payload = frame.jpeg;
     if (const auto socket = socket_.lock()) socket->offerFrame(std::move(out));
   }
-  void sceneChanged(std::uint32_t revision, const nlohmann::json& patch) override {
-    sendText(protocol::sceneText(revision, patch));
-  }
+  void sceneChanged(const std::string& message) override { sendText(message); }
   void renderFailed(const Error& error) override {
     sendText(protocol::errorText(ProtocolError(statusOf(error.code()), "", error.what())));
   }

@@ -76,7 +76,7 @@ TEST(ParseClientMessage, RefusesWhatIsNotJsonOrTooLarge) {
 
 TEST(ServerMessages, AreWrittenAsTheFixtures) {
   EXPECT_EQ(json::parse(helloText({{"version", "0.1.0"}}, "k3", "3q2-7w")), serverFixture("hello"));
-  EXPECT_EQ(json::parse(sceneText(8, json::parse(R"({"channels": {"1": {"color": "#ff0000"}}})"))),
+  EXPECT_EQ(json::parse(sceneText(8, R"({"channels": {"1": {"color": "#ff0000"}}})")),
             serverFixture("scene"));
   EXPECT_EQ(
       json::parse(errorText(

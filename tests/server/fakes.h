@@ -198,14 +198,17 @@ struct FakeViewer : ViewerSink {
   };
   std::vector<Offer> frames;
   std::vector<std::pair<std::uint32_t, nlohmann::json>> scenes;
+  std::vector<const std::string*> messages;  ///< addresses of the texts that tell of these scenes
   std::vector<std::string> failures;
   std::string closed;
 
   void offerFrame(const EncodedFrame& frame, std::uint32_t patch) override {
     frames.push_back({frame.info, frame.width, frame.height, frame.image->pixels.front().r, patch});
   }
-  void sceneChanged(std::uint32_t revision, const nlohmann::json& patch) override {
-    scenes.emplace_back(revision, patch);
+  void sceneChanged(const std::string& message) override {
+    const auto parsed = nlohmann::json::parse(message);
+    scenes.emplace_back(parsed["revision"], parsed["patch"]);
+    messages.push_back(&message);
   }
   void renderFailed(const Error& error) override { failures.emplace_back(error.what()); }
   void sessionClosed(const std::string& reason) override { closed = reason; }

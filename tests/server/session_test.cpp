@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <future>
+#include <latch>
+#include <thread>
+
 #include "protocol/problem.h"
 #include "tests/server/fakes.h"
 
@@ -71,6 +75,71 @@ TEST(Session, TellsTheOtherViewersOfAnEdit) {
   ASSERT_EQ(other->scenes.size(), 1u);
   EXPECT_EQ(other->scenes[0].first, 2u);
   EXPECT_EQ(other->scenes[0].second, (json{{"channels", {{"1", {{"color", "#102030"}}}}}}));
+}
+
+TEST(Session, WritesTheMessageAboutAnEditOnceForAllViewers) {
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
+  const auto first = std::make_shared<FakeViewer>(), second = std::make_shared<FakeViewer>();
+  session->addViewer(first);
+  session->addViewer(second);
+  session->patch(seedPatch(1), {});
+  ASSERT_EQ(first->messages.size(), 1u);
+  EXPECT_EQ(first->messages, second->messages);
+}
+
+/// Resolves no patch before it is released.
+class HeldResolver : public SceneResolver {
+ public:
+  HeldResolver() : SceneResolver(testing::smallStore(), {}) {}
+  Resolved patchNow(const ResolvedScene& base, const json& patch) const override {
+    entered.count_down();
+    released.wait();
+    return SceneResolver::patchNow(base, patch);
+  }
+  mutable std::latch entered{1};
+  std::latch released{1};
+};
+
+TEST(Session, ServesTheLoopsAndNewViewersWhileAnEditIsResolved) {
+  Workshop workshop;
+  const auto resolver = std::make_shared<HeldResolver>();
+  Session session("id", "token", resolver, resolver->replaceNow(json::object()), workshop.hooks);
+  std::thread editor([&] { session.patch(seedPatch(5), {}); });
+  resolver->entered.wait();
+  const auto viewer = std::make_shared<FakeViewer>();
+  auto served = std::async(std::launch::async, [&] {
+    session.addViewer(viewer);
+    session.deliver();
+    return session.request().revision;
+  });
+  const bool inTime = served.wait_for(10s) == std::future_status::ready;
+  resolver->released.count_down();
+  editor.join();
+  ASSERT_TRUE(inTime);
+  EXPECT_EQ(served.get(), 1u);
+  EXPECT_EQ(session.request().revision, 2u);
+  EXPECT_EQ(viewer->scenes, (std::vector<std::pair<std::uint32_t, json>>{{2, seedPatch(5)}}));
+}
+
+TEST(Session, RefusesAnEditWhoseRevisionEndedWhileItWasResolved) {
+  Workshop workshop;
+  const auto resolver = std::make_shared<HeldResolver>();
+  Session session("id", "token", resolver, resolver->replaceNow(json::object()), workshop.hooks);
+  int status = 0;
+  std::thread editor([&] {
+    try {
+      session.patch(seedPatch(5), {0, 0, 1});
+    } catch (const ProtocolError& error) {
+      status = error.status;
+    }
+  });
+  resolver->entered.wait();
+  EXPECT_EQ(session.waitForFrame({0, 1, true}, 0ms), nullptr);  // begins a revision
+  resolver->released.count_down();
+  editor.join();
+  EXPECT_EQ(status, 409);
+  EXPECT_EQ(session.scene().scene->render.seed, 0u);
 }
 
 TEST(Session, RendersNothingThatNobodyLooksAt) {
