@@ -41,7 +41,7 @@
 namespace scolopax::server {
 
 /// A client that receives the session's pictures. Its functions are called with the session's mutex held:
-/// they queue and return.
+/// they queue and return. What they throw is ignored.
 class ViewerSink {
  public:
   virtual ~ViewerSink() = default;
@@ -142,7 +142,7 @@ class Session {
   std::shared_ptr<const EncodedFrame> latestFrame() const;
   /// Requests what is visible in the current scene or a newer one. `answered` is called once, on any thread
   /// and with the session's mutex held, so it must only queue; it is never called if the session is closed
-  /// first. Throws ProtocolError: 404 if the session has ended, 422 as areaOf(),
+  /// first. What it throws is ignored. Throws ProtocolError: 404 if the session has ended, 422 as areaOf(),
   /// 429 if too many picks wait already; and the renderer's Error if the scene cannot be rendered.
   PickId pick(const PickQuery& query, OnPicked answered);
   /// The same, but waits for the answer; nullopt if none came in time or the session was closed. Throws what

@@ -61,6 +61,18 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   }
 
   void offerFrame(const EncodedFrame& frame, std::uint32_t patch) override {
+    orEnd([&] { sendFrame(frame, patch); });
+  }
+  void sceneChanged(const std::string& message) override {
+    orEnd([&] { sendText(message); });
+  }
+  void renderFailed(const Error& error) override {
+    orEnd([&] { sendText(protocol::errorText(ProtocolError(statusOf(error.code()), "", error.what()))); });
+  }
+  void sessionClosed(const std::string& reason) override { end(1001, reason); }
+
+ private:
+  void sendFrame(const EncodedFrame& frame, std::uint32_t patch) {
     protocol::FrameHeader header;
     header.codec = protocol::Codec::jpeg;
     header.flags = std::uint8_t((frame.info.interactive ? protocol::kFlagInteractive : 0) |
@@ -84,15 +96,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
     out.payload = frame.jpeg;
     if (const auto socket = socket_.lock()) socket->offerFrame(std::move(out));
   }
-  void sceneChanged(const std::string& message) override { sendText(message); }
-  void renderFailed(const Error& error) override {
-    sendText(protocol::errorText(ProtocolError(statusOf(error.code()), "", error.what())));
-  }
-  void sessionClosed(const std::string& reason) override {
-    if (const auto socket = socket_.lock()) socket->close(1001, reason);
-  }
 
- private:
   void handle(const protocol::PatchMessage& message) {
     const EditOrigin origin{viewer_, message.id, std::nullopt};
     EditQueue::Edit edit;
@@ -149,27 +153,44 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
 
   /// Reports why an edit was refused.
   void refuse(std::uint32_t id, const std::exception_ptr& failure) {
-    try {
-      std::rethrow_exception(failure);
-    } catch (const ProtocolError& error) {
-      sendText(protocol::errorText(error, id));
-    } catch (const Error& error) {
-      sendText(protocol::errorText(ProtocolError(statusOf(error.code()), "", error.what()), id));
-    } catch (const std::exception& error) {
-      if (options_.log) options_.log(std::string("edit: ") + error.what());
-      if (const auto socket = socket_.lock()) socket->close(1011, "the server failed");
-    }
+    orEnd([&] {
+      try {
+        std::rethrow_exception(failure);
+      } catch (const ProtocolError& error) {
+        sendText(protocol::errorText(error, id));
+      } catch (const Error& error) {
+        sendText(protocol::errorText(ProtocolError(statusOf(error.code()), "", error.what()), id));
+      }
+    });
   }
 
   void sendPicked(std::uint32_t id, const PickAnswer& answer) {
+    orEnd([&] {
+      try {
+        if (answer.failure) std::rethrow_exception(answer.failure);
+        sendText(protocol::pickedText(id, answer.found));
+      } catch (const ProtocolError& error) {
+        sendText(protocol::pickedText(id, error));
+      } catch (const Error& error) {
+        sendText(protocol::pickedText(id, ProtocolError(statusOf(error.code()), "", error.what())));
+      }
+    });
+  }
+
+  /// Calls `send`; if it fails for a reason that the client must not be told, ends the stream. The calling
+  /// thread serves other clients as well.
+  template <class Send>
+  void orEnd(Send&& send) {
     try {
-      if (answer.failure) std::rethrow_exception(answer.failure);
-      sendText(protocol::pickedText(id, answer.found));
-    } catch (const ProtocolError& error) {
-      sendText(protocol::pickedText(id, error));
-    } catch (const Error& error) {
-      sendText(protocol::pickedText(id, ProtocolError(statusOf(error.code()), "", error.what())));
+      send();
+    } catch (const std::exception& error) {
+      if (options_.log) options_.log(std::string("stream: ") + error.what());
+      end(1011, "the server failed");
     }
+  }
+
+  void end(std::uint16_t code, const std::string& reason) {
+    if (const auto socket = socket_.lock()) socket->close(code, reason);
   }
 
   void sendText(std::string text) {

@@ -242,6 +242,21 @@ TEST(Pick, IsToldThatTheSceneCannotBeRendered) {
   EXPECT_THROW(picker.session->waitForPick({1, 2}, 0ms), Error);
 }
 
+TEST(Pick, WhoseAnswerCannotBeTakenDisturbsNoOther) {
+  Picker picker;
+  const auto throws = [](const PickAnswer&) { throw std::runtime_error("no memory for this answer"); };
+  picker.session->pick({1, 2}, throws);
+  picker.pick();
+  picker.workshop.steps(5);
+  ASSERT_EQ(picker.answers.size(), 1u);
+  EXPECT_FALSE(picker.answers[0].failure);
+  picker.session->pick({1, 2}, throws);
+  picker.pick();
+  picker.session->fail(1, Error(ErrorCode::busy, "no memory"));
+  ASSERT_EQ(picker.answers.size(), 2u);
+  EXPECT_TRUE(picker.answers[1].failure);
+}
+
 TEST(Pick, OneTooManyIsRefusedWith429) {
   Picker picker;
   for (std::size_t i = 0; i < Session::kMaxPicks; ++i) picker.pick();

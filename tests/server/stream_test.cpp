@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/stream.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "tests/server/fakes.h"
+
+namespace scolopax::server {
+namespace {
+
+using nlohmann::json;
+using testing::FakeViewer;
+using testing::Workshop;
+
+/// Keeps what it is given to send, but fails for texts that contain `refused`.
+struct FakeSocket : net::WebSocket {
+  std::string refused = "nothing";
+  std::vector<std::string> texts;
+  int frames = 0;
+  std::uint16_t closed = 0;
+
+  void sendText(std::string text) override {
+    if (text.find(refused) != std::string::npos) throw std::runtime_error("no memory for this text");
+    texts.push_back(std::move(text));
+  }
+  void offerFrame(net::Frame) override { ++frames; }
+  void withdrawFrame() override {}
+  void acknowledge(std::uint32_t) override {}
+  void close(std::uint16_t code, std::string) override { closed = code; }
+  net::WebSocketStats stats() const override { return {}; }
+};
+
+/// A session with a client, whose log is kept.
+struct Client {
+  Workshop workshop;
+  Metrics metrics;
+  std::vector<std::string> log;
+  StreamHub hub{workshop.store,
+                workshop.background,
+                metrics,
+                {8, {}, json::object(), [this](const std::string& line) { log.push_back(line); }}};
+  std::shared_ptr<Session> session = workshop.store.create(json::object());
+  std::shared_ptr<FakeSocket> socket = std::make_shared<FakeSocket>();
+  net::WebSocketEvents events = hub.join(session, socket);
+  ~Client() { events.onClose(); }
+};
+
+constexpr const char* kPick = R"({"type": "pick", "id": 3, "x": 1, "y": 1})";
+
+TEST(Stream, EndsWhenAnAnswerToAPickCannotBeSent) {
+  Client client;
+  const auto other = std::make_shared<FakeViewer>();
+  client.session->addViewer(other);
+  client.workshop.step();
+  client.socket->refused = "picked";
+  client.events.onText(kPick);
+  client.workshop.steps(2);
+  EXPECT_EQ(client.socket->closed, 1011);
+  EXPECT_EQ(client.log.size(), 1u);
+  EXPECT_TRUE(other->failures.empty());
+}
+
+TEST(Stream, EndsWhenTheFailureOfAPickCannotBeSent) {
+  Client client;
+  client.workshop.step();
+  client.socket->refused = "picked";
+  client.events.onText(kPick);
+  client.session->fail(1, Error(ErrorCode::busy, "no memory"));
+  EXPECT_EQ(client.socket->closed, 1011);
+}
+
+TEST(Stream, EndsWhenTheOthersEditsCannotBeSent) {
+  Client client;
+  client.socket->refused = "revision";
+  client.session->patch(testing::seedPatch(4), {});
+  EXPECT_EQ(client.socket->closed, 1011);
+}
+
+}  // namespace
+}  // namespace scolopax::server
