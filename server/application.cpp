@@ -207,6 +207,7 @@ void Application::stop() {
   });
   impl_->sessions.closeAll("the server is stopping");
   impl_->server->stop(impl_->config.stopGrace);
+  impl_->renderLoop.stop();
   impl_->renderThread.stop();
   impl_->encodeThread.stop();
 }

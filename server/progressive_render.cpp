@@ -20,15 +20,19 @@ double secondsBetween(TimePoint from, TimePoint to) {
 
 std::uint32_t microseconds(double seconds) { return std::uint32_t(std::clamp(seconds * 1e6, 0.0, 4e9)); }
 
-const std::atomic<bool> kNever{false};
+/// A part of a pass that takes so much longer than its turn was meant to has rays that take that long.
+constexpr double kSlowRay = 0.05;
+/// For so long, passes are then rendered in the background, where they keep no other session waiting.
+constexpr std::chrono::seconds kSlowTime{10};
 
 }  // namespace
 
 ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, const RenderContext& context,
-                                     const std::atomic<bool>& interrupted)
+                                     const std::atomic<bool>& interrupted, const std::atomic<bool>& stopping)
     : session_(std::move(session)),
       context_(context),
       interrupted_(interrupted),
+      stopping_(stopping),
       resolution_(context.policy) {}
 
 ProgressiveRender::~ProgressiveRender() {
@@ -126,6 +130,7 @@ void ProgressiveRender::collect(PassResult& result) {
     if (error.code() != ErrorCode::cancelled) throw;
     result.abandoned = taking_ != nullptr;
     taking_.reset();
+    part_.reset();
     showing_.reset();
     return;
   }
@@ -135,7 +140,10 @@ void ProgressiveRender::collect(PassResult& result) {
 void ProgressiveRender::supervise() {
   if (!job_ || job_->done()) return;
   const RenderRequest request = this->request();
-  const bool useless = taking_ ? taking_->uselessFor(request) : showing_ && film_.stale(request);
+  const bool useless =
+      taking_ ? taking_->uselessFor(request)
+      : part_ ? film_.stale(request) && !film_.keepsPass(request, context_.policy, context_.now())
+              : showing_ && film_.stale(request);
   if (!request.wanted || useless) job_->cancel();
 }
 
@@ -207,14 +215,26 @@ void ProgressiveRender::addSample(const RenderRequest& request, const Others& ot
   const auto slice = urgent ? urgentSlice(others.edited) : othersWait ? policy.politeSlice : policy.slice;
   const TimePoint begin = context_.now();
   if (!film_.unfinished) film_.passBegan = begin, film_.passSeconds = 0;
+  part_ = std::make_shared<PassPart>();
+  part_->slice = slice;
   // A turn between two urgent ones is short but not interrupted, so it makes progress however fast edits
   // come.
-  const bool whole = urgent || othersWait;
-  const bool complete = renderer_->renderPixels(whole ? kNever : interrupted_, slice);
-  result.cancelled = !complete && !whole && interrupted_;
-  film_.passSeconds += secondsBetween(begin, context_.now());
-  film_.unfinished = !complete;
-  if (!complete) return;
+  part_->ends = urgent || othersWait ? &stopping_ : &interrupted_;
+  part_->inBackground = begin < slowUntil_;
+  const auto render = [part = part_, renderer = renderer_, now = context_.now](const std::stop_token& stop) {
+    part->render(*renderer, now, stop);
+  };
+  perform(part_->inBackground, render, &ProgressiveRender::partRendered, result);
+}
+
+void ProgressiveRender::partRendered(PassResult& result) {
+  const auto part = std::exchange(part_, nullptr);
+  if (part->seconds > std::chrono::duration<double>(part->slice).count() + kSlowRay)
+    slowUntil_ = context_.now() + kSlowTime;
+  result.cancelled = !part->complete && (part->inBackground ? part->cancel : *part->ends);
+  film_.passSeconds += part->seconds;
+  film_.unfinished = !part->complete;
+  if (!part->complete) return;
   const auto add = [renderer = renderer_, estimate = film_.scene->stop.error > 0](const std::stop_token&) {
     renderer->addPixels();
     // So that the error is known when it is needed; if estimating it takes long, show() does it.
@@ -325,6 +345,7 @@ void ProgressiveRender::fail(const RenderRequest& request, const Error& error) {
   session_->fail(revision, error);
   // The state that an error leaves behind is not worth keeping.
   taking_.reset();
+  part_.reset();
   showing_.reset();
   dropRenderer();
 }

@@ -42,6 +42,7 @@ struct RenderContext {
 };
 
 struct SceneTaking;
+struct PassPart;
 struct PictureMaking;
 
 class ProgressiveRender {
@@ -58,9 +59,10 @@ class ProgressiveRender {
     still,   ///< the picture at rest
     urgent   ///< the first picture after an edit, or a pick
   };
-  /// `interrupted` ends passes early unless they are urgent; they continue in their next turn.
+  /// `interrupted` ends passes early unless they are urgent, and `stopping` all; they continue in their next
+  /// turn.
   ProgressiveRender(std::shared_ptr<Session> session, const RenderContext& context,
-                    const std::atomic<bool>& interrupted);
+                    const std::atomic<bool>& interrupted, const std::atomic<bool>& stopping);
   ~ProgressiveRender();
   ProgressiveRender(const ProgressiveRender&) = delete;
   ProgressiveRender& operator=(const ProgressiveRender&) = delete;
@@ -101,17 +103,19 @@ class ProgressiveRender {
   void sceneTaken(PassResult& result);
   std::chrono::microseconds urgentSlice(int editedOthers) const;
   void addSample(const RenderRequest& request, const Others& others, PassResult& result);
+  void partRendered(PassResult& result);
   void sampleAdded(PassResult& result);
   void show(const RenderRequest& request, PassResult& result);
   void pictureMade(PassResult& result);
 
   const std::shared_ptr<Session> session_;
   const RenderContext& context_;
-  const std::atomic<bool>& interrupted_;
+  const std::atomic<bool>&interrupted_, &stopping_;
 
   std::shared_ptr<Background::Job> job_;    ///< while it exists, it owns the renderer, except for picks
   Next next_ = nullptr;                     ///< to be called when the job is done
   std::shared_ptr<SceneTaking> taking_;     ///< the scene that is being built; else null
+  std::shared_ptr<PassPart> part_;          ///< the part of a pass that is being rendered; else null
   std::shared_ptr<PictureMaking> showing_;  ///< the picture that is being made; else null
 
   PickTurn pick_;
@@ -121,6 +125,7 @@ class ProgressiveRender {
   std::shared_ptr<Renderer> renderer_;
   FilmState film_;
   ResolutionPolicy resolution_;
+  TimePoint slowUntil_{};   ///< until then, passes are rendered in the background
   double filmSeconds_ = 0;  ///< spent on the film's samples
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
   std::shared_ptr<const Image> reduced_;  ///< this revision's last reduced picture, while it is needed

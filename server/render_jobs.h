@@ -2,6 +2,8 @@
 // The jobs of ProgressiveRender, run on its own thread or in the background: bringing a scene into the
 // renderer, and making a picture from the film.
 #pragma once
+#include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <stop_token>
@@ -36,6 +38,19 @@ struct SceneTaking {
            other.scene->dataset->volume != request.scene->dataset->volume ||
            other.scene->render.macrocell != scene.macrocell;
   }
+};
+
+/// A part of a pass: what one turn renders of it.
+struct PassPart {
+  std::chrono::microseconds slice{};
+  const std::atomic<bool>* ends = nullptr;  ///< ends the part early, in addition to `cancel`
+  std::atomic<bool> cancel{false};
+  bool inBackground = false;
+  bool complete = false;  ///< the pass is complete
+  double seconds = 0;     ///< that it took
+
+  /// Ends early if `stop` is requested, even in the middle of a ray.
+  void render(Renderer& renderer, const Now& now, const std::stop_token& stop);
 };
 
 /// A picture on its way out of the film.

@@ -29,7 +29,7 @@ void RenderLoop::followStore() {
   });
   for (const auto& session : sessions)
     if (!known(session))
-      renders_.push_back(std::make_unique<ProgressiveRender>(session, context_, interrupted_));
+      renders_.push_back(std::make_unique<ProgressiveRender>(session, context_, interrupted_, stopping_));
 }
 
 RenderLoop::Renders::iterator RenderLoop::nextTurn() {
@@ -54,7 +54,7 @@ std::optional<TimePoint> RenderLoop::step() {
   std::optional<TimePoint> next = store_.expire();
   followStore();
   for (const auto& render : renders_) render->supervise();
-  interrupted_ = false;  // an edit from here on interrupts the pass; nextTurn() sees those before
+  interrupted_ = stopping_.load();  // an edit from here on interrupts the pass; nextTurn() sees those before
   const auto turn = nextTurn();
   if (turn != renders_.end()) {
     // Moved behind all others before it runs: a session with slow passes gets one turn per round as well.

@@ -27,6 +27,8 @@ class RenderLoop {
   /// Ends the running pass early, unless it makes the first picture after an edit or is a short turn between
   /// two of those. From any thread.
   void interrupt() { interrupted_ = true; }
+  /// Ends the running pass early, whatever it is, and all later ones at once. From any thread.
+  void stop() { interrupted_ = stopping_ = true; }
 
  private:
   using Renders = std::vector<std::unique_ptr<ProgressiveRender>>;
@@ -37,7 +39,7 @@ class RenderLoop {
   const RenderContext context_;
   const OnPass onPass_;
   Renders renders_;  ///< in the order of their next turns
-  std::atomic<bool> interrupted_{false};
+  std::atomic<bool> interrupted_{false}, stopping_{false};
   bool othersUrgent_ = false;  ///< the chosen turn is not urgent, but another session's is
   bool lastUrgent_ = false;    ///< the last turn was urgent
 };

@@ -244,6 +244,73 @@ TEST(RenderLoop, AddsUpAndMakesLargePicturesInTheBackground) {
   EXPECT_EQ(viewer->frames.size(), before + 1);
 }
 
+TEST(RenderLoop, RendersInTheBackgroundWhatCannotBeDividedIntoTurns) {
+  // A pass of a second, of which a slice is a tenth: its rays take too long for a turn.
+  Workshop workshop;
+  const auto slow = workshop.store.create(seedPatch(1)), quick = workshop.store.create(seedPatch(2));
+  const auto slowViewer = std::make_shared<FakeViewer>(), quickViewer = std::make_shared<FakeViewer>();
+  slow->addViewer(slowViewer);
+  const auto takeLong = [&] { workshop.clock.advance(1s); };
+  workshop.control->duringPass = takeLong;
+  workshop.step();
+  ASSERT_EQ(workshop.control->passes, std::vector<std::uint32_t>({1}));
+  workshop.background.atOnce = false;
+  workshop.control->duringPass = {};
+  workshop.step();
+  EXPECT_EQ(workshop.control->passes.size(), 1u);  // waits in the background
+  ASSERT_EQ(workshop.background.waiting.size(), 1u);
+  quick->addViewer(quickViewer);
+  workshop.background.atOnce = true;  // for the quick one's scene
+  workshop.steps(4);
+  EXPECT_FALSE(quickViewer->frames.empty());
+  EXPECT_EQ(workshop.control->passes.back(), 2u);
+  workshop.control->duringPass = takeLong;
+  workshop.background.finish();
+  workshop.control->duringPass = {};
+  EXPECT_EQ(workshop.control->passes.back(), 1u);
+  const auto before = slowViewer->frames.size();
+  workshop.steps(6);
+  EXPECT_GT(slowViewer->frames.size(), before);
+  // After a while without such rays, its passes take turns again.
+  workshop.clock.advance(20s);
+  workshop.background.atOnce = false;
+  const auto passes = workshop.control->passes.size();
+  workshop.steps(4);
+  EXPECT_GT(workshop.control->passes.size(), passes);
+  EXPECT_TRUE(workshop.background.waiting.empty());
+}
+
+TEST(RenderLoop, EndsAPassInTheBackgroundThatAnEditMakesUseless) {
+  Workshop workshop;
+  const auto session = workshop.store.create(seedPatch(1));
+  session->addViewer(std::make_shared<FakeViewer>());
+  workshop.control->duringPass = [&] { workshop.clock.advance(1s); };
+  workshop.step();
+  workshop.step();
+  workshop.background.atOnce = false;
+  workshop.step();
+  ASSERT_EQ(workshop.background.waiting.size(), 1u);
+  session->patch(seedPatch(5), {});
+  workshop.clock.advance(1s);
+  workshop.step();
+  const auto passes = workshop.control->passes.size();
+  workshop.control->duringPass = {};
+  workshop.background.finish();
+  EXPECT_EQ(workshop.control->passes.size(), passes);  // it was cancelled
+}
+
+TEST(RenderLoop, EndsEvenUrgentPassesWhenItStops) {
+  Workshop workshop;
+  const auto session = workshop.store.create(seedPatch(1));
+  session->addViewer(std::make_shared<FakeViewer>());
+  workshop.step();
+  session->patch(seedPatch(5), {});
+  workshop.control->duringPass = [&] { workshop.render.stop(); };
+  const auto passes = workshop.control->passes.size();
+  workshop.steps(2);
+  EXPECT_EQ(workshop.control->passes.size(), passes);
+}
+
 /// A small picture of 16 samples whose error is being measured, until the background is told to finish.
 struct Measured {
   Workshop workshop;
@@ -324,7 +391,7 @@ TEST(EncodeLoop, EncodesALargePictureInTheBackgroundAndTheSmallOneAfterAnEditAtO
   const auto session = workshop.store.create({{"image", {{"width", 1024}, {"height", 1024}}}});
   const auto viewer = std::make_shared<FakeViewer>();
   session->addViewer(viewer);
-  workshop.control->secondsPerPixel = 1e-6;
+  workshop.control->secondsPerPixel = 1e-7;
   workshop.render.step();
   workshop.background.atOnce = false;
   workshop.encode.step();
