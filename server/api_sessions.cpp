@@ -252,7 +252,7 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
         {"timeout", "query", "number", "Seconds to wait, at most 25, which is the default"}},
        "",
        imageTypes,
-       net::RouteKind::slow,
+       net::RouteKind::waiting,
        [&context](const net::Request& request) { return frame(context, request); },
        {200, 204}},
       {"GET",
@@ -265,7 +265,7 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
         {"y2", "query", "number", "With x2: the rectangle's other corner"}},
        "",
        kJson,
-       net::RouteKind::slow,
+       net::RouteKind::waiting,
        [&context](const net::Request& request) { return pick(context, request); }},
   };
 }

@@ -92,6 +92,20 @@ bool Core::makeRoom() {
   return taken < options.maxConnections;
 }
 
+bool Core::beginWaiting(const std::string& flow) {
+  const std::lock_guard lock(mutex_);
+  int& count = waiting_[flow];
+  if (count >= options.waitingRequests) return false;
+  ++count;
+  return true;
+}
+
+void Core::endWaiting(const std::string& flow) {
+  const std::lock_guard lock(mutex_);
+  const auto count = waiting_.find(flow);
+  if (--count->second == 0) waiting_.erase(count);
+}
+
 std::size_t Core::connectionCount() const {
   const std::lock_guard lock(mutex_);
   return connections_.size();

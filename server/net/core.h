@@ -14,6 +14,8 @@
 #include <mutex>
 #include <random>
 #include <string>
+#include <system_error>
+#include <thread>
 #include <vector>
 
 #include "server/net/fair_pool.h"
@@ -84,6 +86,9 @@ class Core {
   asio::thread_pool slowWorkers;
   std::atomic<int> slowRunning{0};
   std::atomic<int> quickRunningSlowly{0};  ///< of these, requests of quick routes
+  /// False if as many requests of this flow wait as may. Otherwise endWaiting() must follow.
+  bool beginWaiting(const std::string& flow);
+  void endWaiting(const std::string& flow);
 
  private:
   struct Entry {
@@ -98,6 +103,7 @@ class Core {
   mutable std::mutex mutex_;
   std::condition_variable left_;
   std::map<Connection*, Entry> connections_;
+  std::map<std::string, int> waiting_;  ///< requests that wait, by flow
   std::mt19937 random_{std::random_device()()};
   std::atomic<bool> stopping_{false};
   bool cutting_ = false;
@@ -122,6 +128,22 @@ asio::awaitable<Result> runBy(Post post, Work work) {
 template <typename Result, typename Work>
 asio::awaitable<Result> runOn(asio::thread_pool& pool, Work work) {
   return runBy<Result>([&pool](auto job) { asio::post(pool, std::move(job)); }, std::move(work));
+}
+
+/// Runs `work` on a thread that is made for it or, if the system has none left, on the pool.
+template <typename Result, typename Work>
+asio::awaitable<Result> runAlone(asio::thread_pool& pool, Work work) {
+  std::jthread thread;  // joined, without a wait, when its result is there
+  co_return co_await runBy<Result>(
+      [&](auto job) {
+        const auto shared = std::make_shared<decltype(job)>(std::move(job));
+        try {
+          thread = std::jthread([shared] { (*shared)(); });
+        } catch (const std::system_error&) {
+          asio::post(pool, [shared] { (*shared)(); });
+        }
+      },
+      std::move(work));
 }
 
 template <typename Result, typename Work>

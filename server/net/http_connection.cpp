@@ -97,13 +97,34 @@ class SlowSlot {
   bool quick_, taken_;
 };
 
-/// While this object lives, notices within a few kWatchInterval that the client has closed the connection, or
+/// Takes one of the flow's places for requests that wait, if one is free.
+class WaitingPlace {
+ public:
+  WaitingPlace(Core& core, const std::string& flow)
+      : core_(core), flow_(flow), taken_(core.beginWaiting(flow)) {}
+  ~WaitingPlace() {
+    if (taken_) core_.endWaiting(flow_);
+  }
+  WaitingPlace(const WaitingPlace&) = delete;
+  WaitingPlace& operator=(const WaitingPlace&) = delete;
+  bool taken() const { return taken_; }
+
+ private:
+  Core& core_;
+  const std::string flow_;
+  bool taken_;
+};
+
+/// Lets a request wait, and notices within a few kWatchInterval that its client has closed the connection, or
 /// the server has. It polls the system, since reading would consume bytes of the next request. A client may
 /// also close only its sending side and wait for the answer. `mayAsk`: plain HTTP/1.1, where the two can be
 /// told apart.
 class ClientWatch {
  public:
-  ClientWatch(tcp::socket& socket, bool mayAsk) : state_(std::make_shared<State>(socket, mayAsk)) {
+  ClientWatch(tcp::socket& socket, bool mayAsk, Request& request)
+      : state_(std::make_shared<State>(socket, mayAsk)) {
+    request.mayWait = true;
+    request.gone = state_->gone.get_token();
     State::wait(state_);
   }
   ~ClientWatch() {
@@ -112,7 +133,6 @@ class ClientWatch {
   }
   ClientWatch(const ClientWatch&) = delete;
   ClientWatch& operator=(const ClientWatch&) = delete;
-  std::stop_token gone() const { return state_->gone.get_token(); }
 
  private:
   struct State {
@@ -316,6 +336,13 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
   }
 
   awaitable<Response> handle(const Route& route, const std::string& flow, Request& request) {
+    if (route.kind == RouteKind::waiting) {
+      const WaitingPlace place(core_, flow);
+      if (!place.taken()) co_return tooMany();
+      const ClientWatch watch(transport_.socket(), mayBeAsked(), request);
+      co_return co_await runAlone<Response>(core_.slowWorkers,
+                                            [&] { return core_.guarded(route.handler, request); });
+    }
     if (route.kind == RouteKind::quick) {
       bool takesLong = false;
       const Handler quick = [&](const Request& asked) -> Response {
@@ -331,13 +358,17 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
       if (!takesLong) co_return response;
     }
     const SlowSlot slot(core_, route.kind);
-    if (!slot.taken())
-      co_return withRetry(core_.problem(503, "Too many long requests at once; retry later."));
-    const ClientWatch watch(transport_.socket(), version_ >= 11 && !transport_.tls());
-    request.mayWait = true;
-    request.gone = watch.gone();
+    if (!slot.taken()) co_return tooMany();
+    const ClientWatch watch(transport_.socket(), mayBeAsked(), request);
     co_return co_await runOn<Response>(core_.slowWorkers,
                                        [&] { return core_.guarded(route.handler, request); });
+  }
+
+  /// See ClientWatch.
+  bool mayBeAsked() { return version_ >= 11 && !transport_.tls(); }
+
+  Response tooMany() const {
+    return withRetry(core_.problem(503, "Too many long requests at once; retry later."));
   }
 
   awaitable<bool> upgrade(Parser& parser, const Request& request) {

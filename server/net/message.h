@@ -28,9 +28,10 @@ struct Request {
   std::string body;                  ///< whole and within the limit; empty in authorize and upgrades
   std::vector<std::string> matches;  ///< regex groups of the route; [0] is the whole path
   std::string remoteAddress;         ///< numeric, without the port
-  /// Whether the handler may wait: in a RouteKind::slow route, or when called again after TakesLong.
+  /// Whether the handler may wait: unless in a RouteKind::quick route, or when called again after TakesLong.
   bool mayWait = false;
-  /// If the handler may wait: requested when the client closes the connection before it has the answer.
+  /// If the handler may wait: requested when the client closes the connection before it has the answer, or
+  /// the server does.
   std::stop_token gone;
 
   /// First header (query value) of that name, or nullptr.

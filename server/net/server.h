@@ -33,8 +33,9 @@ struct Options {
   TextLimits unsentTexts;
   /// Beyond: 503. At most half of them may be strangers, whose client is not known yet (`knows`).
   std::size_t maxConnections = 512;
-  int workers = 4;        ///< threads for ordinary handlers and WebSocket events, which flows share fairly
-  int longRequests = 16;  ///< long requests at once, at most a quarter from quick routes; beyond: 503
+  int workers = 4;           ///< threads for ordinary handlers and WebSocket events, which flows share fairly
+  int longRequests = 16;     ///< long requests at once, at most a quarter from quick routes; beyond: 503
+  int waitingRequests = 16;  ///< requests of one flow that wait at once; beyond: 503
 
   std::chrono::milliseconds headTimeout{5'000};   ///< from the first byte of a head to its end
   std::chrono::milliseconds idleTimeout{30'000};  ///< between the requests of a kept connection
@@ -69,9 +70,10 @@ struct Options {
 /// before long work, such as loading data.
 void checkTlsFiles(const std::string& certificateFile, const std::string& keyFile);
 
-/// slow: handlers may wait or compute for long (long poll, render); they have threads of their own, so that
-/// they delay no others. quick: handlers may not, except for single requests (TakesLong).
-enum class RouteKind { quick, slow };
+/// quick: handlers may neither wait nor compute for long, except for single requests (TakesLong). slow:
+/// handlers may compute for long; they have places of their own (Options::longRequests). waiting: handlers
+/// wait most of the time (long poll); each request has a thread of its own and takes nobody's place.
+enum class RouteKind { quick, slow, waiting };
 
 class Server {
  public:

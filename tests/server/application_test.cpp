@@ -62,6 +62,35 @@ class ApplicationTest : public ::testing::Test {
   std::optional<Application> application_;  ///< last: ends before what its renderers use
 };
 
+constexpr const char* kSmallRender = R"({"image": {"width": 8, "height": 8}, "stop": {"samples": 1}})";
+
+/// Builds that end only when they are told to.
+struct EndlessBuilds {
+  std::atomic<int> begun{0}, stopped{0};
+  void operator()(const std::stop_token& stop) {
+    ++begun;
+    if (eventually([&] { return stop.stop_requested(); })) ++stopped;
+  }
+};
+
+TEST_F(ApplicationTest, LetsNoSessionsPollsKeepOthersOut) {
+  EndlessBuilds builds;
+  building_ = std::ref(builds);
+  start();
+  std::vector<std::unique_ptr<TestClient>> polls;
+  for (int session = 0; session < 4; ++session) {
+    const std::string path = newSession();
+    for (int i = 0; i < 8; ++i) {
+      polls.push_back(std::make_unique<TestClient>(application_->port()));
+      send(*polls.back(), "GET " + path + "/frame");
+    }
+  }
+  ASSERT_TRUE(eventually([&] { return builds.begun == 4; }));
+  const std::string other = newSession();
+  EXPECT_EQ(call("GET " + other + "/frame?timeout=0").status, 204);
+  EXPECT_EQ(call("POST /api/v1/render", "{").status, 400);
+}
+
 TEST_F(ApplicationTest, ChargesTheAnswersToHeadAsThoseToGet) {
   memory_ = std::make_shared<MemoryBudget>(256 << 10);
   start();

@@ -63,7 +63,7 @@ struct Api {
       std::smatch match;
       if (route.method != method || !std::regex_match(request.path, match, pattern)) continue;
       request.matches.assign(match.begin(), match.end());
-      request.mayWait = route.kind == net::RouteKind::slow;
+      request.mayWait = route.kind != net::RouteKind::quick;
       try {
         return route.handler(request);
       } catch (const net::TakesLong&) {

@@ -466,6 +466,36 @@ TEST_F(HttpTest, LongRequestsNeitherDelayOthersNorGrowWithoutBound) {
   EXPECT_EQ(third.request("GET /poll HTTP/1.1").status, 200);
 }
 
+TEST_F(HttpTest, RequestsThatWaitTakeNobodysPlace) {
+  Options options = quickOptions();
+  options.workers = options.longRequests = 1;
+  options.waitingRequests = 3;
+  options.flowOf = [](const Request& request) { return request.path; };
+  Gate gate;
+  Server server(options);
+  server.route(
+      "GET", "/wait/[a-z]", [&](const Request&) { return passed(gate); }, RouteKind::waiting);
+  server.route(
+      "GET", "/slow", [](const Request&) { return Response{}; }, RouteKind::slow);
+  server.start();
+  std::vector<std::unique_ptr<TestClient>> clients;
+  for (const char* path : {"/wait/a", "/wait/b", "/wait/c", "/wait/d"}) {
+    for (int i = 0; i < 3; ++i) {
+      clients.push_back(std::make_unique<TestClient>(server.port()));
+      clients.back()->send("GET " + std::string(path) + " HTTP/1.1\r\nHost: a\r\n\r\n");
+    }
+  }
+  gate.waitFor(12);
+  TestClient other(server.port());
+  const Answer refused = other.request("GET /wait/a HTTP/1.1");
+  EXPECT_EQ(refused.status, 503);
+  EXPECT_EQ(refused.headers.at("retry-after"), "1");
+  EXPECT_EQ(other.request("GET /slow HTTP/1.1").status, 200);
+  gate.open();
+  for (const auto& client : clients) EXPECT_EQ(client->answer().status, 200);
+  EXPECT_EQ(other.request("GET /wait/a HTTP/1.1").status, 200);
+}
+
 TEST_F(HttpTest, AQuickRequestThatTakesLongNeitherDelaysOthersNorGrowsWithoutBound) {
   Options options = quickOptions();
   options.workers = 1;
