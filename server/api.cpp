@@ -191,10 +191,24 @@ std::uint64_t imageMemory(std::uint64_t pixels, std::string_view format) {
   return pixels * (format == "png" ? 4 * 3 : 3 * sizeof(glm::vec4)) + (1 << 20);
 }
 
-std::string imageBytes(const Image& image, glm::vec3 background, std::string_view format) {
+std::string imageBytes(const Image& image, glm::vec3 background, std::string_view format,
+                       const std::stop_token& stop) {
   const auto bytes = format == "jpeg" ? encodeJpeg(toSrgb8(image, background), 95, ChromaSampling::full444)
-                                      : io::encodeImage(image, background, format);
+                                      : io::encodeImage(image, background, format, stop);
   return {bytes.begin(), bytes.end()};
+}
+
+void setEncodedBody(const ApiContext& context, const net::Request& request, const std::string& flow,
+                    std::uint64_t bytes, const std::function<std::string(const std::stop_token&)>& encode,
+                    net::Response& response) {
+  inLongRequest(context, request, [&](const std::stop_token& stop) {
+    context.encoders.run(flow, stop, [&] {
+      const auto memory = MemoryBudget::takeShared(context.memory, MemoryUse::encodings, bytes);
+      response.body = encode(stop);
+      memory->resize(response.body.size());
+      response.keep = memory;
+    });
+  });
 }
 
 json openApi(const std::vector<Route>& routes) {

@@ -11,6 +11,7 @@
 
 #include "protocol/problem.h"
 #include "renderer/core/error.h"
+#include "server/answer_encoders.h"
 #include "server/config.h"
 #include "server/metrics.h"
 #include "server/net/server.h"
@@ -28,6 +29,7 @@ struct ApiContext {
   SessionStore& sessions;
   StreamHub& streams;
   Metrics& metrics;
+  AnswerEncoders& encoders;
   MakeRenderer makeRenderer;
   std::shared_ptr<MemoryBudget> memory;  ///< also charged by the renderers that makeRenderer returns
   Log log;
@@ -131,7 +133,14 @@ const ImageType* acceptedImageType(const std::string* accept);
 /// Memory, in bytes, that imageBytes needs for `pixels` pixels.
 std::uint64_t imageMemory(std::uint64_t pixels, std::string_view format);
 /// The picture as a file: jpeg with quality 95 and 4:4:4 sampling; png; exr with float32 linear premultiplied
-/// RGBA.
-std::string imageBytes(const Image& image, glm::vec3 background, std::string_view format);
+/// RGBA. Throws Error(cancelled) once `stop` is requested, but a jpeg that has been begun is completed.
+std::string imageBytes(const Image& image, glm::vec3 background, std::string_view format,
+                       const std::stop_token& stop);
+/// Sets the body to encode(stop) on one of the encoders' threads, when it is the flow's turn, and charges
+/// `bytes` of memory for that. Throws what encode() and MemoryBudget::take throw, and ProtocolError(503) if
+/// the client disconnects or the server stops.
+void setEncodedBody(const ApiContext& context, const net::Request& request, const std::string& flow,
+                    std::uint64_t bytes, const std::function<std::string(const std::stop_token&)>& encode,
+                    net::Response& response);
 
 }  // namespace scolopax::server

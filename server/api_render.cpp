@@ -186,14 +186,13 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
   const std::string error = nlohmann::json(errorOf(*renderer, ending.token())).dump();
   checkWanted(context, request);
   const auto pixels = std::uint64_t(scene->render.width) * std::uint64_t(scene->render.height);
-  const auto memory = MemoryBudget::takeShared(
-      context.memory, MemoryUse::encodings, pixels * sizeof(glm::vec4) + imageMemory(pixels, type->format));
-  net::Response response{200,
-                         std::string(type->mediaType),
-                         imageBytes(renderer->image(), scene->render.background, type->format),
-                         {}};
-  memory->resize(response.body.size());
-  response.keep = memory;
+  net::Response response{200, std::string(type->mediaType), "", {}};
+  setEncodedBody(
+      context, request, "", pixels * sizeof(glm::vec4) + imageMemory(pixels, type->format),
+      [&](const std::stop_token& stop) {
+        return imageBytes(renderer->image(), scene->render.background, type->format, stop);
+      },
+      response);
   const Choice choice = renderer->choice();
   response.headers = {{"Scolopax-Samples", std::to_string(renderer->samples())},
                       {"Scolopax-Error", error},

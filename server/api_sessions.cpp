@@ -127,19 +127,20 @@ net::Response frame(ApiContext& context, const net::Request& request) {
   if (!found) return {204, "", "", {}};
   net::Response response{200, std::string(type->mediaType), "", {}};
   const std::uint64_t pixels = found->image->pixels.size();
-  const bool encoded = !aov && format == "jpeg";
-  const auto memory = MemoryBudget::takeShared(
-      context.memory, MemoryUse::encodings,
-      encoded ? found->jpeg->size() : (aov ? pixels * sizeof(glm::vec4) : 0) + imageMemory(pixels, format));
-  if (aov) {
-    const AovValues& values = (*found->aovs)[std::size_t(*aov)];
-    response.body = imageBytes(format == "exr" ? aovImage(values) : aovPicture(values), glm::vec3(0), format);
+  if (!aov && format == "jpeg") {
+    response.keep = MemoryBudget::takeShared(context.memory, MemoryUse::encodings, found->jpeg->size());
+    response.body.assign(found->jpeg->begin(), found->jpeg->end());
   } else {
-    response.body = encoded ? std::string(found->jpeg->begin(), found->jpeg->end())
-                            : imageBytes(*found->image, found->background, format);
+    setEncodedBody(
+        context, request, session->id(), (aov ? pixels * sizeof(glm::vec4) : 0) + imageMemory(pixels, format),
+        [&](const std::stop_token& stop) {
+          if (!aov) return imageBytes(*found->image, found->background, format, stop);
+          const AovValues& values = (*found->aovs)[std::size_t(*aov)];
+          const Image image = format == "exr" ? aovImage(values) : aovPicture(values);
+          return imageBytes(image, glm::vec3(0), format, stop);
+        },
+        response);
   }
-  memory->resize(response.body.size());
-  response.keep = memory;
   response.headers = {{"Scolopax-Frame", std::to_string(found->info.number)},
                       {"Scolopax-Revision", std::to_string(found->info.revision)},
                       {"Scolopax-Samples", std::to_string(found->info.samples)},

@@ -111,6 +111,7 @@ struct Application::Impl {
   EncodeLoop encodeLoop;
   json capabilities;
   StreamHub streams;
+  AnswerEncoders encoders;
   ApiContext context;
   Authorizer authorizer;
   std::optional<net::Server> server;
@@ -136,9 +137,19 @@ struct Application::Impl {
         capabilities(capabilitiesJson(config, sessionResolver->lists())),
         streams(sessions, background, metrics,
                 {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities, log}),
-        context{config,  *datasets, renderResolver,      sessions,
-                streams, metrics,   makeRenderer,        memory,
-                log,     stopping,  cutting.get_token(), [this] { return capabilities; }},
+        context{config,
+                *datasets,
+                renderResolver,
+                sessions,
+                streams,
+                metrics,
+                encoders,
+                makeRenderer,
+                memory,
+                log,
+                stopping,
+                cutting.get_token(),
+                [this] { return capabilities; }},
         authorizer(config.token, isLoopback(config.host), config.allowedOrigins,
                    !config.certificateFile.empty()) {
     net::Options options;

@@ -4,6 +4,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -21,6 +22,9 @@ struct Encoding {
   OIIO::ImageSpec spec;
   Image8 bytes;  ///< empty for float formats
 };
+
+/// A multiple of the rows that EXR (16) and TIFF compress together.
+constexpr int kRowsAtOnce = 64;
 
 bool isFloat(const std::string& extension) {
   return extension == "exr" || extension == "tif" || extension == "tiff";
@@ -58,7 +62,8 @@ Encoding prepare(const Image& image, glm::vec3 background, const std::string& ex
 }
 
 /// The bytes of the file, made in memory, because OpenImageIO does not report every failure to write a file.
-std::vector<unsigned char> encode(const Image& image, glm::vec3 background, const std::string& extension) {
+std::vector<unsigned char> encode(const Image& image, glm::vec3 background, const std::string& extension,
+                                  const std::stop_token& stop = {}) {
   const Encoding encoding = prepare(image, background, extension);
   const std::string name = "image." + extension;
   std::vector<unsigned char> bytes;
@@ -70,11 +75,17 @@ std::vector<unsigned char> encode(const Image& image, glm::vec3 background, cons
   if (!output) throw failed(OIIO::geterror());
   if (!output->set_ioproxy(&proxy)) throw failed("not in memory");
   const bool asFloat = encoding.bytes.rgb.empty();
-  const void* pixels = asFloat ? static_cast<const void*>(image.pixels.data()) : encoding.bytes.rgb.data();
-  const bool done = output->open(name, encoding.spec) &&
-                    output->write_image(asFloat ? OIIO::TypeFloat : OIIO::TypeUInt8, pixels) &&
-                    output->close();
-  if (!done) throw failed(output->geterror());
+  bool done = output->open(name, encoding.spec);
+  for (int y = 0; done && y < image.height; y += kRowsAtOnce) {
+    if (stop.stop_requested())
+      throw Error(ErrorCode::cancelled, "encoding cancelled: its result is no longer needed");
+    const std::size_t first = std::size_t(y) * std::size_t(image.width);
+    const void* rows =
+        asFloat ? static_cast<const void*>(&image.pixels[first]) : &encoding.bytes.rgb[first * 3];
+    done = output->write_scanlines(y, std::min(y + kRowsAtOnce, image.height), 0,
+                                   asFloat ? OIIO::TypeFloat : OIIO::TypeUInt8, rows);
+  }
+  if (!done || !output->close()) throw failed(output->geterror());
   return bytes;
 }
 
@@ -94,11 +105,14 @@ void writeImage(const fs::path& path, const Image& image, glm::vec3 background) 
   writeFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
-std::vector<unsigned char> encodeImage(const Image& image, glm::vec3 background, std::string_view format) {
+std::vector<unsigned char> encodeImage(const Image& image, glm::vec3 background, std::string_view format,
+                                       const std::stop_token& stop) {
   if (format != "png" && format != "exr") {
     throw Error(ErrorCode::unsupported, "image format: expected png or exr, found " + inQuotes(format));
   }
-  return encode(image, background, std::string(format));
+  // OpenEXR's own threads would make one caller take all processors.
+  OIIO::attribute("exr_threads", -1);
+  return encode(image, background, std::string(format), stop);
 }
 
 Image readImage(const fs::path& path) {

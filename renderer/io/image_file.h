@@ -2,6 +2,7 @@
 // Pictures as files and in memory, through OpenImageIO.
 #pragma once
 #include <filesystem>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,7 +28,9 @@ bool isFloatFormat(const std::filesystem::path& path);
 Image readImage(const std::filesystem::path& path);
 
 /// The bytes of a picture in memory: format "png" (8-bit sRGB RGB) or "exr" (float32 linear premultiplied
-/// RGBA).
-std::vector<unsigned char> encodeImage(const Image& image, glm::vec3 background, std::string_view format);
+/// RGBA). Works on the calling thread only. Throws Error(cancelled) within some rows once `stop` is
+/// requested.
+std::vector<unsigned char> encodeImage(const Image& image, glm::vec3 background, std::string_view format,
+                                       const std::stop_token& stop = {});
 
 }  // namespace scolopax::io

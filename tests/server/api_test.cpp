@@ -282,6 +282,21 @@ TEST(Api, AnswersTheLongPollWithAFrameOrWithNothing) {
   EXPECT_EQ(api.errorOf("GET", path + "?format=gif").first, 422);
 }
 
+TEST(Api, EncodesNoPictureForAClientThatHasGone) {
+  Api api;
+  const auto session = api.workshop.store.create({{"stop", {{"samples", 2}}}});
+  session->addViewer(std::make_shared<FakeViewer>());
+  api.workshop.steps(4);
+  const std::string path = "/api/v1/sessions/" + session->id() + "/frame?format=";
+  EXPECT_EQ(api.call("GET", path + "exr").status, 200);
+  EXPECT_EQ(api.call("GET", path + "png&aov=depth").status, 204);
+  api.workshop.steps(6);
+  EXPECT_EQ(api.call("GET", path + "png&aov=depth").status, 200);
+  api.gone.request_stop();
+  for (const char* format : {"png", "exr", "png&aov=depth"})
+    EXPECT_EQ(api.errorOf("GET", path + format), Expected(503, "")) << format;
+}
+
 TEST(Api, RefusesOneWaitingScriptTooManyWith429) {
   Api api;
   api.config.pollTimeout = 60s;

@@ -17,6 +17,7 @@ struct Api {
   Metrics metrics;
   std::shared_ptr<const DatasetStore> datasets = smallStore();
   SceneResolver resolver{datasets, {64, 1000}};
+  AnswerEncoders encoders;
   StreamHub streams{workshop.store, workshop.background, metrics, {}};
   std::atomic<bool> stopping{false};
   std::stop_source gone, cutting;
@@ -27,6 +28,7 @@ struct Api {
                      workshop.store,
                      streams,
                      metrics,
+                     encoders,
                      [this](const std::shared_ptr<const Volume>&) {
                        return std::make_unique<FakeRenderer>(workshop.control);
                      },

@@ -34,6 +34,35 @@ std::string contentOf(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
+TEST(ImageFile, EndsEncodingWhenItIsToldTo) {
+  std::stop_source stop;
+  EXPECT_FALSE(encodeImage(testImage(), glm::vec3(0), "exr", stop.get_token()).empty());
+  stop.request_stop();
+  for (const char* format : {"png", "exr"}) {
+    try {
+      encodeImage(testImage(), glm::vec3(0), format, stop.get_token());
+      ADD_FAILURE() << format << " was encoded";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::cancelled);
+    }
+  }
+}
+
+/// Pictures of more rows than are written at once.
+TEST(ImageFile, HoldsAllRowsOfATallPicture) {
+  const TempDir folder;
+  Image image{3, 200, {}};
+  for (int i = 0; i < 600; ++i) image.pixels.emplace_back(glm::vec3(float(i % 256) / 255), 1.0f);
+  for (const char* name : {"a.exr", "a.tif"}) {
+    writeImage(folder / name, image, glm::vec3(0));
+    EXPECT_EQ(readImage(folder / name).pixels, image.pixels) << name;
+  }
+  for (const char* name : {"a.png", "a.jpg"}) {
+    writeImage(folder / name, image, glm::vec3(0));
+    EXPECT_EQ(readImage(folder / name).height, 200) << name;
+  }
+}
+
 TEST(ImageFile, FloatFormatsComeBackBitForBit) {
   const TempDir folder;
   const Image image = testImage();
