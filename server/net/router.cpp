@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <deque>
+#include <map>
 #include <string_view>
 #include <utility>
 
@@ -59,62 +59,60 @@ class Matcher : public httplib::Server {
   }
 };
 
-// process_request runs on the calling thread: the matching route stores its result here.
-thread_local RouteMatch* currentMatch = nullptr;
+using Methods = std::map<std::string, Route, std::less<>>;
+
+struct Found {
+  const Methods* methods = nullptr;
+  std::vector<std::string> groups;
+};
+
+// process_request runs on the calling thread: the pattern that fits stores its result here.
+thread_local Found* current = nullptr;
 
 }  // namespace
 
+/// The matcher knows every pattern once, whatever methods it has: trying them one after another would match
+/// each path many times.
 struct Router::Impl {
   Matcher matcher;
-  std::deque<Route> routes;
-
-  void match(const std::string& method, const std::string& encodedPath, RouteMatch& match) {
-    currentMatch = &match;
-    matcher.match(method + " " + encodedPath + " HTTP/1.1\r\nContent-Length: 0\r\n\r\n");
-    currentMatch = nullptr;
-  }
+  std::map<std::string, Methods> patterns;
 };
 
 Router::Router() : impl_(std::make_unique<Impl>()) {}
 Router::~Router() = default;
 
 void Router::add(const std::string& method, const std::string& pattern, Route route) {
-  const Route* kept = &impl_->routes.emplace_back(std::move(route));
-  const auto note = [kept](const httplib::Request& request, httplib::Response&) {
-    currentMatch->route = kept;
-    for (const auto& group : request.matches) currentMatch->matches.push_back(group.str());
-  };
+  if (std::find(kMethods.begin(), kMethods.end(), method) == kMethods.end())
+    throw NetError("route " + method + " " + pattern +
+                   ": expected one of GET, POST, PUT, PATCH, DELETE, OPTIONS");
+  const auto [at, isNew] = impl_->patterns.try_emplace(pattern);
+  at->second.try_emplace(method, std::move(route));
+  if (!isNew) return;
   try {
-    if (method == "GET") {
-      impl_->matcher.Get(pattern, note);
-    } else if (method == "POST") {
-      impl_->matcher.Post(pattern, note);
-    } else if (method == "PUT") {
-      impl_->matcher.Put(pattern, note);
-    } else if (method == "PATCH") {
-      impl_->matcher.Patch(pattern, note);
-    } else if (method == "DELETE") {
-      impl_->matcher.Delete(pattern, note);
-    } else if (method == "OPTIONS") {
-      impl_->matcher.Options(pattern, note);
-    } else {
-      throw NetError("route " + method + " " + pattern +
-                     ": expected one of GET, POST, PUT, PATCH, DELETE, OPTIONS");
-    }
+    impl_->matcher.Get(pattern, [methods = &at->second](const httplib::Request& request, httplib::Response&) {
+      current->methods = methods;
+      for (const auto& group : request.matches) current->groups.push_back(group.str());
+    });
   } catch (const std::regex_error& error) {
     throw NetError("route " + method + " " + pattern + ": not a regular expression: " + error.what());
   }
 }
 
 RouteMatch Router::find(const std::string& method, const std::string& path) const {
-  const std::string encoded = percentEncodePath(path);
+  Found found;
+  current = &found;
+  impl_->matcher.match("GET " + percentEncodePath(path) + " HTTP/1.1\r\nContent-Length: 0\r\n\r\n");
+  current = nullptr;
   RouteMatch match;
-  impl_->match(method, encoded, match);
-  if (match.route) return match;
+  if (!found.methods) return match;
+  const auto route = found.methods->find(method == "HEAD" ? "GET" : method);
+  if (route != found.methods->end()) {
+    match.route = &route->second;
+    match.matches = std::move(found.groups);
+    return match;
+  }
   for (const char* other : kMethods) {
-    RouteMatch probe;
-    impl_->match(other, encoded, probe);
-    if (!probe.route) continue;
+    if (!found.methods->contains(other)) continue;
     if (!match.allow.empty()) match.allow += ", ";
     match.allow += other;
     if (std::string_view(other) == "GET") match.allow += ", HEAD";

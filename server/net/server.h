@@ -82,7 +82,8 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// `pattern` is an ECMAScript regex for the whole path. A GET route answers HEAD too. The first match wins.
+  /// `pattern` is an ECMAScript regex for the whole path. A GET route answers HEAD too. The first pattern
+  /// that fits the path wins, and decides which methods there are.
   void route(const std::string& method, const std::string& pattern, Handler handler,
              RouteKind kind = RouteKind::quick);
   /// Without it every upgrade is refused with 404.

@@ -43,6 +43,16 @@ TEST(Router, SaysWhichMethodsAPathHas) {
   EXPECT_EQ(router.find("DELETE", "/y").allow, "");
 }
 
+TEST(Router, LetsTheFirstPatternThatFitsDecideWhichMethodsThereAre) {
+  Router router;
+  router.add("GET", "/things/([^/]+)", route(1));
+  router.add("POST", "/things/(.*)", route(2));
+  router.add("PUT", "/things/([^/]+)", route(3));
+  EXPECT_EQ(statusOf(router.find("PUT", "/things/a")), 3);
+  EXPECT_EQ(router.find("POST", "/things/a").allow, "GET, HEAD, PUT");
+  EXPECT_EQ(statusOf(router.find("POST", "/things/a/b")), 2);
+}
+
 TEST(Router, RefusesUnknownMethodsAndBrokenPatterns) {
   Router router;
   EXPECT_THROW(router.add("BREW", "/x", route(1)), NetError);
