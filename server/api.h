@@ -36,6 +36,7 @@ struct ApiContext {
   std::atomic<bool>& stopping;  ///< ends requests that wait
   std::stop_token cutting;      ///< ends requests that render, after two thirds of Config::stopGrace
   std::function<nlohmann::json()> capabilities;
+  std::function<std::size_t()> unreadTextBytes;  ///< net::Server::unreadTextBytes()
 };
 
 struct Parameter {

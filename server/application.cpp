@@ -149,7 +149,8 @@ struct Application::Impl {
                 log,
                 stopping,
                 cutting.get_token(),
-                [this] { return capabilities; }},
+                [this] { return capabilities; },
+                [this] { return server->unreadTextBytes(); }},
         authorizer(config.token, isLoopback(config.host), config.allowedOrigins,
                    !config.certificateFile.empty()) {
     net::Options options;

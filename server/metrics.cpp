@@ -41,6 +41,7 @@ struct Metrics::Impl {
       counter("scolopax_builds_abandoned_total", "Scenes built off the render thread, but abandoned");
   Gauge& sessions = gauge("scolopax_sessions", "Sessions");
   Gauge& clients = gauge("scolopax_clients", "Open streams");
+  Gauge& unreadTexts = gauge("scolopax_unread_text_bytes", "Text messages that clients have not read");
   Gauge& memoryLimit = gauge("scolopax_memory_limit_bytes", "Limit on the memory that requests use");
   prometheus::Family<Gauge>& memory = prometheus::BuildGauge()
                                           .Name("scolopax_memory_bytes")
@@ -74,6 +75,8 @@ void Metrics::framesSent(std::uint64_t sent, std::uint64_t replaced) {
 
 void Metrics::setSessions(std::size_t count) { impl_->sessions.Set(double(count)); }
 void Metrics::setClients(std::size_t count) { impl_->clients.Set(double(count)); }
+
+void Metrics::setUnreadTextBytes(std::size_t bytes) { impl_->unreadTexts.Set(double(bytes)); }
 
 void Metrics::setMemory(const MemoryBudget& memory) {
   impl_->memoryLimit.Set(double(memory.limit()));

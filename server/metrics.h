@@ -19,6 +19,7 @@ class Metrics {
   void framesSent(std::uint64_t sent, std::uint64_t replaced);
   void setSessions(std::size_t count);
   void setClients(std::size_t count);
+  void setUnreadTextBytes(std::size_t bytes);
   void setMemory(const MemoryBudget& memory);
   std::string text() const;
 

@@ -104,6 +104,8 @@ void Server::start() {
 
 std::uint16_t Server::port() const { return impl_->boundPort; }
 
+std::size_t Server::unreadTextBytes() const { return *impl_->core.unsentTexts; }
+
 void Server::stop(std::chrono::milliseconds grace) {
   const std::lock_guard lock(impl_->stopMutex);
   if (impl_->stopped) return;

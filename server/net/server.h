@@ -93,6 +93,9 @@ class Server {
   void start();
   std::uint16_t port() const;  ///< the one bound, after start()
 
+  /// Bytes of texts that WebSocket clients have not read.
+  std::size_t unreadTextBytes() const;
+
   /// Accepts no more connections, closes WebSockets with 1001, and lets requests finish; after `grace`, cuts
   /// the connections that are left. Handlers must return by themselves: this waits for the last one. Safe to
   /// call twice.

@@ -38,7 +38,8 @@ struct Api {
                      cutting.get_token(),
                      [] {
                        return nlohmann::json{{"backend", "fake"}};
-                     }};
+                     },
+                     [] { return std::size_t(123); }};
   std::vector<Route> routes;
 
   Api() {
