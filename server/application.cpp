@@ -83,6 +83,7 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
             {"clients", config.maxClients},
             {"renders", config.maxRenders},
             {"renderSeconds", config.maxRenderSeconds},
+            {"macrocells", SceneResolver::Options().maxIntervals},
             {"waitingPolls", Session::kMaxPolls},
             {"waitingPicks", Session::kMaxPicks},
             {"waitingEdits", EditQueue::kMaxEdits},

@@ -23,6 +23,7 @@
 #include "server/command_config.h"
 #include "server/commands/validators.h"
 #include "server/net/server.h"
+#include "server/scene_resolver.h"
 
 namespace scolopax {
 namespace {
@@ -181,6 +182,10 @@ CLI::App* addServeCommand(CLI::App& root) {
       ->check(CLI::ExistingFile)
       ->type_name("FILE");
   command->footer(
+      "Macrocells smaller than 4 voxels are refused if a data set would have more than " +
+      std::to_string(server::SceneResolver::Options().maxIntervals) +
+      " of them, counted once\n"
+      "for each channel.\n"
       "Each option can also be set in the environment (--max-body as SCOLOPAX_MAX_BODY) or in the file of "
       "--config;\n"
       "the command line takes precedence over the environment, the environment over the file.\n"

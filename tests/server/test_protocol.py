@@ -110,7 +110,7 @@ class Description(unittest.TestCase):
         self.assertEqual((told["limits"]["sessions"], told["limits"]["messageBytes"]), (4, 65536))
         self.assertEqual(set(told["limits"]), set(
             "bodyBytes messageBytes imageWidth imageHeight imagePixels memoryBytes renders waitingPolls waitingPicks "
-            "waitingEdits pickPixels sessions clients renderSeconds sceneDepth".split()))
+            "waitingEdits pickPixels macrocells sessions clients renderSeconds sceneDepth".split()))
 
     def test_the_schema_is_the_file_beside_the_document(self):
         status, headers, body = call(server, "GET", "/api/v1/schema.json")
