@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "renderer/data/measuring.h"
 #include "renderer/data/value_levels.h"
 
 namespace scolopax {
@@ -14,7 +15,8 @@ std::shared_ptr<const CellColumn> buildBoundColumn(const MacrocellGrid& macrocel
                                                    const kernel::BoundTable& ofValues,
                                                    const GradientCells& gradients,
                                                    const GradientFactor& factor,
-                                                   const std::shared_ptr<MemoryBudget>& memory) {
+                                                   const std::shared_ptr<MemoryBudget>& memory,
+                                                   const std::stop_token& stop) {
   const std::size_t cells = macrocells.cellCount(), columnBytes = cells * sizeof(kernel::LevelInterval);
   auto share = MemoryBudget::take(memory, MemoryUse::grids, columnBytes + cells * sizeof(ValueInterval));
   std::vector<float> factors;
@@ -23,6 +25,7 @@ std::shared_ptr<const CellColumn> buildBoundColumn(const MacrocellGrid& macrocel
   std::vector<ValueInterval> bounds(cells);
   const auto forCells = [&](auto&& f) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bounds.size(), 4096), [&](const auto& range) {
+      checkWanted(stop);
       for (std::size_t cell = range.begin(); cell < range.end(); ++cell) f(cell);
     });
   };
@@ -45,7 +48,8 @@ std::shared_ptr<const CellColumn> buildBoundColumn(const MacrocellGrid& macrocel
 
 std::shared_ptr<const MacrocellGrid> withColumns(const std::shared_ptr<const MacrocellGrid>& macrocells,
                                                  std::span<const std::shared_ptr<const CellColumn>> columns,
-                                                 const std::shared_ptr<MemoryBudget>& memory) {
+                                                 const std::shared_ptr<MemoryBudget>& memory,
+                                                 const std::stop_token& stop) {
   if (columns.empty()) return macrocells;
   const std::size_t before = macrocells->levels.size(), after = before + columns.size();
   auto share = MemoryBudget::take(memory, MemoryUse::grids, macrocells->sizeBytes() / before * after);
@@ -58,6 +62,7 @@ std::shared_ptr<const MacrocellGrid> withColumns(const std::shared_ptr<const Mac
   const CellBlocks blocks(macrocells->cells);
   result.blocks.resize(blocks.count() * after);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.count(), 64), [&](const auto& range) {
+    checkWanted(stop);
     for (std::size_t block = range.begin(); block < range.end(); ++block) {
       kernel::LevelInterval* all = &result.blocks[block * after];
       std::copy_n(&macrocells->blocks[block * before], before, all);

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <glm/common.hpp>
 
+#include "renderer/data/measuring.h"
+
 namespace scolopax {
 namespace {
 
@@ -41,8 +43,9 @@ void addChange(const BoundTable* before, const BoundTable* after, std::vector<Ch
 
 /// Calls f(block) for all blocks, from many threads.
 template <class F>
-void forBlocks(const CellBlocks& blocks, F&& f) {
+void forBlocks(const CellBlocks& blocks, const std::stop_token& stop, F&& f) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.count(), 256), [&](const auto& range) {
+    checkWanted(stop);
     for (std::size_t block = range.begin(); block < range.end(); ++block) f(block);
   });
 }
@@ -145,7 +148,7 @@ struct MajorantGrid::Changes {
 
 MajorantGrid::MajorantGrid(std::shared_ptr<const MacrocellGrid> macrocells, std::vector<BoundTable> tables,
                            bool sums, bool apart, const MajorantGrid* before,
-                           const std::shared_ptr<MemoryBudget>& memory)
+                           const std::shared_ptr<MemoryBudget>& memory, const std::stop_token& stop)
     : macrocells_(std::move(macrocells)),
       tables_(std::make_shared<const std::vector<BoundTable>>(std::move(tables))),
       sums_(sums) {
@@ -159,7 +162,7 @@ MajorantGrid::MajorantGrid(std::shared_ptr<const MacrocellGrid> macrocells, std:
   const std::size_t cells = macrocells_->cellCount(), blocks = CellBlocks(macrocells_->cells).count();
   auto share = MemoryBudget::take(memory, MemoryUse::grids, Totals::sizeBytes(cells, blocks, apart));
   Totals totals = changes.all ? Totals(cells, blocks, apart) : *before->totals_;
-  cellsRebuilt_ = rebuild(changes, totals);
+  cellsRebuilt_ = rebuild(changes, totals, stop);
   totals_ = withShare(std::move(share), std::move(totals));
 }
 
@@ -179,14 +182,14 @@ MajorantGrid::Changes MajorantGrid::changesSince(const MajorantGrid& before, boo
 }
 
 /// Updates the totals; returns the number of cells that were recomputed.
-std::size_t MajorantGrid::rebuild(const Changes& changes, Totals& totals) const {
+std::size_t MajorantGrid::rebuild(const Changes& changes, Totals& totals, const std::stop_token& stop) const {
   const CellBlocks blocks(macrocells_->cells);
   const std::size_t columns = macrocells_->levels.size();
   std::vector<std::uint8_t> radii(blocks.count()), scratch(blocks.count()), stale(blocks.count());
   std::atomic<std::size_t> touched = 0;
   std::atomic<bool> other = changes.all;  // whether the set of empty blocks changes
   // Blocks first: most of them contain no value that an edit changes.
-  forBlocks(blocks, [&](std::size_t block) {
+  forBlocks(blocks, stop, [&](std::size_t block) {
     radii[block] = totals.radii[block] > 0 ? kernel::kMaxEmptyRadius : 0;
     if (!changes.meet(&macrocells_->blocks[block * columns])) return;
     std::size_t count = 0;
@@ -210,7 +213,7 @@ std::size_t MajorantGrid::rebuild(const Changes& changes, Totals& totals) const 
     measureRadii(blocks.size, radii, scratch);
   else
     radii = totals.radii;
-  forBlocks(blocks, [&](std::size_t block) {
+  forBlocks(blocks, stop, [&](std::size_t block) {
     if (radii[block] == totals.radii[block] && !(stale[block] && radii[block] > 0)) return;
     blocks.visitCells(block, [&](std::size_t cell) {
       if (radii[block] > 0)

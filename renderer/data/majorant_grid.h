@@ -3,6 +3,7 @@
 // and the totals of the cells whose bounds it changes are computed anew; the other totals are copied.
 #pragma once
 #include <memory>
+#include <stop_token>
 #include <vector>
 
 #include "renderer/core/memory_budget.h"
@@ -28,9 +29,10 @@ class MajorantGrid {
   /// `sums`: the channels' extinctions add up; otherwise the largest hides the others. `apart`: kernels need
   /// to know which channels are active in each cell. Totals that are as in `before`, if given, are not
   /// recomputed, and all are shared with it if none has changed. The memory is charged to `memory`, if given.
+  /// Throws Error(cancelled) once `stop` is requested while totals are computed.
   MajorantGrid(std::shared_ptr<const MacrocellGrid> macrocells, std::vector<kernel::BoundTable> tables,
                bool sums, bool apart, const MajorantGrid* before = nullptr,
-               const std::shared_ptr<MemoryBudget>& memory = nullptr);
+               const std::shared_ptr<MemoryBudget>& memory = nullptr, const std::stop_token& stop = {});
   /// Number of cells whose total was recomputed.
   std::size_t cellsRebuilt() const { return cellsRebuilt_; }
   /// Valid while this object or a copy of it lives.
@@ -40,7 +42,7 @@ class MajorantGrid {
   struct Totals;
   struct Changes;
   Changes changesSince(const MajorantGrid& before, bool apart) const;
-  std::size_t rebuild(const Changes& changes, Totals& totals) const;
+  std::size_t rebuild(const Changes& changes, Totals& totals, const std::stop_token& stop) const;
   float totalOf(const kernel::LevelInterval* intervals) const;
   std::uint32_t activeOf(const kernel::LevelInterval* intervals) const;
 

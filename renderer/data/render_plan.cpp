@@ -227,7 +227,7 @@ void RenderPlan::planFactors(const std::shared_ptr<MemoryBudget>& memory, const 
                                       scene_.channels[std::size_t(i)].interpolation, stop, memory);
     if (!plan.column)
       plan.column = buildBoundColumn(*values_, channels_.valueColumns[v], *plan.bounds, *gradients,
-                                     *plan.factor, memory);
+                                     *plan.factor, memory, stop);
     channels_.columns.push_back(plan.column);
   }
 }
@@ -280,10 +280,10 @@ RenderPlan::RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene,
   if (newCells) rebuilt_.macrocellChannels = int(volume_->channels().size());
   planChannels(before, memory, stop);
   const bool sameValues = !newCells && channels_.splines == before->channels_.splines;
-  values_ = sameValues ? before->values_ : withColumns(macrocells_, channels_.splines, memory);
+  values_ = sameValues ? before->values_ : withColumns(macrocells_, channels_.splines, memory, stop);
   planFactors(memory, stop);
   const bool sameColumns = sameValues && channels_.columns == before->channels_.columns;
-  bounded_ = sameColumns ? before->bounded_ : withColumns(values_, channels_.columns, memory);
+  bounded_ = sameColumns ? before->bounded_ : withColumns(values_, channels_.columns, memory, stop);
   for (const int i : channels_.visible) {
     const ChannelPlan& plan = *channels_.plans[std::size_t(i)];
     const Channel& channel = volume_->channels()[std::size_t(i)];
@@ -296,11 +296,11 @@ RenderPlan::RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene,
   const auto clip = clipView(scene_.clip, scene_.crop, volume_->grid(), channels_.visible);
   majorants_.emplace(bounded_, boundTables(), sumsExtinction(scene_.blend),
                      needsApart(clip.value_or(kernel::ClipView{})), before ? &*before->majorants_ : nullptr,
-                     memory);
+                     memory, stop);
   rebuilt_.majorantCells = majorants_->cellsRebuilt();
   if (hasSurfaces()) {
     const auto* surfaceCellsBefore = before && before->surfaceCells_ ? &*before->surfaceCells_ : nullptr;
-    surfaceCells_.emplace(values_, presenceTables(), false, true, surfaceCellsBefore, memory);
+    surfaceCells_.emplace(values_, presenceTables(), false, true, surfaceCellsBefore, memory, stop);
   }
   fillView(rays, clip);
   rebuilt_.rebuildMs =

@@ -73,6 +73,39 @@ struct EndlessBuilds {
   }
 };
 
+TEST_F(ApplicationTest, EndsAllBuildsWhenItStops) {
+  EndlessBuilds builds;
+  config_.stopGrace = 0s;
+  building_ = std::ref(builds);
+  start();
+  const std::string session = newSession();
+  TestClient poll(application_->port()), render(application_->port());
+  send(poll, "GET " + session + "/frame");
+  send(render, "POST /api/v1/render", kSmallRender);
+  ASSERT_TRUE(eventually([&] { return builds.begun == 2; }));
+  application_->stop();
+  application_.reset();
+  EXPECT_EQ(builds.stopped, 2);
+}
+
+TEST_F(ApplicationTest, EndsTheBuildOfAClientThatVanishesAndFreesItsPlace) {
+  EndlessBuilds builds;
+  std::atomic<bool> endless{true};
+  building_ = [&](const std::stop_token& stop) {
+    if (endless) builds(stop);
+  };
+  start();
+  {
+    TestClient vanishing(application_->port());
+    send(vanishing, "POST /api/v1/render", kSmallRender);
+    ASSERT_TRUE(eventually([&] { return builds.begun == 1; }));
+    EXPECT_EQ(call("POST /api/v1/render", kSmallRender).status, 503);
+  }
+  endless = false;
+  EXPECT_TRUE(eventually([&] { return builds.stopped == 1; }));
+  EXPECT_TRUE(eventually([&] { return call("POST /api/v1/render", kSmallRender).status == 200; }));
+}
+
 TEST_F(ApplicationTest, LetsNoSessionsPollsKeepOthersOut) {
   EndlessBuilds builds;
   building_ = std::ref(builds);
