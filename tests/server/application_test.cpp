@@ -62,7 +62,7 @@ class ApplicationTest : public ::testing::Test {
   std::optional<Application> application_;  ///< last: ends before what its renderers use
 };
 
-constexpr const char* kSmallRender = R"({"image": {"width": 8, "height": 8}, "stop": {"samples": 1}})";
+constexpr const char* kSmallPicture = R"({"image": {"width": 8, "height": 8}, "stop": {"samples": 1}})";
 
 /// Builds that end only when they are told to.
 struct EndlessBuilds {
@@ -81,7 +81,7 @@ TEST_F(ApplicationTest, EndsAllBuildsWhenItStops) {
   const std::string session = newSession();
   TestClient poll(application_->port()), render(application_->port());
   send(poll, "GET " + session + "/frame");
-  send(render, "POST /api/v1/render", kSmallRender);
+  send(render, "POST /api/v1/render", kSmallPicture);
   ASSERT_TRUE(eventually([&] { return builds.begun == 2; }));
   application_->stop();
   application_.reset();
@@ -97,13 +97,13 @@ TEST_F(ApplicationTest, EndsTheBuildOfAClientThatVanishesAndFreesItsPlace) {
   start();
   {
     TestClient vanishing(application_->port());
-    send(vanishing, "POST /api/v1/render", kSmallRender);
+    send(vanishing, "POST /api/v1/render", kSmallPicture);
     ASSERT_TRUE(eventually([&] { return builds.begun == 1; }));
-    EXPECT_EQ(call("POST /api/v1/render", kSmallRender).status, 503);
+    EXPECT_EQ(call("POST /api/v1/render", kSmallPicture).status, 503);
   }
   endless = false;
   EXPECT_TRUE(eventually([&] { return builds.stopped == 1; }));
-  EXPECT_TRUE(eventually([&] { return call("POST /api/v1/render", kSmallRender).status == 200; }));
+  EXPECT_TRUE(eventually([&] { return call("POST /api/v1/render", kSmallPicture).status == 200; }));
 }
 
 TEST_F(ApplicationTest, LetsNoSessionsPollsKeepOthersOut) {
