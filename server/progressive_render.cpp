@@ -20,8 +20,9 @@ double secondsBetween(TimePoint from, TimePoint to) {
 
 std::uint32_t microseconds(double seconds) { return std::uint32_t(std::clamp(seconds * 1e6, 0.0, 4e9)); }
 
-/// A part of a pass that takes so much longer than its turn was meant to has rays that take that long.
-constexpr double kSlowRay = 0.05;
+/// A part of a pass that takes so much longer than its turn was meant to has rays that take that long; on a
+/// busy machine, any part may take a little longer.
+constexpr double kSlowRay = 0.3;
 /// For so long, passes are then rendered in the background, where they keep no other session waiting.
 constexpr std::chrono::seconds kSlowTime{10};
 
