@@ -2,8 +2,10 @@
 #include "server/background.h"
 
 #include <exception>
+#include <system_error>
 #include <utility>
 
+#include "renderer/core/error.h"
 #include "renderer/core/thread_priority.h"
 
 namespace scolopax::server {
@@ -26,41 +28,84 @@ void Background::Job::run() {
     promise_.set_value();
 }
 
+void Background::Job::leave() {
+  work_ = nullptr;
+  promise_.set_exception(
+      std::make_exception_ptr(Error(ErrorCode::cancelled, "cancelled before its turn came")));
+}
+
 BackgroundThreads::~BackgroundThreads() {
-  for (Running& one : running_) one.job->cancel();
-  for (Running& one : running_) one.thread.join();
+  std::list<std::shared_ptr<Job>> jobs;
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+    for (const auto* entries : {&waiting_, &running_})
+      for (const Entry& entry : *entries) jobs.push_back(entry.job);
+  }
+  for (const auto& job : jobs) job->cancel();
+  came_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
 }
 
 std::shared_ptr<Background::Job> BackgroundThreads::start(Work work, std::function<void()> ended) {
   auto job = std::make_shared<Job>(std::move(work));
-  if (!startThread(job, ended)) {
-    job->run();
-    ended();
+  {
+    const std::lock_guard lock(mutex_);
+    if (idle_ <= waiting_.size() && threads_.size() < mostAtOnce_) startThread();
+    if (!threads_.empty()) {
+      Entry& entry = waiting_.emplace_back(Entry{job, std::move(ended)});
+      entry.onCancel.emplace(job->cancelled(), [this, &which = *job] { leave(which); });
+      came_.notify_one();
+      return job;
+    }
   }
+  job->run();
+  ended();
   return job;
 }
 
-bool BackgroundThreads::startThread(const std::shared_ptr<Job>& job, const std::function<void()>& ended) {
-  const std::lock_guard lock(mutex_);
-  running_.remove_if([](Running& one) {
-    if (!one.over) return false;
-    one.thread.join();
-    return true;
-  });
-  Running& one = running_.emplace_back();
-  one.job = job;
+void BackgroundThreads::startThread() {
   try {
-    one.thread = std::thread([&one, job, ended] {
-      lowerThreadPriority();
-      job->run();
-      ended();
-      one.over = true;
-    });
-  } catch (const std::exception&) {
-    running_.pop_back();
-    return false;
+    threads_.emplace_back([this] { work(); });
+  } catch (const std::system_error&) {  // the threads that there are do the work
   }
-  return true;
+}
+
+void BackgroundThreads::work() {
+  lowerThreadPriority();
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    ++idle_;
+    came_.wait(lock, [&] { return ending_ || !waiting_.empty(); });
+    --idle_;
+    if (waiting_.empty()) return;
+    const auto entry = waiting_.begin();
+    running_.splice(running_.end(), waiting_, entry);
+    lock.unlock();
+    entry->onCancel.reset();
+    entry->job->run();
+    entry->ended();
+    std::list<Entry> over;
+    lock.lock();
+    over.splice(over.end(), running_, entry);
+    lock.unlock();
+    over.clear();
+    lock.lock();
+  }
+}
+
+/// Ends a job that waits.
+void BackgroundThreads::leave(const Job& job) {
+  std::list<Entry> left;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto entry = std::find_if(waiting_.begin(), waiting_.end(),
+                                    [&](const Entry& one) { return one.job.get() == &job; });
+    if (entry == waiting_.end()) return;
+    left.splice(left.end(), waiting_, entry);
+  }
+  left.front().job->leave();
+  left.front().ended();
 }
 
 }  // namespace scolopax::server

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // Jobs that would hold up the thread of a loop: building scenes, encoding large pictures.
 #pragma once
-#include <atomic>
+#include <algorithm>
+#include <condition_variable>
+#include <cstddef>
 #include <functional>
 #include <future>
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <thread>
+#include <vector>
 
 namespace scolopax::server {
 
@@ -20,13 +24,16 @@ class Background {
    public:
     explicit Job(Work work) : work_(std::move(work)) {}
     bool done() const;
-    /// Requests an early end.
+    /// Requests an early end. A job that has not begun ends at once, without doing its work.
     void cancel() { stop_.request_stop(); }
-    /// Throws what the work threw, if anything. To be called once, when done().
+    /// Throws what the work threw, if anything; Error(cancelled) if it was not done. To be called once, when
+    /// done().
     void rethrow() { result_.get(); }
-    /// For implementations of Background, to be called once. Destroys the work, with all that it holds,
-    /// before done() becomes true.
+    /// For implementations of Background, one of which is called once: does the work, or leaves it. Both
+    /// destroy the work, with all that it holds, before done() becomes true.
     void run();
+    void leave();
+    std::stop_token cancelled() const { return stop_.get_token(); }
 
    private:
     std::stop_source stop_;
@@ -43,23 +50,34 @@ class Background {
   virtual std::shared_ptr<Job> start(Work work, std::function<void()> ended) = 0;
 };
 
-/// Starts every job at once, on its own thread of low priority: no job waits for another. If the system
-/// cannot create a thread, start() runs the job itself.
+/// Runs a limited number of jobs at once, on threads of low priority; the others wait for their turn, in the
+/// order in which they came. If the system cannot create even one thread, start() runs the job itself. A job
+/// must not wait for another.
 class BackgroundThreads : public Background {
  public:
+  /// `mostAtOnce`: number of jobs, from 1; by default one per processor.
+  explicit BackgroundThreads(std::size_t mostAtOnce = std::max(1u, std::thread::hardware_concurrency()))
+      : mostAtOnce_(mostAtOnce) {}
   ~BackgroundThreads() override;  ///< cancels the jobs and waits for them
   std::shared_ptr<Job> start(Work work, std::function<void()> ended) override;
 
  private:
-  struct Running {
+  struct Entry {
     std::shared_ptr<Job> job;
-    std::atomic<bool> over{false};
-    std::thread thread;
+    std::function<void()> ended;
+    std::optional<std::stop_callback<std::function<void()>>> onCancel = {};
   };
-  bool startThread(const std::shared_ptr<Job>& job, const std::function<void()>& ended);
+  void startThread();
+  void work();
+  void leave(const Job& job);
 
-  std::mutex mutex_;
-  std::list<Running> running_;
+  const std::size_t mostAtOnce_;
+  std::mutex mutex_;  ///< not held while entries are destroyed
+  std::condition_variable came_;
+  std::list<Entry> waiting_, running_;  ///< the oldest first
+  std::vector<std::thread> threads_;
+  std::size_t idle_ = 0;  ///< threads without a job
+  bool ending_ = false;
 };
 
 }  // namespace scolopax::server
