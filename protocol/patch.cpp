@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "protocol/patch.h"
 
+#include <algorithm>
 #include <charconv>
-#include <nlohmann/json.hpp>
 
 #include "protocol/read_fields.h"
+#include "protocol/scene_json.h"
 
 namespace scolopax::protocol {
 namespace {
@@ -186,15 +187,21 @@ nlohmann::json between(const nlohmann::json& from, const nlohmann::json& to) {
 
 }  // namespace
 
-nlohmann::json applyPatch(const nlohmann::json& sparse, const nlohmann::json& patch,
-                          std::size_t channelCount) {
-  nlohmann::json result = sparse;
-  patchStruct<Scene>(result, patch, Path(), channelCount);
-  return result;
+nlohmann::json applyPatch(nlohmann::json sparse, const nlohmann::json& patch, std::size_t channelCount) {
+  patchStruct<Scene>(sparse, patch, Path(), channelCount);
+  return sparse;
 }
 
 nlohmann::json mergePatchBetween(const nlohmann::json& from, const nlohmann::json& to) {
   return between<Scene>(from, to);
+}
+
+nlohmann::json patchBetween(const Scene& from, const Scene& to) {
+  // Channels that stay, whose curves may be long, need not be written.
+  Scene before = from, after = to;
+  for (std::size_t i = 0; i < std::min(from.channels.size(), to.channels.size()); ++i)
+    if (from.channels[i] == to.channels[i]) before.channels[i] = after.channels[i] = Channel();
+  return between<Scene>(toJson(before), toJson(after));
 }
 
 }  // namespace scolopax::protocol

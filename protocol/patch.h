@@ -4,7 +4,9 @@
 // no null.
 #pragma once
 #include <cstddef>
-#include <nlohmann/json_fwd.hpp>
+#include <nlohmann/json.hpp>
+
+#include "protocol/scene.h"
 
 namespace scolopax::protocol {
 
@@ -13,11 +15,12 @@ namespace scolopax::protocol {
 /// unknown fields, for objects where none is allowed, and for indices that do not exist; parseScene checks
 /// the values afterwards. `sparse` must be a scene that parseScene accepts; {} is one, so applyPatch({},
 /// scene, n) makes a whole scene sparse.
-nlohmann::json applyPatch(const nlohmann::json& sparse, const nlohmann::json& patch,
-                          std::size_t channelCount);
+nlohmann::json applyPatch(nlohmann::json sparse, const nlohmann::json& patch, std::size_t channelCount);
 
 /// Returns the patch for which applyPatch(from, patch) == to. Both scenes must be sparse, or both resolved
 /// (toJson), and have at most as many channels as the data set.
 nlohmann::json mergePatchBetween(const nlohmann::json& from, const nlohmann::json& to);
+/// The same for two resolved scenes.
+nlohmann::json patchBetween(const Scene& from, const Scene& to);
 
 }  // namespace scolopax::protocol

@@ -57,6 +57,21 @@ void readPoints(const nlohmann::json& json, const Path& path, const Traits& trai
   }
 }
 
+/// The points as [position, second].
+template <class Point, class Second>
+nlohmann::json pairs(const std::vector<Point>& points, Second Point::*second) {
+  nlohmann::json::array_t list;
+  list.reserve(points.size());
+  for (const Point& point : points) {
+    nlohmann::json::array_t pair;
+    pair.reserve(2);
+    pair.emplace_back(point.position);
+    pair.emplace_back(point.*second);
+    list.emplace_back(std::move(pair));
+  }
+  return list;
+}
+
 }  // namespace
 
 bool isColor(std::string_view text) {
@@ -147,18 +162,12 @@ void readValue(const nlohmann::json& json, const Path& path, const Traits& trait
 }
 
 nlohmann::json writeValue(const std::vector<ControlPoint>& value) {
-  nlohmann::json list = nlohmann::json::array();
-  for (const ControlPoint& point : value) list.push_back({point.position, point.value});
-  return list;
+  return pairs(value, &ControlPoint::value);
 }
 
 nlohmann::json writeValue(const Colormap& value) {
   if (const auto* name = std::get_if<std::string>(&value)) return *name;
-  nlohmann::json list = nlohmann::json::array();
-  for (const ColorPoint& point : std::get<std::vector<ColorPoint>>(value)) {
-    list.push_back(nlohmann::json::array({point.position, point.color}));
-  }
-  return list;
+  return pairs(std::get<std::vector<ColorPoint>>(value), &ColorPoint::color);
 }
 
 }  // namespace scolopax::protocol

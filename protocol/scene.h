@@ -16,12 +16,14 @@ namespace scolopax::protocol {
 struct ControlPoint {
   double position = 0;
   double value = 0;
+  bool operator==(const ControlPoint&) const = default;
 };
 
 /// On the wire `[position, "#rrggbb"]`, position in [0,1].
 struct ColorPoint {
   double position = 0;
   std::string color;
+  bool operator==(const ColorPoint&) const = default;
 };
 
 /// The name of a colour table, or control points.
@@ -33,12 +35,14 @@ struct Material {
   double diffuse = 0.7;
   double specular = 0.2;
   double shininess = 20;
+  bool operator==(const Material&) const = default;
 };
 
 /// Opacity by the magnitude of the gradient.
 struct GradientOpacity {
   std::optional<std::array<double, 2>> range;
   std::vector<ControlPoint> points{{0, 0}, {1, 1}};
+  bool operator==(const GradientOpacity&) const = default;
 };
 
 /// A surface where the scalar equals a value.
@@ -46,6 +50,7 @@ struct Isovalue {
   std::optional<double> value;
   double opacity = 1;
   std::optional<std::string> color;  ///< "#rrggbb"; none: the channel's at the value
+  bool operator==(const Isovalue&) const = default;
 };
 
 struct Channel {
@@ -63,10 +68,12 @@ struct Channel {
   std::optional<double> density;
   double weight = 1;
   Material material;
+  bool operator==(const Channel&) const = default;
 };
 
 struct Blend {
   std::string mode = "density";
+  bool operator==(const Blend&) const = default;
 };
 
 struct Light {
@@ -75,12 +82,14 @@ struct Light {
   std::array<double, 3> position{0, 0, 0};
   std::string color = "#ffffff";
   double intensity = 1;
+  bool operator==(const Light&) const = default;
 };
 
 struct Camera {
   std::optional<std::array<double, 3>> eye, target, up;
   double fovY = 35;
   std::optional<double> orthoHeight;  ///< when set, fovY is not used
+  bool operator==(const Camera&) const = default;
 };
 
 /// Keeps the points x with dot(normal, x - point) >= 0.
@@ -88,6 +97,7 @@ struct ClipPlane {
   std::optional<std::array<double, 3>> point;
   std::array<double, 3> normal{0, 0, 1};
   std::optional<std::vector<std::uint32_t>> media;
+  bool operator==(const ClipPlane&) const = default;
 };
 
 struct Crop {
@@ -95,6 +105,7 @@ struct Crop {
   std::array<bool, 27> regions{false, false, false, false, false, false, false, false, false,
                                false, false, false, false, true,  false, false, false, false,
                                false, false, false, false, false, false, false, false, false};
+  bool operator==(const Crop&) const = default;
 };
 
 struct Integrator {
@@ -103,6 +114,7 @@ struct Integrator {
   double step = 0.5;
   std::string sampling = "low-discrepancy";
   std::uint32_t seed = 0;
+  bool operator==(const Integrator&) const = default;
 };
 
 struct ImageSettings {
@@ -110,12 +122,14 @@ struct ImageSettings {
   std::uint32_t height = 512;
   std::string background = "#000000";
   std::string filter = "box";
+  bool operator==(const ImageSettings&) const = default;
 };
 
 struct Stop {
   std::optional<std::uint32_t> samples;
   std::optional<double> seconds;
   std::optional<double> error;
+  bool operator==(const Stop&) const = default;
 };
 
 struct Scene {
@@ -131,6 +145,7 @@ struct Scene {
   Integrator integrator;
   ImageSettings image;
   Stop stop;
+  bool operator==(const Scene&) const = default;
 };
 
 }  // namespace scolopax::protocol

@@ -11,6 +11,13 @@ Scene parseScene(const nlohmann::json& json, const Lists& lists) {
   return scene;
 }
 
+Channel parseChannel(const nlohmann::json& json, std::size_t index, const Lists& lists) {
+  Channel channel;
+  const Path root, channels = root / "channels";
+  readStruct(json, channels / index, {lists}, channel);
+  return channel;
+}
+
 nlohmann::json toJson(const Scene& scene) { return writeValue(scene); }
 
 void checkChannelCount(const Scene& scene, std::size_t channelCount) {

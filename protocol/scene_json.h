@@ -14,6 +14,9 @@ namespace scolopax::protocol {
 /// and what was found.
 Scene parseScene(const nlohmann::json& json, const Lists& lists);
 
+/// Reads one entry of a scene's channels, in the same way.
+Channel parseChannel(const nlohmann::json& json, std::size_t index, const Lists& lists);
+
 /// Writes every field that has a value and omits empty optionals. The result therefore contains no null, and
 /// parseScene(toJson(scene)) is the same scene.
 nlohmann::json toJson(const Scene& scene);

@@ -137,7 +137,7 @@ std::shared_ptr<const ResolvedScene> sceneOf(const ApiContext& context, const ne
 /// FNV-1a, 64 bits, of the resolved scene's canonical text: equal pictures have equal hashes.
 std::string sceneHash(const ResolvedScene& scene) {
   std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const char c : scene.picture.dump()) hash = (hash ^ std::uint8_t(c)) * 0x100000001b3u;
+  for (const char c : pictureJson(scene.resolved).dump()) hash = (hash ^ std::uint8_t(c)) * 0x100000001b3u;
   char text[17];
   std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
   return text;

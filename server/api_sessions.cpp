@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/problem.h"
+#include "protocol/scene_json.h"
 #include "server/api.h"
 
 namespace scolopax::server {
@@ -40,7 +41,9 @@ EditOrigin originOf(const net::Request& request) {
 }
 
 net::Response sceneResponse(const Session::SceneState& state) {
-  auto response = jsonResponse(200, {{"revision", state.revision}, {"scene", state.scene->resolved}});
+  json body = {{"revision", state.revision}};
+  body["scene"] = protocol::toJson(state.scene->resolved);
+  auto response = jsonResponse(200, body);
   response.headers.emplace_back("ETag", '"' + std::to_string(state.revision) + '"');
   return response;
 }
@@ -64,11 +67,12 @@ net::Response create(ApiContext& context, const net::Request& request) {
   }
   const auto session = measuredIn(context, request, [&] { return context.sessions.create(scene); });
   const auto state = session->scene();
-  auto response = jsonResponse(201, {{"id", session->id()},
-                                     {"token", session->token()},
-                                     {"revision", state.revision},
-                                     {"scene", state.scene->resolved},
-                                     {"stream", "api/v1/sessions/" + session->id() + "/stream"}});
+  json body = {{"id", session->id()},
+               {"token", session->token()},
+               {"revision", state.revision},
+               {"stream", "api/v1/sessions/" + session->id() + "/stream"}};
+  body["scene"] = protocol::toJson(state.scene->resolved);
+  auto response = jsonResponse(201, body);
   response.headers.emplace_back("Location", "/api/v1/sessions/" + session->id());
   return response;
 }

@@ -102,7 +102,8 @@ struct Application::Impl {
   std::stop_source cutting;
   const Now now = [] { return std::chrono::steady_clock::now(); };
   LoopThread renderThread, encodeThread;
-  BackgroundThreads background;
+  // Apart, so that what is soon done does not wait for what takes long.
+  BackgroundThreads background, builds;
   Metrics metrics;
   std::shared_ptr<const DatasetStore> datasets;
   std::shared_ptr<const SceneResolver> sessionResolver;
@@ -131,12 +132,12 @@ struct Application::Impl {
                  {now, [this] { renderThread.wake(); }, [this] { encodeThread.wake(); },
                   [this] { renderLoop.interrupt(); }}),
         renderLoop(sessions,
-                   {makeRenderer, {}, now, log, background, [this] { renderThread.wake(); }, memory},
+                   {makeRenderer, {}, now, log, background, builds, [this] { renderThread.wake(); }, memory},
                    [this](const PassResult& pass) { metrics.passEnded(pass); }),
         encodeLoop(
             sessions, now, log, background, [this] { encodeThread.wake(); }, memory),
         capabilities(capabilitiesJson(config, sessionResolver->lists())),
-        streams(sessions, background, metrics,
+        streams(sessions, builds, metrics,
                 {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities, log}),
         context{config,
                 *datasets,

@@ -43,7 +43,7 @@ json hitJson(const ResolvedScene& scene, const Picked& picked) {
   return {{"point", {picked.point.x, picked.point.y, picked.point.z}},
           {"voxel", nearestVoxel(picked, volume.grid().dims)},
           {"channel", picked.channel},
-          {"name", scene.resolved["channels"][std::size_t(picked.channel)]["name"]},
+          {"name", *scene.resolved.channels[std::size_t(picked.channel)].name},
           {"depth", picked.depth},
           {"values", valuesJson(volume, picked.voxel, scene.render.channels)}};
 }

@@ -112,14 +112,15 @@ std::uint64_t ProgressiveRender::filmSize() const {
 
 bool ProgressiveRender::largeFilm() const { return filmSize() >= kLargePicture; }
 
-void ProgressiveRender::perform(bool inBackground, Background::Work work, Next next, PassResult& result) {
-  if (!inBackground) {
+void ProgressiveRender::perform(Background* background, Background::Work work, Next next,
+                                PassResult& result) {
+  if (!background) {
     work({});
     (this->*next)(result);
     return;
   }
   next_ = next;
-  job_ = context_.background.start(std::move(work), context_.wake);
+  job_ = background->start(std::move(work), context_.wake);
   if (job_->done()) collect(result);
 }
 
@@ -176,7 +177,7 @@ void ProgressiveRender::takeScene(const RenderRequest& request, const Others& ot
     taking->stats = taking->renderer->setScene(taking->scene, stop);
     if (taking->record) taking->renderer->recordAovs();
   };
-  perform(taking_->inBackground, build, &ProgressiveRender::sceneTaken, result);
+  perform(taking_->inBackground ? &context_.builds : nullptr, build, &ProgressiveRender::sceneTaken, result);
 }
 
 void ProgressiveRender::sceneTaken(PassResult& result) {
@@ -225,7 +226,8 @@ void ProgressiveRender::addSample(const RenderRequest& request, const Others& ot
   const auto render = [part = part_, renderer = renderer_, now = context_.now](const std::stop_token& stop) {
     part->render(*renderer, now, stop);
   };
-  perform(part_->inBackground, render, &ProgressiveRender::partRendered, result);
+  perform(part_->inBackground ? &context_.background : nullptr, render, &ProgressiveRender::partRendered,
+          result);
 }
 
 void ProgressiveRender::partRendered(PassResult& result) {
@@ -241,7 +243,7 @@ void ProgressiveRender::partRendered(PassResult& result) {
     // So that the error is known when it is needed; if estimating it takes long, show() does it.
     if (estimate && !renderer->errorTakesLong()) renderer->estimatedError();
   };
-  perform(largeFilm(), add, &ProgressiveRender::sampleAdded, result);
+  perform(largeFilm() ? &context_.background : nullptr, add, &ProgressiveRender::sampleAdded, result);
 }
 
 void ProgressiveRender::sampleAdded(PassResult& result) {
@@ -274,7 +276,8 @@ void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
   showing_->sampleError = sampleError_;
   const auto make = [showing = showing_, renderer = renderer_, pixels = filmSize(), memory = context_.memory](
                         const std::stop_token& stop) { showing->make(*renderer, pixels, memory, stop); };
-  perform(largeFilm() || renderer_->errorTakesLong(), make, &ProgressiveRender::pictureMade, result);
+  const bool takesLong = largeFilm() || renderer_->errorTakesLong();
+  perform(takesLong ? &context_.background : nullptr, make, &ProgressiveRender::pictureMade, result);
 }
 
 void ProgressiveRender::pictureMade(PassResult&) {

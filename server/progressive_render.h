@@ -36,7 +36,8 @@ struct RenderContext {
   RenderPolicy policy;
   Now now;
   Log log;
-  Background& background;
+  Background& background;  ///< for pictures and films
+  Background& builds;      ///< for scenes, which may take much longer
   std::function<void()> wake;
   std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for pictures; null: no limit
 };
@@ -96,8 +97,8 @@ class ProgressiveRender {
 
   bool pickIn(const RenderRequest& request);
   void turn(const RenderRequest& request, const Others& others, PassResult& result);
-  /// Runs `work`, on this thread or in the background, and then `next` on this thread.
-  void perform(bool inBackground, Background::Work work, Next next, PassResult& result);
+  /// Runs `work`, on this thread if `background` is null, and then `next` on this thread.
+  void perform(Background* background, Background::Work work, Next next, PassResult& result);
   void collect(PassResult& result);
   void takeScene(const RenderRequest& request, const Others& others, PassResult& result);
   void sceneTaken(PassResult& result);

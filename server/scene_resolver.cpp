@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "protocol/fields.h"
-#include "protocol/patch.h"
 #include "protocol/problem.h"
 #include "protocol/scene_json.h"
 #include "renderer/core/error.h"
@@ -219,14 +218,22 @@ void checkMacrocell(int size, const Volume& volume, std::size_t mostIntervals) {
       "expected at least " + std::to_string(least) + " for this data set, found " + std::to_string(size));
 }
 
-/// The part of the resolved scene that determines the picture at a given number of samples.
-json pictureOf(json resolved) {
-  resolved.erase("stop");
-  for (json& channel : resolved["channels"]) channel.erase("name");
+/// Removes what makes no difference to the picture.
+protocol::Scene pictureOf(protocol::Scene resolved) {
+  resolved.stop = {};
+  for (protocol::Channel& channel : resolved.channels) channel.name.reset();
   return resolved;
 }
 
 }  // namespace
+
+bool samePicture(const protocol::Scene& a, const protocol::Scene& b) { return pictureOf(a) == pictureOf(b); }
+
+json pictureJson(const protocol::Scene& resolved) {
+  json picture = protocol::toJson(pictureOf(resolved));
+  picture.erase("stop");
+  return picture;
+}
 
 protocol::Lists rendererLists() {
   protocol::Lists lists;
@@ -307,13 +314,13 @@ std::shared_ptr<const Dataset> SceneResolver::datasetOf(const json& scene) const
 
 SceneResolver::Resolved SceneResolver::replaceNow(const json& scene) const {
   const auto count = datasetOf(scene)->volume->channels().size();
-  return resolve(protocol::applyPatch(json::object(), scene, count), {});
+  return resolve(SparseScene().patched(scene, count), {});
 }
 
 SceneResolver::Resolved SceneResolver::patchNow(const ResolvedScene& base, const json& patch) const {
   const bool namesDataset = patch.is_object() && patch.contains("dataset");
-  const auto count = datasetOf(namesDataset ? patch : base.sparse)->volume->channels().size();
-  json sparse = protocol::applyPatch(base.sparse, patch, count);
+  const auto count = datasetOf(namesDataset ? patch : base.sparse.rest())->volume->channels().size();
+  SparseScene sparse = base.sparse.patched(patch, count);
   Chosen chosen = base.chosen;
   if (resetsView(patch)) chosen.framed.reset();
   for (std::size_t i = 0; i < chosen.gradientRanges.size(); ++i)
@@ -330,10 +337,10 @@ SceneResolver::Resolved SceneResolver::patch(const ResolvedScene& base, const js
   return whenMeasured(stop, [&] { return patchNow(base, patch); });
 }
 
-SceneResolver::Resolved SceneResolver::resolve(json sparse, const Chosen& chosen) const {
-  protocol::Scene scene = protocol::parseScene(sparse, lists_);
+SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const Chosen& chosen) const {
+  protocol::Scene scene = sparse.parsed(lists_);
   auto result = std::make_shared<ResolvedScene>();
-  result->dataset = datasetOf(sparse);
+  result->dataset = datasetOf(sparse.rest());
   if (chosen.dataset == result->dataset) result->chosen = chosen;
   result->chosen.dataset = result->dataset;
   const Volume& volume = *result->dataset->volume;
@@ -368,8 +375,7 @@ SceneResolver::Resolved SceneResolver::resolve(json sparse, const Chosen& chosen
     scene.stop.samples = options_.defaultSamples;
   result->stop = {scene.stop.samples.value_or(0), scene.stop.seconds.value_or(0),
                   scene.stop.error.value_or(0)};
-  result->resolved = protocol::toJson(scene);
-  result->picture = pictureOf(result->resolved);
+  result->resolved = std::move(scene);
   result->sparse = std::move(sparse);
   return result;
 }

@@ -17,6 +17,7 @@
 #include "renderer/data/macrocell_grid.h"
 #include "renderer/data/scene.h"
 #include "server/dataset_store.h"
+#include "server/sparse_scene.h"
 #include "server/stop_rule.h"
 #include "server/unmeasured.h"
 
@@ -35,14 +36,18 @@ struct Chosen {
 
 /// A scene in the forms that the server needs. Immutable once made.
 struct ResolvedScene {
-  nlohmann::json sparse;    ///< what the user set
-  nlohmann::json resolved;  ///< with every value filled in; method `auto` remains
-  nlohmann::json picture;   ///< `resolved` without what does not affect the picture
+  SparseScene sparse;        ///< what the user set
+  protocol::Scene resolved;  ///< with every value filled in; method `auto` remains
   Scene render;
   StopRule stop;
   std::shared_ptr<const Dataset> dataset;
   Chosen chosen = {};
 };
+
+/// Whether two resolved scenes give the same picture at a given number of samples.
+bool samePicture(const protocol::Scene& a, const protocol::Scene& b);
+/// The part of the resolved scene that determines that picture.
+nlohmann::json pictureJson(const protocol::Scene& resolved);
 
 /// The names the renderer knows, for validation, schema and capabilities.
 protocol::Lists rendererLists();
@@ -74,7 +79,7 @@ class SceneResolver {
   const protocol::Lists& lists() const { return lists_; }
 
  private:
-  Resolved resolve(nlohmann::json sparse, const Chosen& chosen) const;
+  Resolved resolve(SparseScene sparse, const Chosen& chosen) const;
   void frame(const protocol::Scene& scene, ResolvedScene& result) const;
   void resolveGradientOpacity(protocol::Scene& scene, ResolvedScene& result) const;
   std::array<double, 2> gradientRange(const ResolvedScene& scene, int channel) const;

@@ -66,12 +66,12 @@ Session::SceneState Session::edit(const EditOrigin& origin, const Resolve& resol
   // Whatever takes time is done without the mutex.
   lock.unlock();
   auto next = resolve(*before);
-  const bool pictureChanges = next->picture != before->picture;
+  const bool pictureChanges = !samePicture(next->resolved, before->resolved);
   lock.lock();
   std::optional<std::string> change;  // for other viewers; most sessions have only one
   while (!change && viewers_.size() > viewers_.count(origin.viewer)) {
     lock.unlock();
-    change = protocol::jsonText(protocol::mergePatchBetween(before->resolved, next->resolved));
+    change = protocol::jsonText(protocol::patchBetween(before->resolved, next->resolved));
     lock.lock();
   }
   checkRevision(origin);  // a query for AOVs may have begun one, or the session have ended

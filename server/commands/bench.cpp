@@ -13,6 +13,7 @@
 #include <map>
 #include <memory>
 
+#include "protocol/scene_json.h"
 #include "renderer/core/error.h"
 #include "renderer/data/shared_macrocells.h"
 #include "renderer/io/image_file.h"
@@ -232,7 +233,7 @@ void run(BenchOptions options) {
 
   ordered_json result = bench::report(points, truth, std::size_t(scene.width) * std::size_t(scene.height));
   result["memory"] = memory;
-  result["scene"] = ordered_json::parse(resolved->resolved.dump());
+  result["scene"] = ordered_json::parse(protocol::toJson(resolved->resolved).dump());
   result["picked"] = nameOf(resolved->render.method);
   result["repetitions"] = options.repetitions;
   if (options.json.empty())

@@ -11,6 +11,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "protocol/scene_json.h"
 #include "renderer/core/error.h"
 #include "renderer/io/image_file.h"
 #include "renderer/io/output_file.h"
@@ -108,7 +109,7 @@ void writeStats(const std::filesystem::path& path, const Renderer& renderer, con
                       {"cellSteps", counts.cellSteps},
                       {"randomBlocks", counts.randomBlocks},
                       {"truncatedRays", counts.truncatedRays},
-                      {"scene", scene.resolved}};
+                      {"scene", protocol::toJson(scene.resolved)}};
   io::writeFile(path, stats.dump(2) + '\n');
 }
 

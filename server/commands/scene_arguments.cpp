@@ -69,7 +69,7 @@ std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& 
   auto resolved = resolver.replace(scene);
   for (const json& patch : patches) resolved = resolver.patch(*resolved, patch);
   // Resolved again as one scene, so that the automatic view fits the final curves.
-  return patches.empty() ? resolved : resolver.replace(resolved->sparse);
+  return patches.empty() ? resolved : resolver.replace(resolved->sparse.whole());
 }
 
 void checkOutputs(const std::vector<std::filesystem::path>& outputs, const SceneArguments& arguments) {

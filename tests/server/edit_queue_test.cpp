@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "protocol/problem.h"
+#include "protocol/scene_json.h"
 #include "tests/server/fakes.h"
 
 namespace scolopax::server {
@@ -47,7 +48,7 @@ struct Editor {
     return 200;
   }
   std::uint32_t revision() const { return session->scene().revision; }
-  json resolved() const { return session->scene().scene->resolved; }
+  json resolved() const { return protocol::toJson(session->scene().scene->resolved); }
 };
 
 TEST(EditQueue, AppliesWhatNeedsNoMeasuringAtOnce) {

@@ -240,6 +240,7 @@ struct Workshop {
                 clock.now(),
                 [](const std::string&) {},
                 background,
+                background,
                 [this] { ++renderWakes; }},
                [this](const PassResult& pass) { last = pass; }),
         encode(

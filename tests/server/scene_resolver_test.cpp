@@ -13,6 +13,7 @@ namespace {
 
 using nlohmann::json;
 using protocol::ProtocolError;
+using protocol::toJson;
 
 SceneResolver resolver() { return {testing::smallStore(), {64, 1'000'000}}; }
 
@@ -28,21 +29,22 @@ std::pair<int, std::string> errorOf(const json& scene) {
 
 TEST(SceneResolver, FillsEveryValueOfAnEmptyScene) {
   const auto scene = resolver().replace(json::object());
-  EXPECT_EQ(scene->sparse, json::object());
-  EXPECT_EQ(scene->resolved["dataset"], "small");
-  ASSERT_EQ(scene->resolved["channels"].size(), 2u);
-  for (const json& channel : scene->resolved["channels"]) {
+  EXPECT_EQ(scene->sparse.whole(), json::object());
+  EXPECT_EQ(toJson(scene->resolved)["dataset"], "small");
+  ASSERT_EQ(toJson(scene->resolved)["channels"].size(), 2u);
+  const json channels = toJson(scene->resolved)["channels"];
+  for (const json& channel : channels) {
     EXPECT_TRUE(channel.contains("name"));
     EXPECT_EQ(channel["range"].size(), 2u);
     EXPECT_GT(channel["density"], 0.0);
     EXPECT_TRUE(channel.contains("color"));
   }
-  EXPECT_EQ(scene->resolved["channels"][1]["name"], "green");
-  EXPECT_NE(scene->resolved["channels"][0]["color"], scene->resolved["channels"][1]["color"]);
-  EXPECT_EQ(scene->resolved["camera"]["eye"].size(), 3u);
-  EXPECT_EQ(scene->resolved["integrator"]["method"], "auto");
+  EXPECT_EQ(toJson(scene->resolved)["channels"][1]["name"], "green");
+  EXPECT_NE(toJson(scene->resolved)["channels"][0]["color"], toJson(scene->resolved)["channels"][1]["color"]);
+  EXPECT_EQ(toJson(scene->resolved)["camera"]["eye"].size(), 3u);
+  EXPECT_EQ(toJson(scene->resolved)["integrator"]["method"], "auto");
   EXPECT_EQ(scene->render.method, Method::automatic);
-  EXPECT_EQ(scene->resolved["stop"], (json{{"samples", 64}}));
+  EXPECT_EQ(toJson(scene->resolved)["stop"], (json{{"samples", 64}}));
   EXPECT_EQ(scene->stop.samples, 64u);
 }
 
@@ -50,12 +52,12 @@ TEST(SceneResolver, LeavesStopRulesOutOfWhatDecidesThePicture) {
   const auto plain = resolver().replace(json::object());
   const auto fine = resolver().replace({{"stop", {{"error", 1e-4}}}});
   EXPECT_EQ(fine->stop.error, 1e-4);
-  EXPECT_EQ(fine->picture, plain->picture);
+  EXPECT_TRUE(samePicture(fine->resolved, plain->resolved));
 }
 
 TEST(SceneResolver, ResolvesAResolvedSceneToItself) {
   const auto first = resolver().replace({{"channels", {{{"gamma", 2}}}}, {"camera", {{"orthoHeight", 3}}}});
-  const auto second = resolver().replace(first->resolved);
+  const auto second = resolver().replace(toJson(first->resolved));
   EXPECT_EQ(second->resolved, first->resolved);
 }
 
@@ -147,20 +149,20 @@ TEST(SceneResolver, FillsInWhereClippingIs) {
   const auto plain = resolver.replace(json::object());
   EXPECT_TRUE(plain->render.clip.empty());
   EXPECT_FALSE(plain->render.crop);
-  EXPECT_EQ(resolver.replace(plain->resolved)->render, plain->render);
+  EXPECT_EQ(resolver.replace(toJson(plain->resolved))->render, plain->render);
   const auto& grid = plain->dataset->volume->grid();
-  EXPECT_EQ(plain->resolved["crop"]["x"], json({-0.5, grid.dims.x - 0.5}));
+  EXPECT_EQ(toJson(plain->resolved)["crop"]["x"], json({-0.5, grid.dims.x - 0.5}));
   const auto clipped =
       resolver.replace({{"clip", {json::object(), {{"media", {1}}}}}, {"crop", {{"y", {1, 1.5}}}}});
   const glm::dvec3 centre(grid.worldFromVoxel * glm::dvec4(glm::dvec3(grid.dims - 1) * 0.5, 1));
-  EXPECT_EQ(clipped->resolved["clip"][0]["point"], json({centre.x, centre.y, centre.z}));
+  EXPECT_EQ(toJson(clipped->resolved)["clip"][0]["point"], json({centre.x, centre.y, centre.z}));
   EXPECT_EQ(clipped->render.clip.at(0), (ClipPlane{centre, {0, 0, 1}, {}}));
   EXPECT_EQ(clipped->render.clip.at(1).channels, std::vector<int>{1});
   ASSERT_TRUE(clipped->render.crop);
   EXPECT_EQ(clipped->render.crop->low, glm::dvec3(-0.5, 1, -0.5));
   EXPECT_EQ(clipped->render.crop->regions, Crop::kInnermost);
   // Sent back, the resolved scene is the same scene.
-  EXPECT_EQ(resolver.replace(clipped->resolved)->render, clipped->render);
+  EXPECT_EQ(resolver.replace(toJson(clipped->resolved))->render, clipped->render);
 }
 
 TEST(SceneResolver, RefusesWhatTheRendererWouldRefuseLater) {
@@ -284,7 +286,7 @@ TEST(SceneResolver, LeavesOpacityByTheGradientOutWhereItIsNotAskedFor) {
   const auto scene = resolverOfSquares().replaceNow(json::object());
   for (std::size_t i = 0; i < 2; ++i) {
     EXPECT_FALSE(scene->render.channels[i].gradientOpacity);
-    EXPECT_FALSE(scene->resolved["channels"][i].contains("gradientOpacity"));
+    EXPECT_FALSE(toJson(scene->resolved)["channels"][i].contains("gradientOpacity"));
   }
 }
 
@@ -295,7 +297,7 @@ TEST(SceneResolver, ChoosesTheRangeOfGradientsByWhatHasOpacity) {
   EXPECT_EQ(steepnessOf(gentle).rangeLo, 0);
   EXPECT_DOUBLE_EQ(steepnessOf(gentle).rangeHi, rangeEnd(146, 3));
   EXPECT_EQ(steepnessOf(gentle).factor, (std::vector<OpacityKnot>{{0, 0}, {1, 1}}));
-  EXPECT_EQ(gentle->resolved["channels"][0]["gradientOpacity"],
+  EXPECT_EQ(toJson(gentle->resolved)["channels"][0]["gradientOpacity"],
             (json{{"range", {0, steepnessOf(gentle).rangeHi}}, {"points", {{0, 0}, {1, 1}}}}));
   EXPECT_FALSE(gentle->render.channels[1].gradientOpacity);
   EXPECT_DOUBLE_EQ(steepnessOf(resolve.replace(steepFrom(4, 16))).rangeHi, rangeEnd(255, 2));
@@ -303,10 +305,10 @@ TEST(SceneResolver, ChoosesTheRangeOfGradientsByWhatHasOpacity) {
   EXPECT_DOUBLE_EQ(steepnessOf(resolve.replace(steepFrom(100, 200))).rangeHi, rangeEnd(255, 5));
   json flat = steepFrom(0, 10);
   flat["dataset"] = "flat";
-  EXPECT_EQ(resolve.replace(flat)->resolved["channels"][0]["gradientOpacity"]["range"], json({0, 1}));
+  EXPECT_EQ(toJson(resolve.replace(flat)->resolved)["channels"][0]["gradientOpacity"]["range"], json({0, 1}));
   // Sent back, the resolved scene is the same scene.
-  EXPECT_EQ(resolve.replace(gentle->resolved)->render, gentle->render);
-  EXPECT_EQ(resolve.replace(gentle->resolved)->resolved, gentle->resolved);
+  EXPECT_EQ(resolve.replace(toJson(gentle->resolved))->render, gentle->render);
+  EXPECT_EQ(resolve.replace(toJson(gentle->resolved))->resolved, gentle->resolved);
 }
 
 TEST(SceneResolver, TakesTheRangeAndTheFactorThatAreGiven) {
@@ -314,8 +316,8 @@ TEST(SceneResolver, TakesTheRangeAndTheFactorThatAreGiven) {
   const auto scene =
       resolverOfSquares().replaceNow({{"channels", {json::object(), {{"gradientOpacity", curve}}}}});
   EXPECT_EQ(steepnessOf(scene, 1), (GradientOpacity{3, 0.5, {{0.25, 1}, {0.75, 0}}}));
-  EXPECT_EQ(scene->resolved["channels"][1]["gradientOpacity"], curve);
-  EXPECT_NE(scene->picture, resolverOfSquares().replaceNow(json::object())->picture);
+  EXPECT_EQ(toJson(scene->resolved)["channels"][1]["gradientOpacity"], curve);
+  EXPECT_FALSE(samePicture(scene->resolved, resolverOfSquares().replaceNow(json::object())->resolved));
   EXPECT_EQ(errorOf({{"channels", {{{"gradientOpacity", {{"range", {1}}}}}}}}),
             std::pair(422, std::string("/channels/0/gradientOpacity/range")));
 }
@@ -372,9 +374,56 @@ TEST(SceneResolver, ThrowsUnmeasuredInsteadOfWaitingOnlyWhereItHasToMeasure) {
 TEST(SceneResolver, KnowsWhatLeavesThePictureAsItIs) {
   const auto resolve = resolver();
   const auto base = resolve.replace(json::object());
-  EXPECT_EQ(resolve.patch(*base, {{"stop", {{"samples", 9}}}})->picture, base->picture);
-  EXPECT_EQ(resolve.patch(*base, {{"channels", {{"0", {{"name", "nucleus"}}}}}})->picture, base->picture);
-  EXPECT_NE(resolve.patch(*base, {{"channels", {{"0", {{"gamma", 3}}}}}})->picture, base->picture);
+  const auto looksTheSame = [&](const json& patch) {
+    const auto patched = resolve.patch(*base, patch);
+    EXPECT_EQ(pictureJson(patched->resolved) == pictureJson(base->resolved),
+              samePicture(patched->resolved, base->resolved));
+    return samePicture(patched->resolved, base->resolved);
+  };
+  EXPECT_TRUE(looksTheSame({{"stop", {{"samples", 9}}}}));
+  EXPECT_TRUE(looksTheSame({{"channels", {{"0", {{"name", "nucleus"}}}}}}));
+  EXPECT_FALSE(looksTheSame({{"channels", {{"0", {{"gamma", 3}}}}}}));
+}
+
+TEST(SceneResolver, SharesTheChannelsThatAPatchLeavesAsTheyAre) {
+  const SceneResolver resolve = resolver();
+  const auto base = resolve.replace({{"channels", {{{"gamma", 2}}, {{"gamma", 3}}}}});
+  const auto entry = [](const SceneResolver::Resolved& scene, std::size_t i) {
+    return scene->sparse.channel(i).get();
+  };
+  const auto moved = resolve.patch(*base, {{"camera", {{"fovY", 20}}}});
+  EXPECT_EQ(entry(moved, 0), entry(base, 0));
+  EXPECT_EQ(entry(moved, 1), entry(base, 1));
+  const auto edited = resolve.patch(*moved, {{"channels", {{"1", {{"weight", 2}}}}}});
+  EXPECT_EQ(entry(edited, 0), entry(base, 0));
+  EXPECT_EQ(edited->sparse.whole(), json::parse(R"({"camera": {"fovY": 20},
+      "channels": [{"gamma": 2}, {"gamma": 3, "weight": 2}]})"));
+  EXPECT_EQ(edited->resolved, resolve.replace(edited->sparse.whole())->resolved);
+  const auto fresh = resolve.patch(*edited, {{"channels", nullptr}});
+  EXPECT_EQ(fresh->sparse.whole(), (json{{"camera", {{"fovY", 20}}}}));
+}
+
+TEST(SceneResolver, PatchesAsAWholeSceneIsPatched) {
+  const SceneResolver resolve = resolver();
+  const std::vector<json> patches = {
+      {{"channels", {{"1", {{"opacity", {{0, 0}, {1, 0.5}}}}}}}},
+      {{"channels", {{"0", {{"color", "#ff0000"}}}, {"1", {{"opacity", {{"1", {1, 0.25}}}}}}}}},
+      {{"camera", {{"fovY", 20}}}, {"channels", {{"0", {{"colormap", "fire"}}}}}},
+      {{"channels", {{"1", nullptr}}}},
+      {{"channels", json::array({json::object(), {{"gamma", 2}}})}},
+      {{"channels", json::array({{{"gamma", 3}}})}},
+      {{"channels", {{"1", {{"visible", false}}}}}},
+      {{"channels", json::array()}},
+      {{"channels", nullptr}},
+      {{"stop", {{"samples", 3}}}}};
+  auto scene = resolve.replace(json::object());
+  json whole = json::object();
+  for (const json& patch : patches) {
+    scene = resolve.patch(*scene, patch);
+    whole = protocol::applyPatch(whole, patch, 2);
+    EXPECT_EQ(scene->sparse.whole(), whole) << patch;
+    EXPECT_EQ(scene->resolved, resolve.replace(whole)->resolved) << patch;
+  }
 }
 
 }  // namespace

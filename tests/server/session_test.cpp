@@ -60,7 +60,7 @@ TEST(Session, ReplacesTheWholeScene) {
   Workshop workshop;
   const auto session = workshop.store.create({{"integrator", {{"seed", 5}}}, {"image", {{"width", 32}}}});
   session->replace({{"image", {{"height", 16}}}}, {});
-  EXPECT_EQ(session->scene().scene->sparse, (json{{"image", {{"height", 16}}}}));
+  EXPECT_EQ(session->scene().scene->sparse.whole(), (json{{"image", {{"height", 16}}}}));
   EXPECT_EQ(session->scene().scene->render.seed, 0u);
 }
 

@@ -37,6 +37,7 @@ struct RunningServer {
        now,
        [](const std::string&) {},
        background,
+       background,
        [this] { renderThread.wake(); }},
       [](const PassResult&) {}};
   EncodeLoop encode{store, now, [](const std::string&) {}, background, [this] { encodeThread.wake(); }};
