@@ -33,6 +33,7 @@ bool FilmState::showDue(const RenderRequest& request, const FilmProgress& film, 
   if (samples == 0) return false;
   if (shown.revision != revision || shown.interactive != request.interactive) return true;
   if (request.failures != shownFailures) return true;
+  if (!shown.reduced && samples < shown.samples) return false;
   if (shown.mixed && !request.pollSamples.empty()) return true;
   if (!request.interactive && divisor == 1 && film.finished) return !shown.final;
   if (samples == shown.samples) return false;

@@ -44,7 +44,8 @@ struct FilmState {
   bool firstOfEdit(const RenderRequest& request) const;
   /// Whether that picture takes longer than RenderPolicy::tooLate and can be restarted at a lower resolution.
   bool lateForEdit(const RenderRequest& request, const RenderPolicy& policy) const;
-  /// Whether a frame should be made of the film in its present state.
+  /// Whether a frame should be made of the film in its present state. None is as long as one with more
+  /// samples is shown: the film was dropped meanwhile.
   bool showDue(const RenderRequest& request, const FilmProgress& film, const RenderPolicy& policy,
                TimePoint now) const;
 };

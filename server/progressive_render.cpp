@@ -38,6 +38,7 @@ ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, const Ren
 
 ProgressiveRender::~ProgressiveRender() {
   if (job_) job_->cancel();
+  unpark();
   dropRenderer();
 }
 
@@ -50,6 +51,19 @@ void ProgressiveRender::dropRenderer() {
   if (!renderer_) return;
   context_.background.start([last = std::move(renderer_)](const std::stop_token&) {}, [] {});
   renderer_.reset();
+}
+
+void ProgressiveRender::park() {
+  pick_.forget();
+  context_.parked->park(this, std::move(renderer_));
+  renderer_.reset();
+  parked_ = true;
+}
+
+void ProgressiveRender::unpark() {
+  if (!std::exchange(parked_, false)) return;
+  renderer_ = context_.parked->take(this);
+  if (!renderer_) dropRenderer();
 }
 
 /// Until an edit has been shown, speed still counts more than quality: if its picture is late because others
@@ -76,6 +90,7 @@ bool ProgressiveRender::showDue(const RenderRequest& request) const {
 ProgressiveRender::Work ProgressiveRender::work() const {
   const RenderRequest request = this->request();
   if (pickable(request)) return Work::urgent;
+  if (parked_) return !request.wanted ? Work::none : film_.firstOfEdit(request) ? Work::urgent : Work::still;
   if (job_ && !job_->done()) return Work::none;
   if (job_) return film_.firstOfEdit(request) ? Work::urgent : Work::still;
   if (!request.wanted || !(film_.stale(request) || !finished(request) || showDue(request))) return Work::none;
@@ -100,8 +115,9 @@ double ProgressiveRender::wantedDivisor(const RenderRequest& request, int edited
   const Scene& scene = request.scene->render;
   const auto pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height);
   if (request.interactive) return resolution_.whileEdited(pixels, editedOthers);
-  if (!request.pollSamples.empty()) return 1;
-  const bool reducedShown = film_.shown.revision == request.revision && film_.shown.reduced;
+  const bool shown = film_.shown.revision == request.revision;
+  const bool reducedShown = shown && film_.shown.reduced;
+  if (!request.pollSamples.empty() || (shown && !reducedShown)) return 1;
   return resolution_.atRest(pixels, reducedShown ? std::optional(film_.divisor) : std::nullopt);
 }
 
@@ -140,8 +156,9 @@ void ProgressiveRender::collect(PassResult& result) {
 }
 
 void ProgressiveRender::supervise() {
-  if (!job_ || job_->done()) return;
   const RenderRequest request = this->request();
+  if (!job_ && renderer_ && !request.wanted) park();
+  if (!job_ || job_->done()) return;
   const bool useless =
       taking_ ? taking_->uselessFor(request)
       : part_ ? film_.stale(request) && !film_.keepsPass(request, context_.policy, context_.now())
@@ -305,6 +322,7 @@ bool ProgressiveRender::pickIn(const RenderRequest& request) {
 }
 
 void ProgressiveRender::turn(const RenderRequest& request, const Others& others, PassResult& result) {
+  if (request.wanted) unpark();
   if (pickIn(request)) return;
   if (job_ && !job_->done()) return;
   const bool collected = job_ != nullptr;

@@ -11,6 +11,7 @@
 #include "renderer/renderer.h"
 #include "server/background.h"
 #include "server/film_state.h"
+#include "server/parked_renderers.h"
 #include "server/resolution.h"
 #include "server/session.h"
 
@@ -40,6 +41,7 @@ struct RenderContext {
   Background& builds;      ///< for scenes, which may take much longer
   std::function<void()> wake;
   std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for pictures; null: no limit
+  std::shared_ptr<ParkedRenderers> parked = std::make_shared<ParkedRenderers>();
 };
 
 struct SceneTaking;
@@ -75,7 +77,8 @@ class ProgressiveRender {
   bool edited() const;
   /// When there may be work again even if nothing wakes the loop.
   std::optional<TimePoint> dueAt() const;
-  /// Cancels the background job once its result is no longer wanted.
+  /// Cancels the background job once its result is no longer wanted, and parks the renderer while nobody
+  /// watches.
   void supervise();
   /// One turn: a slice of a pick, or at most one sample pass with the rebuild before it and the submission
   /// after it. Steps that take long run in the background and are completed in a later turn. Never throws:
@@ -94,6 +97,8 @@ class ProgressiveRender {
   bool largeFilm() const;
   void fail(const RenderRequest& request, const Error& error);
   void dropRenderer();
+  void park();
+  void unpark();
 
   bool pickIn(const RenderRequest& request);
   void turn(const RenderRequest& request, const Others& others, PassResult& result);
@@ -124,6 +129,7 @@ class ProgressiveRender {
 
   std::shared_ptr<const Volume> volume_;
   std::shared_ptr<Renderer> renderer_;
+  bool parked_ = false;  ///< the renderer is in RenderContext::parked, unless it has been dropped
   FilmState film_;
   ResolutionPolicy resolution_;
   TimePoint slowUntil_{};   ///< until then, passes are rendered in the background

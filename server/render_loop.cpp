@@ -18,6 +18,15 @@ void keepEarlier(std::optional<TimePoint>& a, const std::optional<TimePoint>& b)
 
 }  // namespace
 
+RenderLoop::RenderLoop(SessionStore& store, RenderContext context, OnPass onPass)
+    : store_(store), context_(std::move(context)), onPass_(std::move(onPass)) {
+  if (!context_.memory) return;
+  context_.memory->setRelease([kept = std::weak_ptr(context_.parked)] {
+    const auto parked = kept.lock();
+    return parked && parked->dropOldest();
+  });
+}
+
 void RenderLoop::followStore() {
   const auto sessions = store_.all();
   const auto known = [&](const std::shared_ptr<Session>& session) {

@@ -19,8 +19,8 @@ namespace scolopax::server {
 class RenderLoop {
  public:
   using OnPass = std::function<void(const PassResult&)>;
-  RenderLoop(SessionStore& store, RenderContext context, OnPass onPass)
-      : store_(store), context_(std::move(context)), onPass_(std::move(onPass)) {}
+  /// When the context's budget lacks memory, renderers of sessions that nobody watches are dropped.
+  RenderLoop(SessionStore& store, RenderContext context, OnPass onPass);
   /// Runs one turn of the next session that has work. First pictures after edits take precedence; between two
   /// of them, a session at rest gets a short turn, so that no session starves.
   std::optional<TimePoint> step();

@@ -51,17 +51,32 @@ std::uint64_t MemoryBudget::used(MemoryUse use) const {
   return used_[std::size_t(use)];
 }
 
-void MemoryBudget::change(MemoryUse use, std::uint64_t from, std::uint64_t to) {
+void MemoryBudget::setRelease(std::function<bool()> release) {
   const std::lock_guard lock(mutex_);
-  const std::uint64_t most = to <= kOrdinaryBytes ? limit_ : limit_ / 4 * 3;
-  const std::uint64_t others = total() - from;
-  if (to > from && (to > most || others > most - to))
-    throw Error(to > most ? ErrorCode::tooLarge : ErrorCode::busy,
-                "memory for " + std::string(kMemoryUses[std::size_t(use)]) + ": expected at most " +
-                    mebibytes(most) + (others > 0 ? ", of which " + mebibytes(others) + " are in use" : "") +
-                    ", found " + mebibytes(to));
-  used_[std::size_t(use)] += to;
-  used_[std::size_t(use)] -= from;
+  release_ = std::move(release);
+}
+
+void MemoryBudget::change(MemoryUse use, std::uint64_t from, std::uint64_t to) {
+  for (;;) {
+    std::function<bool()> release;
+    std::string refusal;
+    {
+      const std::lock_guard lock(mutex_);
+      const std::uint64_t most = to <= kOrdinaryBytes ? limit_ : limit_ / 4 * 3;
+      const std::uint64_t others = total() - from;
+      if (to <= from || (to <= most && others <= most - to)) {
+        used_[std::size_t(use)] += to;
+        used_[std::size_t(use)] -= from;
+        return;
+      }
+      refusal = "memory for " + std::string(kMemoryUses[std::size_t(use)]) + ": expected at most " +
+                mebibytes(most) + (others > 0 ? ", of which " + mebibytes(others) + " are in use" : "") +
+                ", found " + mebibytes(to);
+      if (to > most) throw Error(ErrorCode::tooLarge, refusal);
+      release = release_;
+    }
+    if (!release || !release()) throw Error(ErrorCode::busy, refusal);
+  }
 }
 
 }  // namespace scolopax

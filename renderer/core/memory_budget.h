@@ -4,6 +4,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string_view>
@@ -50,6 +51,10 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
   static std::shared_ptr<Share> takeShared(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use,
                                            std::uint64_t bytes);
 
+  /// Before a request is refused because others hold the memory, `release` is called, on any thread and with
+  /// no lock held; if it returns true, it has released some, and the request is tried again.
+  void setRelease(std::function<bool()> release);
+
   std::uint64_t limit() const { return limit_; }
   std::uint64_t used(MemoryUse use) const;
 
@@ -59,6 +64,7 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
 
   const std::uint64_t limit_;
   mutable std::mutex mutex_;
+  std::function<bool()> release_;
   std::array<std::uint64_t, std::size(kMemoryUses)> used_{};
 };
 

@@ -44,7 +44,8 @@ struct FakeControl {
   bool takesLong = false;                         ///< what takesLong() returns, for every scene
   bool choosingTakesLong = false;                 ///< the same, for scenes with the automatic method
   std::function<void(std::stop_token)> building;  ///< called in setScene
-  std::shared_ptr<MemoryBudget> memory;           ///< from which films take a byte per pixel
+  std::shared_ptr<MemoryBudget> memory;           ///< from which films take memory
+  std::uint64_t filmPixelBytes = 1;               ///< how much per pixel
   std::uint32_t longErrorFrom =
       ~0u;  ///< from this many samples on the error takes long, until it is measured
   std::function<void(std::stop_token)> measuring;  ///< called during that measurement
@@ -102,7 +103,7 @@ class FakeRenderer : public Renderer {
     if (control_->building) control_->building(stop);
     if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "stopped");
     if (!control_->failure.empty()) throw Error(ErrorCode::badInput, control_->failure);
-    film_.resize(std::uint64_t(scene.width) * std::uint64_t(scene.height));
+    film_.resize(std::uint64_t(scene.width) * std::uint64_t(scene.height) * control_->filmPixelBytes);
     RebuildStats stats;
     stats.filmReset = samples_ == 0 || scene.seed != scene_.seed || scene.width != scene_.width ||
                       scene.height != scene_.height;
@@ -229,7 +230,7 @@ struct Workshop {
   RenderLoop render;
   EncodeLoop encode;
 
-  explicit Workshop(SessionStore::Options options = {})
+  explicit Workshop(SessionStore::Options options = {}, const std::shared_ptr<MemoryBudget>& memory = nullptr)
       : store(resolver, options, hooks),
         render(store,
                {[this](const std::shared_ptr<const Volume>&) {
@@ -241,11 +242,13 @@ struct Workshop {
                 [](const std::string&) {},
                 background,
                 background,
-                [this] { ++renderWakes; }},
+                [this] { ++renderWakes; },
+                memory},
                [this](const PassResult& pass) { last = pass; }),
         encode(
             store, clock.now(), [](const std::string&) {}, background, [this] { ++encoderWakes; }) {
     control->clock = &clock;
+    control->memory = memory;
   }
 
   /// A render step and an encoder step.

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/server/fakes.h"
 
 namespace scolopax::server {
@@ -37,6 +39,66 @@ TEST(RenderLoop, RefusesAFilmThatTheMemoryForAllSessionsDoesNotHoldUntilItIsAske
   workshop.clock.advance(std::chrono::seconds(1));
   workshop.steps(20);
   EXPECT_FALSE(viewers[4]->frames.empty());
+}
+
+TEST(RenderLoop, DropsTheFilmThatNobodyHasWatchedForTheLongestTimeWhenMemoryIsShort) {
+  Workshop workshop({}, std::make_shared<MemoryBudget>(11'000'000));  // three films and the pictures
+  workshop.control->filmPixelBytes = 1000;
+  struct Watched {
+    std::shared_ptr<Session> session;
+    std::shared_ptr<FakeViewer> viewer = std::make_shared<FakeViewer>();
+    ViewerId id = 0;
+  };
+  std::vector<Watched> all(4);
+  const auto watch = [&](std::size_t i) {
+    Watched& one = all[i];
+    one.id = one.session->addViewer(one.viewer);
+    workshop.steps(3);
+    EXPECT_TRUE(one.viewer->failures.empty()) << i;
+  };
+  const auto leave = [&](std::size_t i) {
+    all[i].session->removeViewer(all[i].id);
+    workshop.steps(3);
+  };
+  for (Watched& one : all)
+    one.session =
+        workshop.store.create({{"image", {{"width", 64}, {"height", 48}}}, {"stop", {{"samples", 2}}}});
+  for (const std::size_t i : {0, 1, 2}) watch(i);
+  leave(1);
+  leave(0);
+  EXPECT_EQ(workshop.control->renderersMade, 3);
+  watch(3);  // instead of 1
+  watch(0);  // still there
+  EXPECT_EQ(workshop.control->renderersMade, 4);
+  leave(2);
+  watch(1);  // instead of 2
+  EXPECT_EQ(workshop.control->renderersMade, 5);
+  for (const Watched& one : all) {
+    // Nothing worse is shown than what was.
+    std::vector<std::uint32_t> samples;
+    for (const auto& frame : one.viewer->frames) samples.push_back(frame.info.samples);
+    EXPECT_TRUE(std::is_sorted(samples.begin(), samples.end()));
+    EXPECT_TRUE(one.viewer->frames.back().info.final);
+  }
+  // An edit shows that the film is there again.
+  all[1].session->patch(seedPatch(7), {});
+  workshop.steps(3);
+  EXPECT_EQ(all[1].viewer->frames.back().red, 7);
+}
+
+TEST(RenderLoop, GivesThePictureOfARequestTheMemoryOfAFilmThatNobodyWatches) {
+  const auto memory = std::make_shared<MemoryBudget>(3'500'000);
+  Workshop workshop({}, memory);
+  workshop.control->filmPixelBytes = 1000;
+  const auto session = workshop.store.create({{"image", {{"width", 64}, {"height", 48}}}});
+  const ViewerId id = session->addViewer(std::make_shared<FakeViewer>());
+  workshop.render.step();
+  EXPECT_EQ(memory->used(MemoryUse::films), 64 * 48 * 1000u);
+  EXPECT_THROW(MemoryBudget::take(memory, MemoryUse::encodings, 1'000'000), Error);
+  session->removeViewer(id);
+  workshop.render.step();
+  EXPECT_NO_THROW(MemoryBudget::take(memory, MemoryUse::encodings, 1'000'000));
+  EXPECT_EQ(memory->used(MemoryUse::films), 0u);
 }
 
 TEST(RenderLoop, TriesAgainAfterASecondWhatOthersMemoryKeptItFrom) {

@@ -56,6 +56,26 @@ TEST(MemoryBudget, RefusesWithTheNumbersWhatIsTooLargeAndWhatOthersHold) {
   EXPECT_EQ(refusal(budget, 40).first, ErrorCode::io);
 }
 
+TEST(MemoryBudget, HasMemoryReleasedBeforeItRefuses) {
+  const auto budget = budgetOf(100);
+  std::vector<MemoryBudget::Share> spare;
+  for (int i = 0; i < 3; ++i) spare.push_back(MemoryBudget::take(budget, MemoryUse::films, 30 * kMiB));
+  int asked = 0;
+  budget->setRelease([&] {
+    ++asked;
+    if (spare.empty()) return false;
+    spare.pop_back();
+    return true;
+  });
+  EXPECT_EQ(refusal(budget, 101).first, ErrorCode::tooLarge);  // releasing would not help
+  EXPECT_EQ(asked, 0);
+  const auto held = MemoryBudget::take(budget, MemoryUse::grids, 60 * kMiB);
+  EXPECT_EQ(asked, 2);
+  EXPECT_EQ(refusal(budget, 50).first, ErrorCode::busy);
+  EXPECT_EQ(asked, 4);
+  EXPECT_TRUE(spare.empty());
+}
+
 TEST(MemoryBudget, StaysAsItWasWhenAShareCannotGrow) {
   const auto budget = budgetOf(100);
   auto share = MemoryBudget::take(budget, MemoryUse::films, 60 * kMiB);
