@@ -58,8 +58,8 @@ net::Handler guarded(const ApiContext& context, const net::Handler& handler) {
     try {
       net::Response response = handler(request);
       // Whatever changes something is answered: its client would take a refusal to mean that nothing changed.
-      const bool changes = request.method != "GET" && request.method != "HEAD";
-      return changes ? std::move(response) : charged(context.memory, std::move(response));
+      const bool reads = request.method == "GET" || request.method == "HEAD";
+      return charged(context.memory, std::move(response), reads);
     } catch (const ProtocolError& error) {
       return errorResponse(error);
     } catch (const Error& error) {
@@ -112,10 +112,13 @@ net::Response jsonResponse(int status, const json& body) {
   return {status, "application/json", protocol::jsonText(body), {}};
 }
 
-net::Response charged(const std::shared_ptr<MemoryBudget>& memory, net::Response response) {
+net::Response charged(const std::shared_ptr<MemoryBudget>& memory, net::Response response, bool refusable) {
   constexpr std::size_t kFreeBytes = 64 << 10;
-  if (!response.keep && response.body.size() > kFreeBytes)
-    response.keep = MemoryBudget::takeShared(memory, MemoryUse::answers, response.body.size());
+  const std::size_t bytes = response.body.size();
+  if (!response.keep && bytes > kFreeBytes)
+    response.keep = std::make_shared<MemoryBudget::Share>(
+        refusable ? MemoryBudget::take(memory, MemoryUse::answers, bytes)
+                  : MemoryBudget::charge(memory, MemoryUse::answers, bytes));
   return response;
 }
 

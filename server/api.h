@@ -79,8 +79,8 @@ void addApi(net::Server& server, ApiContext& context);
 int statusOf(ErrorCode code);
 net::Response jsonResponse(int status, const nlohmann::json& body);
 /// The answer, which is charged to the budget until it has been sent if it is long and not charged yet.
-/// Throws Error(busy) or Error(tooLarge) if there is no memory for it.
-net::Response charged(const std::shared_ptr<MemoryBudget>& memory, net::Response response);
+/// Throws Error(busy) or Error(tooLarge) if there is no memory for it and it is `refusable`.
+net::Response charged(const std::shared_ptr<MemoryBudget>& memory, net::Response response, bool refusable);
 net::Response errorResponse(const protocol::ProtocolError& error);
 /// The body as JSON. Throws ProtocolError: 415 unless Content-Type is application/json or `alsoType`, and
 /// what parseJson throws.

@@ -126,8 +126,12 @@ struct Application::Impl {
         memory(std::move(budget)),
         datasets(std::make_shared<const DatasetStore>(std::move(loaded), memory)),
         sessionResolver(std::make_shared<const SceneResolver>(
-            datasets, SceneResolver::Options{config.sessionSamples, config.maxPixels})),
-        renderResolver(datasets, {config.renderSamples, config.maxPixels}),
+            datasets,
+            SceneResolver::Options{
+                .defaultSamples = config.sessionSamples, .maxPixels = config.maxPixels, .memory = memory})),
+        renderResolver(
+            datasets,
+            {.defaultSamples = config.renderSamples, .maxPixels = config.maxPixels, .memory = memory}),
         sessions(sessionResolver, {config.maxSessions, config.keepSession},
                  {now, [this] { renderThread.wake(); }, [this] { encodeThread.wake(); },
                   [this] { renderLoop.interrupt(); }}),

@@ -53,7 +53,9 @@ std::shared_ptr<Background::Job> BackgroundThreads::start(Work work, std::functi
     const std::lock_guard lock(mutex_);
     if (idle_ <= waiting_.size() && threads_.size() < mostAtOnce_) startThread();
     if (!threads_.empty()) {
-      Entry& entry = waiting_.emplace_back(Entry{job, std::move(ended)});
+      Entry& entry = waiting_.emplace_back();
+      entry.job = job;
+      entry.ended = std::move(ended);
       entry.onCancel.emplace(job->cancelled(), [this, &which = *job] { leave(which); });
       came_.notify_one();
       return job;

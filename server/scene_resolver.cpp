@@ -120,6 +120,10 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
   }
 }
 
+/// Scenes whose curves take no more are not charged, so that ordinary edits need no memory that others may
+/// hold.
+constexpr std::uint64_t kFreeBytes = 64 << 10;
+
 /// Share of the voxels with opacity whose gradients the automatic range includes.
 constexpr double kWithinRange = 0.995;
 
@@ -216,6 +220,21 @@ void checkMacrocell(int size, const Volume& volume, std::size_t mostIntervals) {
   throw ProtocolError(
       422, "/integrator/macrocell",
       "expected at least " + std::to_string(least) + " for this data set, found " + std::to_string(size));
+}
+
+/// Memory, in bytes, that the curves of a scene take in all forms of a ResolvedScene.
+std::uint64_t curveBytes(const protocol::Scene& scene) {
+  // In JSON, a control point is a list of its own, in three allocations; a colour is another.
+  constexpr std::uint64_t kPoint = 96 + sizeof(protocol::ControlPoint) + sizeof(OpacityKnot),
+                          kColorPoint = 96 + 48 + sizeof(protocol::ColorPoint) + sizeof(ColorKnot);
+  std::uint64_t points = 0, colors = 0;
+  for (const protocol::Channel& channel : scene.channels) {
+    points += channel.opacity.size();
+    if (channel.gradientOpacity) points += channel.gradientOpacity->points.size();
+    const auto* colormap = channel.colormap ? std::get_if<1>(&*channel.colormap) : nullptr;
+    if (colormap) colors += colormap->size();
+  }
+  return points * kPoint + colors * kColorPoint;
 }
 
 /// Removes what makes no difference to the picture.
@@ -340,6 +359,8 @@ SceneResolver::Resolved SceneResolver::patch(const ResolvedScene& base, const js
 SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const Chosen& chosen) const {
   protocol::Scene scene = sparse.parsed(lists_);
   auto result = std::make_shared<ResolvedScene>();
+  if (const std::uint64_t bytes = curveBytes(scene); bytes > kFreeBytes)
+    result->memory = MemoryBudget::take(options_.memory, MemoryUse::scenes, bytes);
   result->dataset = datasetOf(sparse.rest());
   if (chosen.dataset == result->dataset) result->chosen = chosen;
   result->chosen.dataset = result->dataset;

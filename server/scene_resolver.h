@@ -14,6 +14,7 @@
 
 #include "protocol/lists.h"
 #include "protocol/scene.h"
+#include "renderer/core/memory_budget.h"
 #include "renderer/data/macrocell_grid.h"
 #include "renderer/data/scene.h"
 #include "server/dataset_store.h"
@@ -42,6 +43,7 @@ struct ResolvedScene {
   StopRule stop;
   std::shared_ptr<const Dataset> dataset;
   Chosen chosen = {};
+  MemoryBudget::Share memory = {};
 };
 
 /// Whether two resolved scenes give the same picture at a given number of samples.
@@ -58,6 +60,7 @@ class SceneResolver {
     std::uint32_t defaultSamples = 64;     ///< if the scene has no stop rule
     std::uint64_t maxPixels = 16'777'216;  ///< width x height
     std::size_t maxIntervals = 1 << 25;    ///< macrocells x channels, for macrocells below the default size
+    std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for scenes with long curves; null: no limit
   };
   SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options);
   virtual ~SceneResolver() = default;

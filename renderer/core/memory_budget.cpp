@@ -37,6 +37,17 @@ MemoryBudget::Share MemoryBudget::take(const std::shared_ptr<MemoryBudget>& budg
   return share;
 }
 
+MemoryBudget::Share MemoryBudget::charge(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use,
+                                         std::uint64_t bytes) {
+  Share share(budget, use);
+  if (budget) {
+    const std::lock_guard lock(budget->mutex_);
+    budget->used_[std::size_t(use)] += bytes;
+  }
+  share.bytes_ = bytes;
+  return share;
+}
+
 std::shared_ptr<MemoryBudget::Share> MemoryBudget::takeShared(const std::shared_ptr<MemoryBudget>& budget,
                                                               MemoryUse use, std::uint64_t bytes) {
   return std::make_shared<Share>(take(budget, use, bytes));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A limit on the memory that requests make a server allocate: films, pictures, encodings, macrocells, long
-// answers. Large allocations are charged here first; a refusal states the limit.
+// answers, scenes with long curves. Large allocations are charged here first; a refusal states the limit.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -13,8 +13,9 @@
 namespace scolopax {
 
 /// What memory is used for.
-enum class MemoryUse { films, grids, pictures, encodings, answers };
-inline constexpr std::string_view kMemoryUses[] = {"films", "grids", "pictures", "encodings", "answers"};
+enum class MemoryUse { films, grids, pictures, encodings, answers, scenes };
+inline constexpr std::string_view kMemoryUses[] = {"films",     "grids",   "pictures",
+                                                   "encodings", "answers", "scenes"};
 
 /// Every function may be called from any thread. Shares keep the budget alive.
 class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
@@ -47,7 +48,9 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
   };
   /// Throws like Share::resize. A null `budget` grants every request.
   static Share take(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use, std::uint64_t bytes = 0);
-  /// The same, for memory with several owners.
+  /// Charges what is held in any case, even beyond the limit.
+  static Share charge(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use, std::uint64_t bytes);
+  /// Like take(), for memory with several owners.
   static std::shared_ptr<Share> takeShared(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use,
                                            std::uint64_t bytes);
 

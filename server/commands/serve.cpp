@@ -164,8 +164,8 @@ CLI::App* addServeCommand(CLI::App& root) {
   limit("max-clients", config.maxClients, "Streams at once")->check(CLI::PositiveNumber);
   limit("max-image", config.maxPixels, "Pixels of one picture")->check(CLI::PositiveNumber);
   limit("max-memory", options->maxMemoryMebibytes,
-        "MiB of memory for films, pictures, encodings, macrocells, gradient histograms and long answers, "
-        "without the volumes; a quarter of the machine's by default")
+        "MiB of memory for films, pictures, encodings, macrocells, gradient histograms, scenes with long "
+        "curves and long answers, without the volumes; a quarter of the machine's by default")
       ->check(CLI::Range(std::uint64_t(64), std::uint64_t(1) << 32));
   limit("max-render-seconds", config.maxRenderSeconds, "Seconds of one POST /render")
       ->check(CLI::PositiveNumber);

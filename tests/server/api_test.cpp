@@ -30,15 +30,18 @@ std::string headerOf(const net::Response& response, std::string_view name) {
 TEST(Api, ChargesLongAnswersUntilTheyHaveBeenSent) {
   const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(1) << 20);
   const auto answer = [](std::size_t bytes) { return net::Response{200, "", std::string(bytes, 'x'), {}}; };
-  EXPECT_EQ(charged(memory, answer(1000)).keep, nullptr);
+  EXPECT_EQ(charged(memory, answer(1000), true).keep, nullptr);
   {
-    const net::Response first = charged(memory, answer(600 << 10));
+    const net::Response first = charged(memory, answer(600 << 10), true);
     EXPECT_EQ(memory->used(MemoryUse::answers), 600u << 10);
-    EXPECT_THROW(charged(memory, answer(600 << 10)), Error);
+    EXPECT_THROW(charged(memory, answer(600 << 10), true), Error);
     // What has been charged already is not charged again.
     net::Response encoded = answer(600 << 10);
     encoded.keep = first.keep;
-    EXPECT_EQ(charged(memory, std::move(encoded)).keep, first.keep);
+    EXPECT_EQ(charged(memory, std::move(encoded), true).keep, first.keep);
+    // Answers to edits are given in any case.
+    const net::Response edited = charged(memory, answer(600 << 10), false);
+    EXPECT_EQ(memory->used(MemoryUse::answers), 1200u << 10);
   }
   EXPECT_EQ(memory->used(MemoryUse::answers), 0u);
 }

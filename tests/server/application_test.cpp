@@ -125,13 +125,15 @@ TEST_F(ApplicationTest, LetsNoSessionsPollsKeepOthersOut) {
 }
 
 TEST_F(ApplicationTest, ChargesTheAnswersToHeadAsThoseToGet) {
-  memory_ = std::make_shared<MemoryBudget>(256 << 10);
+  memory_ = std::make_shared<MemoryBudget>(16 << 20);
   start();
   json points = json::array();
   for (int i = 0; i < 4096; ++i) points.push_back({i / 4096.0, 0.123456789});
   const std::string session = newSession(
       json{{"scene", {{"channels", {{"0", {{"opacity", points}}}, {"1", {{"opacity", points}}}}}}}}.dump());
-  const auto full = MemoryBudget::takeShared(memory_, MemoryUse::answers, 128 << 10);
+  std::uint64_t used = 64 << 10;
+  for (std::size_t use = 0; use < std::size(kMemoryUses); ++use) used += memory_->used(MemoryUse(use));
+  const auto full = MemoryBudget::takeShared(memory_, MemoryUse::answers, memory_->limit() - used);
   EXPECT_EQ(call("GET " + session + "/scene").status, 503);
   EXPECT_EQ(call("HEAD " + session + "/scene").status, 503);
 }

@@ -5,7 +5,9 @@
 
 #include <glm/geometric.hpp>
 
+#include "protocol/patch.h"
 #include "protocol/problem.h"
+#include "protocol/scene_json.h"
 #include "tests/server/fakes.h"
 
 namespace scolopax::server {
@@ -424,6 +426,38 @@ TEST(SceneResolver, PatchesAsAWholeSceneIsPatched) {
     EXPECT_EQ(scene->sparse.whole(), whole) << patch;
     EXPECT_EQ(scene->resolved, resolve.replace(whole)->resolved) << patch;
   }
+}
+
+/// Curves of `count` control points in the first channel.
+json longCurves(int count) {
+  json opacity = json::array(), colors = json::array();
+  for (int i = 0; i < count; ++i) {
+    opacity.push_back({double(i) / count, 0.5});
+    colors.push_back(json::array({double(i) / count, "#102030"}));
+  }
+  return {{"channels", {{{"opacity", opacity}, {"colormap", colors}}}}};
+}
+
+TEST(SceneResolver, ChargesScenesWithLongCurvesToTheMemoryOfRequests) {
+  const auto memory = std::make_shared<MemoryBudget>(2 << 20);
+  const SceneResolver resolve(testing::smallStore(), {.memory = memory});
+  {
+    const auto ordinary = resolve.replace(longCurves(100));
+    EXPECT_EQ(memory->used(MemoryUse::scenes), 0u);
+    const auto one = resolve.replace(longCurves(4096));
+    EXPECT_EQ(memory->used(MemoryUse::scenes), 4096u * (128 + 216));
+    try {
+      resolve.patch(*one, {{"camera", {{"fovY", 20}}}});
+      FAIL() << "no error";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::busy);
+      EXPECT_STREQ(error.what(),
+                   "memory for scenes: expected at most 2 MiB, of which 2 MiB are in use, found 2 MiB");
+    }
+    EXPECT_NO_THROW(resolve.patch(*one, {{"channels", nullptr}}));
+    EXPECT_NO_THROW(resolve.patch(*ordinary, {{"camera", {{"fovY", 20}}}}));
+  }
+  EXPECT_EQ(memory->used(MemoryUse::scenes), 0u);
 }
 
 }  // namespace
