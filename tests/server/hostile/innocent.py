@@ -20,6 +20,12 @@ FULL = bool(os.environ.get("SCOLOPAX_HOSTILE_FULL"))
 SECONDS = 10 if FULL else 3
 ORBITALS = 256 if FULL else 128
 PERIOD = 0.05  # between two edits
+# An edit is late if it takes three times as long as the slowest twentieth without an attack, but no less than this: on
+# a busy machine the system itself delays a few.
+LATE = 0.09
+LATE_SHARE = 0.2
+# MiB that sockets, stacks and the allocator may add to what an attack may take.
+SLACK = 100
 
 
 class Innocent:
@@ -116,9 +122,28 @@ class HostileTest(unittest.TestCase):
     def descriptors(self):
         return len(os.listdir(f"/proc/{self.server.process.pid}/fd"))
 
-    def under(self, attack, seconds=SECONDS):
+    def assert_descriptors_at_most(self, bound):
+        """Waits for connections that the server is still closing."""
+        for _ in range(200):
+            if self.descriptors() <= bound:
+                return
+            time.sleep(0.05)
+        self.fail(f"{self.descriptors()} descriptors, expected at most {bound}")
+
+    def under(self, attack, memory, seconds=SECONDS):
         """Calls attack(over) while Innocent works. Asserts that it got at least a tenth of the frames that it gets
-        without an attack; a server that stalls sends one or none. Prints how late they were."""
+        without an attack (a server that stalls sends one or none) and, with the full attacks, that few were late; that
+        the server took at most `memory` MiB (and SLACK) more; and that it closed all descriptors."""
+        descriptors, before = self.descriptors(), self.memory()
+        with open(f"/proc/{self.server.process.pid}/clear_refs", "w", encoding="utf-8") as file:
+            file.write("5")  # VmHWM begins anew
+        self.latencies_under(attack, seconds)
+        print(f"memory: {before:.0f} MiB before, {self.memory():.0f} MiB after, at most {self.memory('VmHWM'):.0f} MiB",
+              flush=True)
+        self.assert_memory_below(self.memory("VmHWM"), before + memory + SLACK)
+        self.assert_descriptors_at_most(descriptors + 4)
+
+    def latencies_under(self, attack, seconds):
         with Innocent(self.server) as viewer:
             before = viewer.watch(max(2, seconds / 3))
             over = threading.Event()
@@ -136,13 +161,17 @@ class HostileTest(unittest.TestCase):
             over.set()
             thread.join(120)
             rate = len(before) / max(2, seconds / 3)
+            bar = max(LATE, 3 * percentile(before, .95))
+            late = sum(latency > bar for latency in during)
             print(f"\n{self.id().split('.')[-1]}: undisturbed {rate:.1f} frames/s, median {percentile(before, .5) * 1e3:.0f} "
                   f"ms, p95 {percentile(before, .95) * 1e3:.0f} ms; attacked {len(during) / seconds:.1f} frames/s, median "
                   f"{percentile(during, .5) * 1e3:.0f} ms, p95 {percentile(during, .95) * 1e3:.0f} ms, longest "
-                  f"{max(during, default=float('inf')) * 1e3:.0f} ms", flush=True)
+                  f"{max(during, default=float('inf')) * 1e3:.0f} ms; {late} of {len(during)} later than {bar * 1e3:.0f} ms", flush=True)
             self.assertEqual(failures, [])
             self.assertIsNone(viewer.process.poll())
             self.assertGreaterEqual(len(during), rate * seconds / 10)
+            if FULL and not SANITIZED:
+                self.assertLessEqual(late, LATE_SHARE * len(during))
 
 
 if __name__ == "__main__":

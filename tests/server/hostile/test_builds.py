@@ -17,6 +17,9 @@ from innocent import HostileTest, Viewer  # noqa: E402
 LARGE = {"dataset": "orbitals", "image": {"width": 64, "height": 64}}
 
 
+GRIDS = 1000  # MiB that the macrocells of all scenes of these tests take
+
+
 class Builds(HostileTest):
     def toggle(self, over, patches):
         """A viewer of the large volume that edits ten times a second without waiting."""
@@ -46,15 +49,15 @@ class Builds(HostileTest):
                 session = self.session(**LARGE, integrator={"macrocell": next(sizes)})
                 self.server.call("GET", f"/api/v1/sessions/{session['id']}/frame?timeout=20")
                 self.server.call("DELETE", f"/api/v1/sessions/{session['id']}")
-        self.under(attack)
+        self.under(attack, GRIDS)
         self.assertGreater(self.metric("scolopax_builds_total"), built)
 
     def test_toggling_the_macrocells_stalls_nobody(self):
-        self.under(lambda over: self.toggle(over, [{"integrator": {"macrocell": size}} for size in (2, 3)]))
+        self.under(lambda over: self.toggle(over, [{"integrator": {"macrocell": size}} for size in (2, 3)]), GRIDS)
 
     def test_toggling_the_data_set_stalls_nobody(self):
         small = self.server.json("GET", "/api/v1/datasets")[1]["datasets"][0]["id"]
-        self.under(lambda over: self.toggle(over, [{"dataset": small}, {"dataset": "orbitals"}]))
+        self.under(lambda over: self.toggle(over, [{"dataset": small}, {"dataset": "orbitals"}]), GRIDS)
 
     def test_macrocells_that_only_cost_are_refused(self):
         allowed = [size for size in (1, 2, 3, 4) if (-(-(self.orbitals - 1) // size)) ** 3 * 8 <= 1 << 25]
@@ -71,13 +74,13 @@ class Builds(HostileTest):
         body = json.dumps({**LARGE, "integrator": {"macrocell": 2}, "stop": {"samples": 1}}).encode()
         head = (f"POST /api/v1/render HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {self.server.token}\r\n"
                 f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n").encode()
-        begin, refused = time.monotonic(), 0
+        descriptors, begin, refused = self.descriptors(), time.monotonic(), 0
         for _ in range(10):
             clients = [socket.create_connection(("127.0.0.1", self.server.port)) for _ in range(2)]
             for client in clients:
                 client.sendall(head + body)
                 client.close()
-            for _ in range(400):
+            for _ in range(100):  # ApplicationTest.EndsTheBuildOf... needs no clock
                 if self.server.call("POST", "/api/v1/render", {"image": {"width": 8, "height": 8}, "stop": {"samples": 1}})[0] == 200:
                     break
                 refused += 1
@@ -85,6 +88,7 @@ class Builds(HostileTest):
             else:
                 self.fail("the places are not free again")
         print(f"\nten times two clients that vanish: {time.monotonic() - begin:.2f} s, {refused} times refused")
+        self.assert_descriptors_at_most(descriptors + 4)
 
 
 class Ending(HostileTest):
@@ -98,7 +102,8 @@ class Ending(HostileTest):
         threading.Event().wait(0.2)
         begin = time.monotonic()
         self.server.process.send_signal(signal.SIGTERM)
-        # The grace period of 3 s, and the time of thread joins on a busy machine.
+        # The grace period of 3 s, and the time of thread joins on a busy machine. That builds see the stop is tested
+        # without a clock by ApplicationTest.EndsAllBuildsWhenItStops.
         self.assertEqual(self.server.process.wait(timeout=10), 0)
         print(f"\nSIGTERM during builds: {time.monotonic() - begin:.2f} s of a grace of 3 s")
         for thread in threads:

@@ -33,7 +33,7 @@ class Rays(HostileTest):
                 self.assertEqual(status, 200, body)
                 self.server.call("GET", path + "/frame?timeout=1")
             self.server.call("DELETE", path)
-        self.under(attack)
+        self.under(attack, 64)
 
     def test_that_take_millions_of_steps(self):
         self.edit(SLOW, lambda number: {"camera": {"fovY": 30 + number % 10}})
