@@ -96,8 +96,8 @@ Renderers renderersFor(const std::shared_ptr<const Volume>& volume, const BenchO
 /// The settings with every number of samples that stays within the longest time, as predicted by one sample,
 /// which also warms up. The smallest number is always kept. Costs are counted by separate renderers, since
 /// counting slows them down.
-std::vector<Point> pointsOf(const BenchOptions& options, const Renderers& renderers, const Renderers& counting,
-                            const Scene& scene) {
+std::vector<Point> pointsOf(const BenchOptions& options, const Renderers& renderers,
+                            const Renderers& counting, const Scene& scene) {
   std::vector<Point> points;
   const std::vector<std::uint32_t> samples = ordered(options.samples);
   int leftOut = 0;

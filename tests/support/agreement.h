@@ -12,8 +12,8 @@
 //    the squared length of the bias, without the noise. In units of its estimated standard deviation it is at
 //    worst a sum of squares of k normal numbers, where k is the number of independent components of the
 //    picture: beyond 8, 1e-10 for k = 144 and 1e-6 for k = 12.
-// Together below 2e-6, and over all 1300 comparisons of `make check` below 0.3 %. Seeds are fixed: a test that
-// passes once passes always.
+// Together below 2e-6, and over all 1300 comparisons of `make check` below 0.3 %. Seeds are fixed: a test
+// that passes once passes always.
 #pragma once
 #include <array>
 #include <string>

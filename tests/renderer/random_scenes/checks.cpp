@@ -277,9 +277,8 @@ class Checks {
     };
     if (!worstOf(found, longTruth(), allowed).beyond()) return;
     const std::vector<double> hidden = hiddenFrom(scene);  // slow, and rarely needed
-    const Worst worst = worstOf(found, longTruth(), [&](std::size_t i, int c) {
-      return allowed(i, c) + hidden[i] * largest_;
-    });
+    const Worst worst = worstOf(found, longTruth(),
+                                [&](std::size_t i, int c) { return allowed(i, c) + hidden[i] * largest_; });
     if (!worst.beyond()) return;
     // Absorption within a segment is ignored (README): while a step may be opaque, errors do not fall with
     // the step yet, and differences between steps give no bound.
