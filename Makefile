@@ -107,12 +107,13 @@ check-cuda: test-deps
 	$(call run-tests,cuda,-L cuda)
 
 # clang 14 supports coroutines but does not define their feature macro, which Boost and libstdc++ test.
-TIDY := clang-tidy --quiet -p build/tidy --extra-arg=-D__cpp_impl_coroutine=201902L \
+TIDY := clang-tidy --quiet --extra-arg=-D__cpp_impl_coroutine=201902L \
   --extra-arg=-DBOOST_ASIO_HAS_CO_AWAIT=1 --extra-arg=-DBOOST_ASIO_HAS_STD_COROUTINE=1
 
+# What is compiled, files together where the build takes them together.
 check-tidy: build test-deps
-	cmake --preset tidy > /dev/null
-	git ls-files 'renderer/*.cpp' 'cuda/*.cpp' 'protocol/*.cpp' 'server/*.cpp' | xargs -P $(JOBS) -n 4 $(TIDY)
+	sed -n 's/^ *"file": "\(.*\)".*/\1/p' build/release/compile_commands.json | grep -v /tests/ | sort -u \
+	  | xargs -P $(JOBS) -n 1 $(TIDY) -p build/release
 
 check-format: test-deps
 	git ls-files '*.cpp' '*.h' '*.cu' | xargs clang-format --dry-run --Werror

@@ -28,4 +28,6 @@ class Error : public std::runtime_error {
   ErrorCode code_;
 };
 
+[[noreturn]] inline void failBadInput(const std::string& what) { throw Error(ErrorCode::badInput, what); }
+
 }  // namespace scolopax

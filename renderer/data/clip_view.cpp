@@ -15,8 +15,6 @@
 namespace scolopax {
 namespace {
 
-[[noreturn]] void fail(const std::string& what) { throw Error(ErrorCode::badInput, what); }
-
 bool keepsRegion(std::uint32_t regions, int x, int y, int z) { return regions >> (x + 3 * y + 9 * z) & 1; }
 
 /// The box that the kept regions of a crop span, and whether they fill it.
@@ -73,21 +71,21 @@ kernel::ClipPlaneView viewOf(const ClipPlane& plane, const Grid& grid, std::uint
 
 void checkClipping(std::span<const ClipPlane> planes, const std::optional<Crop>& crop, std::size_t channels) {
   if (planes.size() > std::size_t(kernel::kMaxClipPlanes))
-    fail("clip: expected at most " + std::to_string(kernel::kMaxClipPlanes) + " planes, found " +
-         std::to_string(planes.size()));
+    failBadInput("clip: expected at most " + std::to_string(kernel::kMaxClipPlanes) + " planes, found " +
+                 std::to_string(planes.size()));
   for (const ClipPlane& plane : planes) {
     if (!std::isfinite(glm::length(plane.point)) || !isFinite(plane.normal))
-      fail("clip: point, normal and the length of the point must be finite");
-    if (plane.normal == glm::dvec3(0)) fail("clip: the normal must not be zero");
+      failBadInput("clip: point, normal and the length of the point must be finite");
+    if (plane.normal == glm::dvec3(0)) failBadInput("clip: the normal must not be zero");
     for (const int channel : plane.channels.value_or(std::vector<int>()))
       if (channel < 0 || std::size_t(channel) >= channels)
-        fail("clip: expected a channel below " + std::to_string(channels) + ", found " +
-             std::to_string(channel));
+        failBadInput("clip: expected a channel below " + std::to_string(channels) + ", found " +
+                     std::to_string(channel));
   }
   if (!crop) return;
-  if (!isFinite(crop->low) || !isFinite(crop->high)) fail("crop: ends must be finite");
+  if (!isFinite(crop->low) || !isFinite(crop->high)) failBadInput("crop: ends must be finite");
   for (int axis = 0; axis < 3; ++axis)
-    if (crop->low[axis] > crop->high[axis]) fail("crop: ends are out of order");
+    if (crop->low[axis] > crop->high[axis]) failBadInput("crop: ends are out of order");
 }
 
 std::optional<kernel::ClipView> clipView(std::span<const ClipPlane> planes, const std::optional<Crop>& crop,

@@ -10,6 +10,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
 #include "renderer/kernel/classify.h"
+#include "renderer/kernel/lanes.h"
 
 namespace scolopax {
 namespace {
@@ -115,12 +116,12 @@ OpticalCurve makeOpticalCurve(const Curve<float>& opacity, const Curve<glm::vec3
     curve.first = std::numeric_limits<float>::infinity();
     return curve;
   }
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   // If the curve jumps up there, the position of the jump itself has opacity.
-  curve.first = first == curve.knots.begin()                    ? -kInfinity
-                : std::prev(first)->position == first->position ? std::nextafter(first->position, -kInfinity)
-                                                                : std::prev(first)->position;
-  curve.last = last == curve.knots.rbegin() ? kInfinity : std::prev(last)->position;
+  curve.first = first == curve.knots.begin() ? -kernel::kInfinity
+                : std::prev(first)->position == first->position
+                    ? std::nextafter(first->position, -kernel::kInfinity)
+                    : std::prev(first)->position;
+  curve.last = last == curve.knots.rbegin() ? kernel::kInfinity : std::prev(last)->position;
   return curve;
 }
 

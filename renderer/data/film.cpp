@@ -73,7 +73,8 @@ glm::dvec4 HalvedSums<Sum>::mean(std::size_t pixel) const {
 template <class Sum>
 template <class F>
 double HalvedSums<Sum>::sumOverHalves(const F& f) const {
-  const double odd = passes_ / 2, even = passes_ - odd;
+  const std::uint32_t half = passes_ / 2;
+  const double odd = half, even = passes_ - half;
   return sumOverPixels(pixels(), [&](std::size_t i) {
     return f(glm::dvec4(halves_[0][i]) / even, glm::dvec4(halves_[1][i]) / odd);
   });
@@ -84,7 +85,8 @@ double HalvedSums<Sum>::variance() const {
   if (passes_ < 2) return kNaN;
   // The variance of a mean of n samples is 1/n of a sample's, and that of the difference between the means
   // of the halves is 1/even + 1/odd of it.
-  const double odd = passes_ / 2, even = passes_ - odd, all = passes_;
+  const std::uint32_t half = passes_ / 2;
+  const double odd = half, even = passes_ - half, all = passes_;
   return even * odd / (all * all) *
          sumOverHalves([](const glm::dvec4& a, const glm::dvec4& b) { return squaredLength(a - b); });
 }

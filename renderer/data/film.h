@@ -2,6 +2,7 @@
 // Running sums per pixel. Takes passes from a launcher; gives images and their noise. The picture is the mean
 // of the samples plus, for every level of multi-level quadrature, the mean of that level's corrections.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <glm/vec4.hpp>
 #include <vector>
@@ -41,7 +42,7 @@ class HalvedSums {
   double sumOverHalves(const F& f) const;
 
   std::uint32_t passes_ = 0;
-  RawVector<Sum> halves_[2];  // undefined until the half has a pass
+  std::array<RawVector<Sum>, 2> halves_;  // undefined until the half has a pass
 };
 
 class Film {

@@ -17,8 +17,6 @@
 namespace scolopax {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 /// Voxels from `low` to `high`, both included.
 struct Voxels {
   glm::ivec3 low, high;
@@ -46,7 +44,7 @@ class Steepness {
     const glm::ivec3 last = dims_ - 1;
     const Voxels around{glm::max(between.low - 1, 0), glm::min(between.high + 1, last)};
     const bool inner = !spline_ && around.low == between.low - 1 && around.high == between.high + 1;
-    glm::dvec3 least(kInfinity), largest(-kInfinity);
+    glm::dvec3 least(std::numeric_limits<double>::infinity()), largest = -least;
     double value = 0;
     for (int axis = 0; axis < 3; ++axis) {
       const bool atBorder = around.low[axis] == between.low[axis] || around.high[axis] == between.high[axis];

@@ -16,6 +16,7 @@
 #include "renderer/core/shared_builds.h"
 #include "renderer/data/measuring.h"
 #include "renderer/data/transfer_function.h"
+#include "renderer/kernel/lanes.h"
 
 namespace scolopax {
 namespace {
@@ -106,12 +107,11 @@ double largestSquare(const GradientRows<T>& rows, const std::stop_token& stop) {
       [](double a, double b) { return std::max(a, b); });
 }
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
 /// What one thread has counted.
-struct Counts {
+struct GradientCounts {
   std::vector<std::uint64_t> joint = std::vector<std::uint64_t>(kBins * kBins);
-  std::vector<ValueInterval> stored = std::vector<ValueInterval>(kBins, {kInfinity, -kInfinity});
+  std::vector<ValueInterval> stored =
+      std::vector<ValueInterval>(kBins, {kernel::kInfinity, -kernel::kInfinity});
   std::uint64_t nonFinite = 0;
 };
 
@@ -124,9 +124,9 @@ GradientHistogram measure(const GradientRows<T>& rows, const Channel& channel, d
                           const std::stop_token& stop) {
   const double largest = std::sqrt(largestSquare(rows, stop));
   const double binsPerUnit = largest > 0 ? double(kBins) / largest : 0.0;
-  tbb::enumerable_thread_specific<Counts> ofThreads;
+  tbb::enumerable_thread_specific<GradientCounts> ofThreads;
   tbb::parallel_for(rows.all(), [&](const Rows& range) {
-    Counts& counts = ofThreads.local();
+    GradientCounts& counts = ofThreads.local();
     forRows(rows, range, stop, [&](std::size_t row, const std::vector<double>& squares) {
       for (std::size_t x = 0; x < squares.size(); ++x) {
         if (!std::isfinite(squares[x])) {
@@ -143,8 +143,8 @@ GradientHistogram measure(const GradientRows<T>& rows, const Channel& channel, d
     });
   });
 
-  Counts all;
-  for (const Counts& counts : ofThreads) {
+  GradientCounts all;
+  for (const GradientCounts& counts : ofThreads) {
     for (std::size_t i = 0; i < all.joint.size(); ++i) all.joint[i] += counts.joint[i];
     for (std::size_t i = 0; i < kBins; ++i)
       all.stored[i] = {std::min(all.stored[i].lo, counts.stored[i].lo),

@@ -19,28 +19,6 @@ using kernel::kMaxLevels;
 using kernel::LevelInterval;
 using kernel::TotalCode;
 
-/// The intervals of one channel over which two tables may differ: those that reach level `first` and begin no
-/// later than level `last`.
-struct Change {
-  int column, first, last;
-  bool meets(LevelInterval v) const { return v.hi >= first && v.lo <= last; }
-};
-
-/// Appends the range of levels in which the tables differ; null is the table of a channel that is not
-/// visible.
-void addChange(const BoundTable* before, const BoundTable* after, std::vector<Change>& changes) {
-  // Levels and gaps alternate: 2i is level i, 2i + 1 the gap above it.
-  int first = 2 * kMaxLevels, last = -1;
-  for (int i = 0; i < 2 * kMaxLevels; ++i) {
-    const float a = before ? before->largest[i % 2][i / 2] : 0.0f,
-                b = after ? after->largest[i % 2][i / 2] : 0.0f;
-    if (a == b) continue;
-    first = std::min(first, i);
-    last = i;
-  }
-  if (last >= 0) changes.push_back({(before ? before : after)->column, (first + 1) / 2, last / 2});
-}
-
 /// Calls f(block) for all blocks, from many threads.
 template <class F>
 void forBlocks(const CellBlocks& blocks, const std::stop_token& stop, F&& f) {
@@ -138,8 +116,29 @@ struct MajorantGrid::Totals {
 
 /// Which totals an edit changes.
 struct MajorantGrid::Changes {
+  /// The intervals of one channel over which two tables may differ: those that reach level `first` and begin
+  /// no later than level `last`.
+  struct Change {
+    int column, first, last;
+    bool meets(LevelInterval v) const { return v.hi >= first && v.lo <= last; }
+  };
   bool all;
   std::vector<Change> some;
+
+  /// Appends the range of levels in which the tables differ; null is the table of a channel that is not
+  /// visible.
+  void add(const BoundTable* before, const BoundTable* after) {
+    // Levels and gaps alternate: 2i is level i, 2i + 1 the gap above it.
+    int first = 2 * kMaxLevels, last = -1;
+    for (int i = 0; i < 2 * kMaxLevels; ++i) {
+      const float a = before ? before->largest[i % 2][i / 2] : 0.0f,
+                  b = after ? after->largest[i % 2][i / 2] : 0.0f;
+      if (a == b) continue;
+      first = std::min(first, i);
+      last = i;
+    }
+    if (last >= 0) some.push_back({(before ? before : after)->column, (first + 1) / 2, last / 2});
+  }
   bool meet(const LevelInterval* intervals) const {
     return all || std::any_of(some.begin(), some.end(),
                               [&](const Change& change) { return change.meets(intervals[change.column]); });
@@ -177,7 +176,7 @@ MajorantGrid::Changes MajorantGrid::changesSince(const MajorantGrid& before, boo
     return {true, {}};
   Changes changes{false, {}};
   for (int column = 0; column < int(macrocells_->levels.size()); ++column)
-    addChange(tableOf(then, column), tableOf(now, column), changes.some);
+    changes.add(tableOf(then, column), tableOf(now, column));
   return changes;
 }
 

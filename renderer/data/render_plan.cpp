@@ -37,38 +37,38 @@ bool samePicture(Scene a, const Scene& b) {
 /// Whether the bound of all channels together is the sum of their bounds.
 bool sumsExtinction(BlendMode blend) { return blend != BlendMode::max && blend != BlendMode::mix; }
 
-[[noreturn]] void fail(const std::string& what) { throw Error(ErrorCode::badInput, what); }
-
 }  // namespace
 
 void checkLight(const Light& light) {
   const double length = glm::length(light.vector);
   if (light.type != LightType::headlight && !std::isfinite(length))
-    fail("lights: the length of position and direction must be finite");
-  if (light.type == LightType::directional && !(length > 0)) fail("lights: the direction must not be zero");
+    failBadInput("lights: the length of position and direction must be finite");
+  if (light.type == LightType::directional && !(length > 0))
+    failBadInput("lights: the direction must not be zero");
   for (const double value : {light.intensity, light.color.x, light.color.y, light.color.z})
     if (!(value >= 0 && std::isfinite(value)))
-      fail("lights: colour and intensity must be finite and not negative");
+      failBadInput("lights: colour and intensity must be finite and not negative");
 }
 
 void checkStep(double step) {
   if (step != 0 && !(step >= kLeastStep && step <= 100))
-    fail("integrator.step: expected 0, or " + shortText(kLeastStep) + " to 100, found " + shortText(step));
+    failBadInput("integrator.step: expected 0, or " + shortText(kLeastStep) + " to 100, found " +
+                 shortText(step));
 }
 
 void checkScene(const Scene& scene, const Volume& volume) {
   if (scene.channels.size() != volume.channels().size())
-    fail("scene: expected " + std::to_string(volume.channels().size()) + " channels, found " +
-         std::to_string(scene.channels.size()));
+    failBadInput("scene: expected " + std::to_string(volume.channels().size()) + " channels, found " +
+                 std::to_string(scene.channels.size()));
   checkImageSize(scene);
   if (scene.lights.size() > std::size_t(kernel::kMaxLights))
-    fail("lights: expected at most " + std::to_string(kernel::kMaxLights) + ", found " +
-         std::to_string(scene.lights.size()));
+    failBadInput("lights: expected at most " + std::to_string(kernel::kMaxLights) + ", found " +
+                 std::to_string(scene.lights.size()));
   for (const Light& light : scene.lights) checkLight(light);
   checkClipping(scene.clip, scene.crop, volume.channels().size());
   checkStep(scene.step);
   if (scene.macrocell < 1 || scene.macrocell > 64)
-    fail("integrator.macrocell: expected 1 to 64, found " + std::to_string(scene.macrocell));
+    failBadInput("integrator.macrocell: expected 1 to 64, found " + std::to_string(scene.macrocell));
 }
 
 namespace {

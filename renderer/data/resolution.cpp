@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "renderer/kernel/lanes.h"
 
 namespace scolopax {
 
@@ -27,8 +28,8 @@ kernel::OpacityLimit opacityLimit(double transmittance) {
 
 void setResolution(kernel::SceneView& view, const Resolution& resolution) {
   view.voxelwise = resolution.voxelwise;
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  view.step = std::isfinite(resolution.step) ? view.smallestSpacing * float(resolution.step) : kInfinity;
+  view.step =
+      std::isfinite(resolution.step) ? view.smallestSpacing * float(resolution.step) : kernel::kInfinity;
   // The biases of ending rays early, and of what hides other matter in the same segment, must fall with that
   // of the segments' lengths, which is of second order.
   const double part = view.cutsAtVoxels() ? std::min(1.0, resolution.step / 2) : 1.0;

@@ -8,6 +8,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/data/field_view.h"
+#include "renderer/kernel/lanes.h"
 #include "renderer/kernel/optical_curve.h"
 
 namespace scolopax {
@@ -17,11 +18,10 @@ namespace {
 /// The least float at which `reaches` is true, near `guess`.
 template <class Reaches>
 float leastThat(float guess, const Reaches& reaches) {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   constexpr int kNear = 100;  // the guess is rounded, and so is what it is compared with
-  for (int i = 0; i < kNear && reaches(std::nextafter(guess, -kInfinity)); ++i)
-    guess = std::nextafter(guess, -kInfinity);
-  for (int i = 0; i < kNear && !reaches(guess); ++i) guess = std::nextafter(guess, kInfinity);
+  for (int i = 0; i < kNear && reaches(std::nextafter(guess, -kernel::kInfinity)); ++i)
+    guess = std::nextafter(guess, -kernel::kInfinity);
+  for (int i = 0; i < kNear && !reaches(guess); ++i) guess = std::nextafter(guess, kernel::kInfinity);
   return guess;
 }
 

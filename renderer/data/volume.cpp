@@ -14,6 +14,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
+#include "renderer/kernel/lanes.h"
 
 namespace scolopax {
 namespace {
@@ -47,9 +48,8 @@ void checkGrid(const Grid& grid) {
 /// voxels has the resolution of the spread.
 void normalise(VoxelBuffer& buffer, Channel& channel) {
   if (buffer.type() != ScalarType::f32) return;
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const auto voxels = buffer.as<float>();
-  float least = kInfinity, most = -kInfinity;
+  float least = kernel::kInfinity, most = -kernel::kInfinity;
   for (const float v : voxels) {
     if (!std::isfinite(v)) continue;
     least = std::min(least, v);

@@ -12,7 +12,7 @@
 namespace scolopax {
 namespace {
 
-constexpr std::size_t kSamples = 4;
+constexpr std::size_t kPilotSamples = 4;
 /// The finest resolution of thumbnails. What finer ones give is extrapolated. None before it tells enough:
 /// steps that all leap over the same detail give similar pictures.
 constexpr int kFinestThumbnail = kEqualSteps + 2;
@@ -78,7 +78,7 @@ class Ladder {
   const Pictures& at(int i) const { return pictures_[std::size_t(i)]; }
   void render(Thumbnails& thumbnails) {
     const Resolution resolution = resolutionAt(next_++);
-    if (resolution.step >= leastStep_) pictures_.push_back(thumbnails.render(resolution, kSamples));
+    if (resolution.step >= leastStep_) pictures_.push_back(thumbnails.render(resolution, kPilotSamples));
   }
   /// Whether the last two pictures certainly differ by more than is usually wanted.
   bool isRough() const {
@@ -159,7 +159,7 @@ AutomaticChoice chooseAutomatically(Launcher& launcher, const RenderPlan& plan, 
                          scheduleLevels(ladder.variance(base) / gain, levels), thumbnails.rays()};
   if (rest <= kBiasLeft && work <= 2 * baseWork) return choice;
   Thumbnails tracked(launcher, plan, Method::superposed, true, stop);
-  const Pictures tracker = tracked.render({}, kSamples);
+  const Pictures tracker = tracked.render({}, kPilotSamples);
   if (rest > kBiasLeft || std::sqrt(variance(tracker) * tracker.fetches * kTrackerFetch) < work)
     choice = {Method::superposed, resolutionOf(Scene()), {}, 0};
   choice.rays = thumbnails.rays() + tracked.rays();

@@ -9,7 +9,7 @@
 namespace scolopax {
 namespace {
 
-constexpr std::size_t kSamples = 8;
+constexpr std::size_t kThumbnailSamples = 8;
 /// Maximum number of segments of a ray, at the smallest step.
 constexpr double kMostSegments = 1 << 16;
 
@@ -24,9 +24,9 @@ double estimateBias(Launcher& launcher, const RenderPlan& plan, const std::stop_
   const double least = plan.grid().diagonal() / double(plan.view().smallestSpacing) / kMostSegments;
   Resolution own = resolutionOf(plan.scene());
   own.step = std::max(own.step, least);
-  const Pictures coarse = thumbnails.render(own, kSamples);
-  const Pictures middle = thumbnails.render({std::max(1.0, least), true}, kSamples);
-  const Pictures fine = thumbnails.render({std::max(0.5, least), true}, kSamples);
+  const Pictures coarse = thumbnails.render(own, kThumbnailSamples);
+  const Pictures middle = thumbnails.render({std::max(1.0, least), true}, kThumbnailSamples);
+  const Pictures fine = thumbnails.render({std::max(0.5, least), true}, kThumbnailSamples);
   // The error is of second order in the longest segment: half of it gives a quarter of the error.
   return std::sqrt(upper(squaredDifference(coarse, fine))) +
          std::sqrt(upper(squaredDifference(middle, fine))) / 3;

@@ -4,17 +4,15 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <numbers>
 
 #include "renderer/core/error.h"
 
 namespace scolopax {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 double factorial(int n) { return std::tgamma(n + 1.0); }
 
@@ -51,7 +49,7 @@ HydrogenOrbital::HydrogenOrbital(int n, int l, int m) : n_(n), l_(l), m_(std::ab
                     " l=" + std::to_string(l) + " m=" + std::to_string(m));
   // The r^l of the radial part's (2r/n)^l moves into the solid harmonic below; its (2/n)^l stays here.
   const double radial = power(2.0 / n, 3 + 2 * l) * factorial(n - l - 1) / (2 * n * factorial(n + l));
-  const double angular = (2 * l + 1) / (4 * kPi) * factorial(l - m_) / factorial(l + m_);
+  const double angular = (2 * l + 1) / (4 * std::numbers::pi) * factorial(l - m_) / factorial(l + m_);
   norm_ = radial * angular;
   for (int k = 0; 2 * k <= l - m_; ++k)
     angular_.push_back((k % 2 ? -1 : 1) * factorial(2 * l - 2 * k) /

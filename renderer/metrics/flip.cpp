@@ -6,6 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+#include <numbers>
 #include <string>
 
 #include "renderer/core/error.h"
@@ -16,7 +17,6 @@
 namespace scolopax {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // Table 1 and sections 4.1, 4.2 of the paper.
 constexpr double kColorExponent = 0.7, kFeatureExponent = 0.5;  // qc, qf
 constexpr double kColorKnee = 0.4, kErrorAtKnee = 0.95;         // pc, pt
@@ -113,16 +113,17 @@ constexpr double kWidestB = 0.04;
 template <std::size_t N>
 void filterBySensitivity(Planes& image, int component, const Sensitivity (&terms)[N],
                          double pixelsPerDegree) {
-  const int radius = int(std::ceil(3 * std::sqrt(kWidestB / (2 * kPi * kPi)) * pixelsPerDegree));
+  const int radius =
+      int(std::ceil(3 * std::sqrt(kWidestB / (2 * std::numbers::pi * std::numbers::pi)) * pixelsPerDegree));
   std::vector<double> values, sum(image.pixels.size());
   for (const glm::dvec3& p : image.pixels) values.push_back(p[component]);
   double total = 0;
   for (const Sensitivity& term : terms) {
     const Taps taps = makeTaps(radius, [&](double i) {
       const double degrees = i / pixelsPerDegree;
-      return std::exp(-kPi * kPi * degrees * degrees / term.b);
+      return std::exp(-std::numbers::pi * std::numbers::pi * degrees * degrees / term.b);
     });
-    const double scale = term.a * std::sqrt(kPi / term.b);
+    const double scale = term.a * std::sqrt(std::numbers::pi / term.b);
     total += scale * sumOf(taps) * sumOf(taps);
     const std::vector<double> part = filtered(values, image.width, image.height, taps, taps);
     for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += scale * part[i];

@@ -9,6 +9,9 @@
 
 namespace scolopax::reference {
 
+/// Rounding of sums and products of polynomials, relative to the longest vectors in them.
+inline constexpr double kPolynomialNoise = 1e-13;
+
 /// n over k; n up to Bernstein::kMaxDegree.
 double binomial(std::size_t n, std::size_t k);
 

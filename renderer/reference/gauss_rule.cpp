@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 
 namespace scolopax::reference {
 namespace {
@@ -22,11 +23,10 @@ std::array<double, N + 1> legendre(double x) {
 
 template <int N>
 GaussRule<N>::GaussRule() {
-  constexpr double kPi = 3.14159265358979323846;
   std::array<std::array<double, N + 1>, N> p;  // polynomials at the nodes
   std::array<double, N> x;                     // nodes on [-1,1], ascending: roots of P_N by Newton's method
   for (std::size_t i = 0; i < N; ++i) {
-    x[i] = -std::cos(kPi * (double(i) + 0.75) / (N + 0.5));
+    x[i] = -std::cos(std::numbers::pi * (double(i) + 0.75) / (N + 0.5));
     double derivative = 0;
     for (int step = 0; step < 10; ++step) {
       p[i] = legendre<N>(x[i]);

@@ -7,7 +7,6 @@
 namespace scolopax::reference {
 namespace {
 
-constexpr double kNoise = 1e-13;           // rounding of polynomials, relative to the longest vectors in them
 constexpr double kNearExtremum = 0x1p-24;  // a kink this far from a cut causes an error of its square
 
 ChannelCurves curveOf(const GradientOpacity& opacity) {
@@ -23,13 +22,14 @@ ChannelCurves curveOf(const GradientOpacity& opacity) {
 void FactorAlong::appendCuts(std::vector<double>& cuts) const {
   const BernsteinVector& g = gradient_.scaled;
   const Bernstein& scale = gradient_.scale;
-  const double longest = g.longest(), noise = kNoise * longest * longest;
+  const double longest = g.longest(), noise = kPolynomialNoise * longest * longest;
   const Bernstein squared = g.dot(g), scaleSquared = scale * scale;
   for (const double value : curve_->breakpoints()) {
     if (!(value > 0)) continue;  // |gradient| does not cross 0
     if (value * scale.lower() > longest) break;
     const double most = value * scale.upper();
-    (squared - scaleSquared * (value * value)).appendSignChanges(std::max(noise, kNoise * most * most), cuts);
+    (squared - scaleSquared * (value * value))
+        .appendSignChanges(std::max(noise, kPolynomialNoise * most * most), cuts);
   }
   // d/du (|g|^2 / scale^2) = 2 (g.g' scale - g.g scale') / scale^3. Where |g| is zero, or nearly so, its
   // square has a double root or none, but the derivative changes sign.

@@ -11,7 +11,6 @@
 namespace scolopax::reference {
 namespace {
 
-constexpr double kNoise = 1e-13;        // rounding of polynomials, relative to the longest vectors in them
 constexpr double kNarrowest = 0x1p-20;  // share of the part, below which directions may turn at will
 constexpr double kSame = 1e-11;         // distance of cuts, below which they are one
 constexpr double kMostTurn = 0.5;       // of directions in half a piece, radians
@@ -19,11 +18,6 @@ constexpr double kSmoothPower = 8;      // max(x, 0) to this power is smooth eno
 
 double angleBetween(const glm::dvec3& a, const glm::dvec3& b) {
   return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
-}
-
-glm::dvec3 unit(const glm::dvec3& v) {
-  const double length = glm::length(v);
-  return length > 0 ? v / length : glm::dvec3(0);
 }
 
 }  // namespace
@@ -102,7 +96,7 @@ void LightCuts::appendKinks(const Line& line, const Shaded& shaded, std::vector<
   const bool diffuse = material.diffuse > 0;
   const bool edge =
       material.specular > 0 && material.shininess < kSmoothPower;  // highlights have a kink at their edge
-  const double noise = kNoise * shaded.longest;
+  const double noise = kPolynomialNoise * shaded.longest;
 
   const Bernstein nv = normal.dot(line.toViewer);
   nv.appendSignChanges(noise, cuts);
@@ -126,7 +120,7 @@ void LightCuts::appendKinks(const Line& line, const Shaded& shaded, std::vector<
   const double steep = shaded.channel.range / smallestSpacing_;
   const double most = scale.upper() * steep;
   (normal.dot(normal) - scale * scale * (steep * steep))
-      .appendSignChanges(kNoise * std::max(shaded.longest * shaded.longest, most * most), cuts);
+      .appendSignChanges(kPolynomialNoise * std::max(shaded.longest * shaded.longest, most * most), cuts);
 }
 
 /// Appends `end`, after the cuts that are needed before it.
@@ -164,7 +158,7 @@ bool LightCuts::isNormalResolved(const Line& line, const Shaded& shaded, double 
   const glm::dvec3 middle = piece(0.5);
   double turn = 0;
   for (const glm::dvec3& control : piece.controlPoints())
-    if (glm::length(control) > 10 * kNoise * shaded.longest)
+    if (glm::length(control) > 10 * kPolynomialNoise * shaded.longest)
       turn = std::max(turn, angleBetween(control, middle));
   if (turn > kMostTurn) return false;
   if (!(material.specular > 0)) return true;

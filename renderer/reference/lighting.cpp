@@ -31,12 +31,12 @@ void check(const Material& m) {
     throw Error(ErrorCode::badInput, "reference: a material must be finite and not negative, shininess > 0");
 }
 
+}  // namespace
+
 glm::dvec3 unit(const glm::dvec3& v) {
   const double length = glm::length(v);
   return length > 0 ? v / length : glm::dvec3(0);
 }
-
-}  // namespace
 
 Lighting::Lighting(const Scene& scene, const glm::dvec3& zero)
     : shading_(scene.shading), shadows_(scene.shadows), lights_(scene.lights) {

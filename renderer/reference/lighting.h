@@ -10,6 +10,9 @@
 
 namespace scolopax::reference {
 
+/// A vector of the same direction and length 1; of length 0 if `v` is.
+glm::dvec3 unit(const glm::dvec3& v);
+
 /// One light as it arrives at a point.
 struct ArrivingLight {
   glm::dvec3 direction;  ///< towards the light, length 1; 0 at the light itself

@@ -5,7 +5,7 @@ namespace scolopax::reference {
 namespace {
 
 constexpr double kLastBit = 0x1p-52;  // of a u that is near 1
-constexpr double kOnPlane = 1e-9;     // voxels, by which rounding may carry a ray off the plane it runs along
+constexpr double kOffPlane = 1e-9;    // voxels, by which rounding may carry a ray off the plane it runs along
 
 }  // namespace
 
@@ -25,7 +25,7 @@ std::optional<ScalarAlong> scalarAlong(const ScalarField& field, const CellOnRay
       return ScalarAlong(spline->along(part.begin, part.end));
     }
     case Interpolation::nearest: {
-      const auto voxel = field.nearestVoxel(part.middle + kOnPlane);
+      const auto voxel = field.nearestVoxel(part.middle + kOffPlane);
       if (!voxel) return std::nullopt;
       return ScalarAlong(CellScalar(*voxel));
     }

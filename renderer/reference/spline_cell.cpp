@@ -9,7 +9,7 @@
 namespace scolopax::reference {
 namespace {
 
-using Row = std::array<double, 4>;  // the first `count` of them are used
+using SplineRow = std::array<double, 4>;  // the first `count` of them are used
 
 /// Where de Boor's algorithm divides the control values of a uniform spline of `count` - 1 degrees, for one
 /// parameter: the ratios of all levels.
@@ -25,7 +25,7 @@ struct Ratios {
 /// De Boor's algorithm with one parameter in the first `ends` levels and another in the rest: coefficient
 /// `ends`, in Bernstein form, of the part between both parameters (the blossom of the segment). Interpolates
 /// only, so that equal control values give their value to the last bit.
-double blossom(Row v, std::size_t count, const Ratios& begin, const Ratios& end, std::size_t ends) {
+double blossom(SplineRow v, std::size_t count, const Ratios& begin, const Ratios& end, std::size_t ends) {
   for (std::size_t level = 1; level < count; ++level) {
     const auto& ratio = (level <= ends ? end : begin).of[level - 1];
     for (std::size_t j = 0; j + level < count; ++j) v[j] = lerpExact(v[j], v[j + 1], ratio[j]);
@@ -52,7 +52,7 @@ struct Box {
     size[axis] = length;
     for (std::size_t layer = 0; layer < layers; ++layer)
       for (std::size_t i = 0; i < stride; ++i) {
-        Row row{};
+        SplineRow row{};
         for (std::size_t k = 0; k < before.size[axis]; ++k)
           row[k] = before.values[(layer * before.size[axis] + k) * stride + i];
         rule(row);
@@ -63,7 +63,7 @@ struct Box {
 
 /// The derivative along an axis: a spline of one degree less, whose control values are the differences.
 Box derivative(Box box, std::size_t axis) {
-  box.replaceRows(axis, 3, [](Row& row) {
+  box.replaceRows(axis, 3, [](SplineRow& row) {
     for (std::size_t k = 0; k < 3; ++k) row[k] = row[k + 1] - row[k];
   });
   return box;
@@ -74,7 +74,7 @@ double valueAt(Box box, const glm::dvec3& point) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::size_t count = box.size[axis];
     const Ratios at(point[int(axis)], count);
-    box.replaceRows(axis, 1, [&](Row& row) { row[0] = blossom(row, count, at, at, 0); });
+    box.replaceRows(axis, 1, [&](SplineRow& row) { row[0] = blossom(row, count, at, at, 0); });
   }
   return std::clamp(box.values[0], least, most);  // rounding must not carry it across a step of a curve
 }
@@ -86,8 +86,8 @@ Bernstein diagonal(Box box, const glm::dvec3& begin, const glm::dvec3& end) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::size_t count = box.size[axis];
     const Ratios first(begin[int(axis)], count), last(end[int(axis)], count);
-    box.replaceRows(axis, count, [&](Row& row) {
-      const Row control = row;
+    box.replaceRows(axis, count, [&](SplineRow& row) {
+      const SplineRow control = row;
       for (std::size_t k = 0; k < count; ++k) row[k] = blossom(control, count, first, last, k);
     });
   }

@@ -10,7 +10,7 @@ namespace scolopax::reference {
 namespace {
 
 /// Positions of the interior maxima of the curve, and the opacity there.
-std::vector<std::pair<double, double>> peaksOf(const std::vector<OpacityKnot>& curve) {
+std::vector<std::pair<double, double>> peaksIn(const std::vector<OpacityKnot>& curve) {
   // Of several knots at one position, only the first and the last can be seen: the limits from both sides.
   std::vector<OpacityKnot> seen;
   for (std::size_t i = 0; i < curve.size(); ++i) {
@@ -47,7 +47,7 @@ std::vector<Surface> surfacesOf(const ChannelAppearance& appearance, const Chann
   }
   const double lo = appearance.rangeLo, hi = appearance.rangeHi;
   if (appearance.peaks == Peaks::off || lo == hi) return surfaces;
-  for (const auto& [position, opacity] : peaksOf(appearance.opacity)) {
+  for (const auto& [position, opacity] : peaksIn(appearance.opacity)) {
     const double alpha = -std::expm1(-opacity * appearance.density * smallestSpacing);
     if (alpha > 0)
       surfaces.push_back(

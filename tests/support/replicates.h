@@ -29,10 +29,11 @@ struct Replicates {
   int samples = 0;
 };
 
-/// Replicates rendered by the CPU backend.
-inline Replicates replicate(const std::shared_ptr<const Volume>& volume, Scene scene, Method method) {
+/// Replicates rendered by the CPU backend, of `longer` times as many samples as usual.
+inline Replicates replicate(const std::shared_ptr<const Volume>& volume, Scene scene, Method method,
+                            int longer = 1) {
   scene.method = method;
-  Replicates result{{}, samplesPerReplicate()};
+  Replicates result{{}, longer * samplesPerReplicate()};
   const auto renderer = makeCpuRenderer(volume, 0);
   const std::atomic<bool> never = false;
   for (int r = 0; r < kReplicates; ++r) {

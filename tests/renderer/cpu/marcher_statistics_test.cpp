@@ -77,8 +77,8 @@ TEST_P(Estimates, OfBiasIsThatOfTheReference) {
       const RenderPlan plan(made->volume, scene);
       const double found = estimateBias(*launcher, plan);
       // Quadrature stops at a transmittance of 1e-4, an error that does not depend on the step.
-      EXPECT_GT(found, truth / 3 - 1e-4) << "lit " << lit << " step " << step;
-      EXPECT_LT(found, truth * 3 + 1e-4) << "lit " << lit << " step " << step;
+      EXPECT_GT(found, truth / 2 - 3e-5) << "lit " << lit << " step " << step;
+      EXPECT_LT(found, truth * 2 + 1e-4) << "lit " << lit << " step " << step;
     }
 }
 

@@ -127,9 +127,17 @@ struct ShadowedElsewhere : kernel::EqualSteps {
   };
 };
 
+/// So that some 300 of all rays of a comparison collide in matter of this optical depth, and the mean picture
+/// of a tracker is known within some 6 %.
+int longerFor(double depth) {
+  const double rays = 9.0 * kReplicates * samplesPerReplicate();
+  return std::max(1, int(300 / (rays * depth)));
+}
+
 class ThinLight : public testing::TestWithParam<BlendMode> {
  protected:
-  static void compare(const VolumeAndScene& made) {
+  /// Trackers take `longer` times as many samples as in other tests.
+  static void compare(const VolumeAndScene& made, int longer) {
     for (const LightConfiguration& light : kLightConfigurations) {
       Scene scene = made.scene;
       scene.blend = GetParam();
@@ -140,7 +148,7 @@ class ThinLight : public testing::TestWithParam<BlendMode> {
       for (const glm::vec4& pixel : expected.image.pixels)
         brightest = std::max({brightest, pixel.r, pixel.g, pixel.b, pixel.a});
       for (const Method method : kTrackers)
-        EXPECT_TRUE(haveMean(replicate(made.volume, scene, method), scene, expected))
+        EXPECT_TRUE(haveMean(replicate(made.volume, scene, method, longer), scene, expected))
             << nameOf(method) << ' ' << light.name;
       auto withBias = expected;
       withBias.maximumRayError += kBias * double(brightest);
@@ -155,14 +163,14 @@ class ThinLight : public testing::TestWithParam<BlendMode> {
 TEST_P(ThinLight, FallsOnMatterInLightAndLeavesOutMatterInShadow) {
   for (const double density : {2e-4, 0.001, 0.06}) {
     SCOPED_TRACE(density);
-    compare(litAndShadowed(density));
+    compare(litAndShadowed(density), longerFor(5 * density));
   }
 }
 
 TEST_P(ThinLight, FollowsANormalThatTurnsAlongTheRay) {
   for (const double density : {1e-4, 0.002, 0.03}) {
     SCOPED_TRACE(density);
-    compare(turningNormal(density));
+    compare(turningNormal(density), longerFor(5 * density));
   }
 }
 

@@ -40,8 +40,10 @@ TEST(Filters, OfTheSplineConvergeInSmallSteps) {
     Scene scene = thin(made.scene, 0.005);
     interpolateAll(scene, Interpolation::cubic);
     // Voxel cell by voxel cell, the spline of degree 9 is replaced by a cubic.
-    EXPECT_LT(largestError(made.volume, scene, 0), 2e-4) << kTestSceneNames[int(which)];
-    EXPECT_LT(largestError(made.volume, scene, 0.1, 16), 2e-4) << kTestSceneNames[int(which)];
+    EXPECT_LT(largestError(made.volume, scene, 0), 5e-5) << kTestSceneNames[int(which)];
+    // Of second order.
+    const double ofVoxel = largestError(made.volume, scene, 1, 16);
+    EXPECT_LT(largestError(made.volume, scene, 0.1, 16), ofVoxel / 50 + 2e-6) << kTestSceneNames[int(which)];
   }
 }
 

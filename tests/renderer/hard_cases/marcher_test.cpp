@@ -114,13 +114,17 @@ TEST(RayMarch, OfVoxelsThatAreNotFiniteIsFinite) {
     scene.blend = blend;
     scene.shading = scene.shadows = true;
     scene.channels = {ramp(0, 1, 0.5, kRed), ramp(0, 2, 0.5, kBlue)};
-    scene.step = 0.1;
     scene.filter = PixelFilter::point;
-    const Image found = march(volume, scene, 16);
     const auto expected = reference::renderReference(*volume, scene, 1).image;
-    for (std::size_t i = 0; i < found.pixels.size(); ++i)
-      for (int c = 0; c < 4; ++c)
-        ASSERT_NEAR(found.pixels[i][c], expected.pixels[i][c], 0.05) << nameOf(blend) << " pixel " << i;
+    for (const double step : {0.1, 0.025}) {
+      scene.step = step;
+      const Image found = march(volume, scene, 16);
+      // Rays enter and leave some gaps, each within a step of where they should, in matter of extinction 0.5.
+      for (std::size_t i = 0; i < found.pixels.size(); ++i)
+        for (int c = 0; c < 4; ++c)
+          ASSERT_NEAR(found.pixels[i][c], expected.pixels[i][c], 0.5 * step)
+              << nameOf(blend) << " pixel " << i << " step " << step;
+    }
   }
 }
 

@@ -63,6 +63,31 @@ TEST(Voxelwise, DividesCellsOfDenseMatter) {
   }
 }
 
+TEST(Voxelwise, DividesFrontsBehindWhichTheColorChanges) {
+  // The front of a ramp of extinction is 0.004 voxels deep. Equal steps average all colours of the step that
+  // it is in, as README says.
+  const glm::ivec3 dims(8, 8, 8);
+  const auto volume =
+      volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int z) { return 32 * z; }));
+  Scene scene = frontScene(*volume, 8, 8);
+  scene.channels = {ramp(0, 255, 1e6)};
+  for (const double change : {1.5e-3, 0.015, 0.06}) {
+    scene.channels[0].color = {{0, kRed}, {change, kRed}, {change + 1e-4, kBlue}};
+    EXPECT_LT(largestError(volume, scene), 2e-3) << change;
+    if (change < 0.01)
+      EXPECT_GT(largestError(volume, scene, 0.5), 0.5);
+    else
+      EXPECT_LT(largestError(volume, scene, 0.02), 1e-4) << change;
+    scene.method = Method::automatic;
+    const auto renderer = makeCpuRenderer(volume, 0);
+    renderer->setScene(scene);
+    renderer->renderSample(false);
+    const Image first = renderer->image();
+    for (const glm::vec4& pixel : first.pixels)
+      EXPECT_LT(glm::distance(pixel, glm::vec4(1, 0, 0, 1)), 2e-4) << change;
+  }
+}
+
 TEST(Voxelwise, LosesNothingWhereCurvesJumpOften) {
   // A staircase of 200 jumps, all of which are passed within one cell; in max and mix, parts end at jumps.
   const glm::ivec3 dims(2, 2, 2);

@@ -219,7 +219,7 @@ class Checks {
   /// The parts that quadrature leaves out on purpose, and the rounding of its product of transmittances.
   double quadratureFloor(const Scene& scene, const Truth& truth, std::size_t i) const {
     constexpr double kOpaque = 1e-4;
-    const double segments = drawn_.source.grid.diagonal() / (scene.step * smallestSpacing());
+    const double segments = drawn_.source.grid.diagonal() / (std::max(scene.step, 0.01) * smallestSpacing());
     const bool mayEnd = i + 1 == truth.mean.size() || truth.mean[i].a > 1 - 2 * kOpaque ||
                         scene.blend == BlendMode::composite || scene.filter == PixelFilter::box;
     return ((mayEnd ? kOpaque : 0) + (scene.shadows ? kOpaque : 0) + 2e-7 * (10 + segments)) * largest_;
@@ -254,8 +254,24 @@ class Checks {
     return levels;
   }
 
+  /// At step 0, nothing tells how large the error is. What is left out, or seen twice, is far more than this.
+  static constexpr double kWholeCells = 0.05;
+  void checkWholeCells(const Scene& scene) {
+    const Estimates found =
+        estimate(drawn_.volume, scene, effortFor(scene, 1e6, isLit(scene) ? 1 << 14 : 512), 4);
+    const Worst worst = worstOf(found, quick_, [&](std::size_t i, int c) {
+      return longNoise(found, found.most[i][c] - found.least[i][c], i, c) +
+             quadratureFloor(scene, quick_, i) + kWholeCells * (c < 3 ? largest_ : 1);
+    });
+    if (worst.beyond()) report(std::string(nameOf(scene.method)) + " of whole cells", textOf(worst, found));
+  }
+
   void checkQuadrature(Scene scene) {
     valueSamples_ = scene.sampling == Sampling::independent ? 1 : 8;
+    if (scene.step == 0) {
+      checkWholeCells(scene);
+      scene.step = 0.5;
+    }
     const Levels quick =
         levelsOf(scene, {scene.step, scene.step / 4, scene.step / 16}, 1e5, isLit(scene) ? 1 << 12 : 512, 2);
     scene.step = quick.step.back();

@@ -315,7 +315,7 @@ const Field kSceneFields[] = {
     {"integrator",
      [](Draw& d, const Surroundings&) -> json {
        const int macrocell = d.oneOf<int>({1, 1, 2, 3, 4, 5, 8, 64});
-       const double step = d.decades(0.1, 4);
+       const double length = d.decades(0.1, 4), step = length < 0.15 ? 0 : length;  // a ninth are 0
        return {{"integrator",
                 {{"method", nameFrom(d, kMethods)},
                  {"macrocell", macrocell},
