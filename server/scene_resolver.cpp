@@ -268,7 +268,7 @@ protocol::Lists rendererLists() {
 }
 
 SceneResolver::SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options)
-    : datasets_(std::move(datasets)), options_(options), lists_(rendererLists()) {
+    : datasets_(std::move(datasets)), options_(std::move(options)), lists_(rendererLists()) {
   for (const auto& dataset : datasets_->all())
     coarse_.emplace(dataset.get(), buildCoarseMacrocells(*dataset->volume));
 }

@@ -2,6 +2,7 @@
 #include "server/session.h"
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 #include "protocol/json_text.h"
@@ -17,10 +18,10 @@ namespace {
 constexpr std::size_t kMaxPendingPatches = 1024;
 
 /// Calls a function of a client. A failure there must not disturb the other clients, nor end a loop's thread.
-template <class Call>
-void tell(Call&& call) noexcept {
+template <class Call, class... Arguments>
+void tell(const Call& call, Arguments&&... arguments) noexcept {
   try {
-    call();
+    std::invoke(call, std::forward<Arguments>(arguments)...);
   } catch (...) {
   }
 }
@@ -86,7 +87,7 @@ Session::SceneState Session::edit(const EditOrigin& origin, const Resolve& resol
   const std::string message = change ? protocol::sceneText(revision_, *change) : std::string();
   for (auto& [id, viewer] : viewers_) {
     if (id != origin.viewer) {
-      tell([&] { viewer.sink->sceneChanged(message); });
+      tell(&ViewerSink::sceneChanged, *viewer.sink, message);
       continue;
     }
     viewer.pending.push_back({origin.patchId, revision_});
@@ -102,7 +103,7 @@ ViewerId Session::addViewer(std::shared_ptr<ViewerSink> sink) {
   if (closed_) throw protocol::ProtocolError(404, "", "the session has ended");
   const ViewerId id = nextViewer_++;
   retryIfBusy();
-  if (failedRevision_ == revision_) tell([&] { sink->renderFailed(*failure_); });
+  if (failedRevision_ == revision_) tell(&ViewerSink::renderFailed, *sink, *failure_);
   viewers_[id].sink = std::move(sink);
   lastUsed_ = hooks_.now();
   hooks_.wakeRender();
@@ -148,7 +149,7 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
     aovs_ = true;
     ++revision_;
     const std::string message = protocol::sceneText(revision_, "{}");
-    for (auto& [id, viewer] : viewers_) tell([&] { viewer.sink->sceneChanged(message); });
+    for (auto& [id, viewer] : viewers_) tell(&ViewerSink::sceneChanged, *viewer.sink, message);
   }
   retryIfBusy();
   const std::uint32_t revision = revision_;
@@ -214,7 +215,7 @@ void Session::close(const std::string& reason) {
   const std::lock_guard lock(mutex_);
   if (std::exchange(closed_, true)) return;
   hooks_.interruptRender();
-  for (auto& [id, viewer] : viewers_) tell([&] { viewer.sink->sessionClosed(reason); });
+  for (auto& [id, viewer] : viewers_) tell(&ViewerSink::sessionClosed, *viewer.sink, reason);
   viewers_.clear();
   picks_.clear();
   frameCame_.notify_all();
@@ -263,14 +264,14 @@ void Session::fail(std::uint32_t revision, const Error& error) {
   const bool busy = error.code() == ErrorCode::busy;
   const bool known = busy && retryAt_ && failedRevision_ == revision;  // a retry that failed again
   if (!known)
-    for (auto& [id, viewer] : viewers_) tell([&] { viewer.sink->renderFailed(error); });
+    for (auto& [id, viewer] : viewers_) tell(&ViewerSink::renderFailed, *viewer.sink, error);
   if (revision != revision_) return;  // the current scene may well render
   failedRevision_ = revision;
   failure_ = error;
   retryAt_.reset();
   if (busy) retryAt_ = hooks_.now() + kRetryTime;
   for (const WaitingPick& pick : std::exchange(picks_, {}))
-    tell([&] { pick.answered({{}, std::make_exception_ptr(error)}); });
+    tell(pick.answered, PickAnswer{{}, std::make_exception_ptr(error)});
   frameCame_.notify_all();
 }
 
@@ -278,7 +279,7 @@ void Session::answerPick(PickId id, const PickAnswer& answer) {
   const std::lock_guard lock(mutex_);
   const auto pick = std::find_if(picks_.begin(), picks_.end(), [&](const auto& p) { return p.id == id; });
   if (pick == picks_.end()) return;
-  tell([&] { pick->answered(answer); });
+  tell(pick->answered, answer);
   picks_.erase(pick);
   lastUsed_ = hooks_.now();
   frameCame_.notify_all();
@@ -322,7 +323,7 @@ std::optional<TimePoint> Session::deliver() {
     }
     viewer.lastOffer = now;
     viewer.lastNumber = frame_->info.number;
-    tell([&] { viewer.sink->offerFrame(*frame_, viewer.containedPatch); });
+    tell(&ViewerSink::offerFrame, *viewer.sink, *frame_, viewer.containedPatch);
   }
   return next;
 }

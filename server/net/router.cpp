@@ -81,12 +81,12 @@ struct Router::Impl {
 Router::Router() : impl_(std::make_unique<Impl>()) {}
 Router::~Router() = default;
 
-void Router::add(const std::string& method, const std::string& pattern, Route route) {
+void Router::add(const std::string& method, const std::string& pattern, const Route& route) {
   if (std::find(kMethods.begin(), kMethods.end(), method) == kMethods.end())
     throw NetError("route " + method + " " + pattern +
                    ": expected one of GET, POST, PUT, PATCH, DELETE, OPTIONS");
   const auto [at, isNew] = impl_->patterns.try_emplace(pattern);
-  at->second.try_emplace(method, std::move(route));
+  at->second.try_emplace(method, route);
   if (!isNew) return;
   try {
     impl_->matcher.Get(pattern, [methods = &at->second](const httplib::Request& request, httplib::Response&) {

@@ -27,7 +27,7 @@ class Router {
   ~Router();
   /// Of the patterns that fit a path, the one that was added first decides, whatever methods it has. Throws
   /// NetError for an unknown method or an invalid regex.
-  void add(const std::string& method, const std::string& pattern, Route route);
+  void add(const std::string& method, const std::string& pattern, const Route& route);
   /// `path` is decoded. Thread-safe once all routes are added.
   RouteMatch find(const std::string& method, const std::string& path) const;
 
