@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 #include "renderer/cpu/ray_packets.h"
 #include "renderer/data/instances.h"
+#include "renderer/renderer.h"
 
 namespace scolopax {
 namespace {
@@ -45,5 +47,10 @@ class CpuLauncher final : public Launcher {
 }  // namespace
 
 std::unique_ptr<Launcher> makeCpuLauncher(int threads) { return std::make_unique<CpuLauncher>(threads); }
+
+std::unique_ptr<Renderer> makeCpuRenderer(std::shared_ptr<const Volume> volume, int threads,
+                                          std::shared_ptr<MemoryBudget> memory) {
+  return makeRenderer(makeCpuLauncher(threads), std::move(volume), std::move(memory));
+}
 
 }  // namespace scolopax

@@ -280,9 +280,4 @@ std::unique_ptr<Renderer> makeRenderer(std::unique_ptr<Launcher> launcher,
   return std::make_unique<Engine>(std::move(launcher), std::move(volume), std::move(memory));
 }
 
-std::unique_ptr<Renderer> makeCpuRenderer(std::shared_ptr<const Volume> volume, int threads,
-                                          std::shared_ptr<MemoryBudget> memory) {
-  return makeRenderer(makeCpuLauncher(threads), std::move(volume), std::move(memory));
-}
-
 }  // namespace scolopax

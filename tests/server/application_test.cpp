@@ -21,7 +21,16 @@ using net::Gate;
 using net::TestClient;
 using nlohmann::json;
 
-/// A server whose renderers are all controlled by what the test puts into `building`.
+/// Builds that end only when they are told to.
+struct EndlessBuilds {
+  std::atomic<int> begun{0}, stopped{0};
+  void operator()(const std::stop_token& stop) {
+    ++begun;
+    if (eventually([&] { return stop.stop_requested(); })) ++stopped;
+  }
+};
+
+/// A server whose renderers are all controlled by what the test puts into `building_`.
 class ApplicationTest : public ::testing::Test {
  protected:
   void start() {
@@ -58,57 +67,46 @@ class ApplicationTest : public ::testing::Test {
   static constexpr const char* kToken = "0123456789abcdef";
   Config config_;
   std::function<void(std::stop_token)> building_;
+  EndlessBuilds endless_;
   std::shared_ptr<MemoryBudget> memory_;
   std::optional<Application> application_;  ///< last: ends before what its renderers use
 };
 
 constexpr const char* kSmallPicture = R"({"image": {"width": 8, "height": 8}, "stop": {"samples": 1}})";
 
-/// Builds that end only when they are told to.
-struct EndlessBuilds {
-  std::atomic<int> begun{0}, stopped{0};
-  void operator()(const std::stop_token& stop) {
-    ++begun;
-    if (eventually([&] { return stop.stop_requested(); })) ++stopped;
-  }
-};
-
 TEST_F(ApplicationTest, EndsAllBuildsWhenItStops) {
-  EndlessBuilds builds;
   config_.stopGrace = 0s;
-  building_ = std::ref(builds);
+  building_ = std::ref(endless_);
   start();
   const std::string session = newSession();
   TestClient poll(application_->port()), render(application_->port());
   send(poll, "GET " + session + "/frame");
   send(render, "POST /api/v1/render", kSmallPicture);
-  ASSERT_TRUE(eventually([&] { return builds.begun == 2; }));
+  ASSERT_TRUE(eventually([&] { return endless_.begun == 2; }));
   application_->stop();
   application_.reset();
-  EXPECT_EQ(builds.stopped, 2);
+  EXPECT_EQ(endless_.stopped, 2);
 }
 
 TEST_F(ApplicationTest, EndsTheBuildOfAClientThatVanishesAndFreesItsPlace) {
-  EndlessBuilds builds;
-  std::atomic<bool> endless{true};
+  std::atomic<bool> ends{false};
   building_ = [&](const std::stop_token& stop) {
-    if (endless) builds(stop);
+    if (!ends) endless_(stop);
   };
   start();
   {
     TestClient vanishing(application_->port());
     send(vanishing, "POST /api/v1/render", kSmallPicture);
-    ASSERT_TRUE(eventually([&] { return builds.begun == 1; }));
+    ASSERT_TRUE(eventually([&] { return endless_.begun == 1; }));
     EXPECT_EQ(call("POST /api/v1/render", kSmallPicture).status, 503);
   }
-  endless = false;
-  EXPECT_TRUE(eventually([&] { return builds.stopped == 1; }));
+  ends = true;
+  EXPECT_TRUE(eventually([&] { return endless_.stopped == 1; }));
   EXPECT_TRUE(eventually([&] { return call("POST /api/v1/render", kSmallPicture).status == 200; }));
 }
 
 TEST_F(ApplicationTest, LetsNoSessionsPollsKeepOthersOut) {
-  EndlessBuilds builds;
-  building_ = std::ref(builds);
+  building_ = std::ref(endless_);
   start();
   std::vector<std::unique_ptr<TestClient>> polls;
   for (int session = 0; session < 4; ++session) {
@@ -118,7 +116,7 @@ TEST_F(ApplicationTest, LetsNoSessionsPollsKeepOthersOut) {
       send(*polls.back(), "GET " + path + "/frame");
     }
   }
-  ASSERT_TRUE(eventually([&] { return builds.begun == 4; }));
+  ASSERT_TRUE(eventually([&] { return endless_.begun == 4; }));
   const std::string other = newSession();
   EXPECT_EQ(call("GET " + other + "/frame?timeout=0").status, 204);
   EXPECT_EQ(call("POST /api/v1/render", "{").status, 400);

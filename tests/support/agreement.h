@@ -217,4 +217,12 @@ inline ::testing::AssertionResult haveSameMean(const Replicates& a, const Replic
   return detail::areNoise(d, 2e-6);
 }
 
+/// Compares every tracker with the reference, with rays through pixel centres; samples may have any value.
+inline void expectUnbiased(const std::shared_ptr<const Volume>& volume, Scene scene) {
+  scene.filter = PixelFilter::point;
+  const auto expected = reference::renderReference(*volume, scene, 1);
+  for (const Method method : kTrackers)
+    EXPECT_TRUE(haveMean(replicate(volume, scene, method), scene, expected)) << nameOf(method);
+}
+
 }  // namespace scolopax::test

@@ -13,9 +13,6 @@
 
 namespace scolopax::test {
 
-inline constexpr BlendMode kBlends[] = {BlendMode::density, BlendMode::max, BlendMode::mix,
-                                        BlendMode::composite};
-
 struct LightConfiguration {
   const char* name;
   bool shading, shadows;

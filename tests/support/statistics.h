@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <vector>
 
 #include "renderer/data/image.h"
@@ -45,6 +46,17 @@ inline Image renderAnalog(const std::shared_ptr<const Volume>& volume, Scene sce
   scene.method = method;
   scene.sampling = Sampling::independent;
   return renderSamples(volume, scene, samples, threads);
+}
+
+inline bool sameBits(const Image& a, const Image& b) {
+  return a.pixels.size() == b.pixels.size() &&
+         std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(a.pixels[0])) == 0;
+}
+
+/// A picture with one value everywhere: the closed form of a scene whose pixels are all the same.
+inline reference::ReferenceImage flat(const Scene& scene, glm::dvec4 value) {
+  const std::size_t pixels = std::size_t(scene.width) * std::size_t(scene.height);
+  return {{scene.width, scene.height, std::vector<glm::vec4>(pixels, glm::vec4(value))}, {}, 0};
 }
 
 /// Compares a picture of `samples` times the factor samples with the reference. Every sample must be 0 or 1

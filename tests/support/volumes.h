@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Small volumes and scenes for tests.
 #pragma once
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -14,6 +15,22 @@ namespace scolopax::test {
 
 /// The unbiased methods.
 inline constexpr Method kTrackers[] = {Method::superposed, Method::cumulative, Method::syncDda, Method::nDda};
+/// Every method but `automatic`, which chooses one of them.
+inline constexpr Method kAllMethods[] = {Method::superposed, Method::cumulative, Method::syncDda,
+                                         Method::nDda,       Method::raymarch,   Method::hybrid};
+inline constexpr BlendMode kBlends[] = {BlendMode::density, BlendMode::max, BlendMode::mix,
+                                        BlendMode::composite};
+
+inline constexpr glm::dvec3 kRed(1, 0, 0), kGreen(0, 1, 0), kBlue(0, 0, 1), kWhite(1, 1, 1);
+
+inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// The largest float, and the smallest above 0.
+inline constexpr double kLargest = std::numeric_limits<float>::max();
+inline constexpr double kDenormal = std::numeric_limits<float>::denorm_min();
+
+/// For samples that nobody cancels.
+inline const std::atomic<bool> kNever = false;
 
 /// Voxel (i,j,k) = value(i,j,k), rounded for integer types.
 template <class T, class F>
@@ -56,6 +73,16 @@ inline ChannelAppearance solid(double density, glm::dvec3 color = glm::dvec3(1))
   ChannelAppearance a;
   a.density = density;
   a.opacity = {{0, 1}};
+  a.color = {{0, color}};
+  return a;
+}
+
+/// Opacity rises from 0 at lo to 1 at hi.
+inline ChannelAppearance ramp(double lo, double hi, double density, glm::dvec3 color = kWhite) {
+  ChannelAppearance a;
+  a.rangeLo = lo;
+  a.rangeHi = hi;
+  a.density = density;
   a.color = {{0, color}};
   return a;
 }

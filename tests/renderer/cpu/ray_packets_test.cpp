@@ -24,9 +24,9 @@ namespace {
 using namespace test;
 
 /// The random choices for a scene.
-struct Draw {
+struct RandomChoices {
   std::mt19937 random;
-  explicit Draw(unsigned seed) : random(seed) {}
+  explicit RandomChoices(unsigned seed) : random(seed) {}
   double between(double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(random); }
   int upTo(int most) { return std::uniform_int_distribution<int>(0, most)(random); }
   template <class T>
@@ -37,7 +37,7 @@ struct Draw {
 
 /// Blobs in mostly empty space, with noise; floats include voxels that are not finite.
 template <class T>
-ChannelSource blobs(Draw& draw, glm::ivec3 dims) {
+ChannelSource blobs(RandomChoices& draw, glm::ivec3 dims) {
   glm::dvec3 centres[3];
   for (glm::dvec3& c : centres)
     c = glm::dvec3(draw.between(0, 1), draw.between(0, 1), draw.between(0, 1)) * glm::dvec3(dims);
@@ -53,7 +53,7 @@ ChannelSource blobs(Draw& draw, glm::ivec3 dims) {
   });
 }
 
-ChannelSource anyBlobs(Draw& draw, glm::ivec3 dims) {
+ChannelSource anyBlobs(RandomChoices& draw, glm::ivec3 dims) {
   switch (draw.upTo(3)) {
     case 0:
       return blobs<std::uint8_t>(draw, dims);
@@ -66,7 +66,7 @@ ChannelSource anyBlobs(Draw& draw, glm::ivec3 dims) {
   }
 }
 
-ChannelAppearance anyAppearance(Draw& draw) {
+ChannelAppearance anyAppearance(RandomChoices& draw) {
   ChannelAppearance a;
   a.rangeLo = draw.of({0.0, 20.0, 150.0});
   a.rangeHi = draw.of({200.0, 120.0, 21.0});
@@ -88,7 +88,7 @@ ChannelAppearance anyAppearance(Draw& draw) {
   return a;
 }
 
-Light anyLight(Draw& draw, const Grid& grid) {
+Light anyLight(RandomChoices& draw, const Grid& grid) {
   const auto vector = [&] {
     return glm::dvec3(draw.between(-1, 1), draw.between(-1, 1), draw.between(-1, 1));
   };
@@ -99,7 +99,7 @@ Light anyLight(Draw& draw, const Grid& grid) {
 }
 
 /// Random clip planes of all or some channels, and crop regions.
-void clipAnyhow(Draw& draw, const Volume& volume, Scene& scene) {
+void clipAnyhow(RandomChoices& draw, const Volume& volume, Scene& scene) {
   const glm::dvec3 size(volume.grid().dims);
   const auto inside = [&] {
     return glm::dvec3(draw.between(0, 1), draw.between(0, 1), draw.between(0, 1)) * size - 0.5;
@@ -117,7 +117,7 @@ void clipAnyhow(Draw& draw, const Volume& volume, Scene& scene) {
 }
 
 /// Opacity by the gradient for some channels, with ranges typical of the blobs.
-void factorAnyhow(Draw& draw, Scene& scene) {
+void factorAnyhow(RandomChoices& draw, Scene& scene) {
   for (ChannelAppearance& a : scene.channels) {
     if (draw.upTo(1)) continue;
     const double lo = draw.of({0.0, 5.0, 30.0}), hi = draw.of({5.0, 20.0, 80.0});
@@ -131,7 +131,7 @@ void factorAnyhow(Draw& draw, Scene& scene) {
 }
 
 /// A random scene seen from outside or inside, in any light.
-Scene anyScene(Draw& draw, const Volume& volume) {
+Scene anyScene(RandomChoices& draw, const Volume& volume) {
   Scene scene = frontScene(volume, 1 + draw.upTo(40), 1 + draw.upTo(40));
   if (draw.upTo(3) > 0) scene.camera = framingCamera(volume.grid(), 35, 1);
   if (draw.upTo(3) == 0)
@@ -240,7 +240,7 @@ class RayPackets : public testing::TestWithParam<InstructionSet> {
 TEST_P(RayPackets, HaveTheBitsOfOneRayAfterTheOther) {
   for (unsigned seed = 0; seed < 400; ++seed) {
     SCOPED_TRACE(seed);
-    Draw draw(seed);
+    RandomChoices draw(seed);
     glm::ivec3 dims(2 + draw.upTo(40), 2 + draw.upTo(40), 2 + draw.upTo(40));
     if (draw.upTo(9) == 0) dims[draw.upTo(2)] = 1;
     std::vector<ChannelSource> sources;

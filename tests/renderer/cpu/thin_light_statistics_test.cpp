@@ -15,8 +15,6 @@ namespace {
 
 using namespace test;
 
-constexpr glm::dvec3 kRed{1, 0, 0}, kGreen{0, 1, 0}, kBlue{0, 0, 1};
-
 ChannelAppearance slab(glm::dvec3 color, double density) {
   ChannelAppearance a;
   a.rangeLo = 0;

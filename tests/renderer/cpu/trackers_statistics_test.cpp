@@ -15,14 +15,6 @@ namespace {
 
 using namespace test;
 
-constexpr glm::dvec3 kRed(1, 0, 0), kGreen(0, 1, 0), kBlue(0, 0, 1), kWhite(1, 1, 1);
-
-/// A picture with one value everywhere: the closed form of a scene whose pixels are all the same.
-reference::ReferenceImage flat(const Scene& scene, glm::dvec4 value) {
-  const std::size_t pixels = std::size_t(scene.width) * std::size_t(scene.height);
-  return {{scene.width, scene.height, std::vector<glm::vec4>(pixels, glm::vec4(value))}, {}, 0};
-}
-
 class HomogeneousBox : public testing::TestWithParam<Method> {};
 
 TEST_P(HomogeneousBox, HidesOneMinusExpOfItsThicknessSeenOrthographically) {

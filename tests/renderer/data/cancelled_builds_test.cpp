@@ -29,14 +29,14 @@ bool endsWhenToldTo(Build build) {
   return false;
 }
 
-std::shared_ptr<const Volume> ramp() {
+std::shared_ptr<const Volume> slantedRamp() {
   const glm::ivec3 dims(12);
   return volumeOf(gridOf(dims),
                   channelOf<std::uint8_t>(dims, [](int x, int y, int z) { return x + 5 * y + 9 * z; }));
 }
 
 TEST(CancelledBuilds, EndInEveryStage) {
-  const auto volume = ramp();
+  const auto volume = slantedRamp();
   const Channel& channel = volume->channels()[0];
   const auto macrocells = std::make_shared<const MacrocellGrid>(buildMacrocells(*volume, 2));
   ChannelAppearance look;
@@ -60,7 +60,7 @@ TEST(CancelledBuilds, EndWhereAnEditNeedsNoMeasurement) {
   scene.width = scene.height = 8;
   scene.channels.resize(1);
   scene.channels[0].rangeHi = 255;
-  const auto volume = ramp();
+  const auto volume = slantedRamp();
   const RenderPlan before(volume, scene);
   scene.channels[0].opacity = {{0, 0.5}, {1, 1}};
   EXPECT_TRUE(endsWhenToldTo(

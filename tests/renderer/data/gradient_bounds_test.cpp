@@ -18,12 +18,10 @@ namespace {
 
 using namespace test;
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
 /// The random inputs of the search.
-struct Draw {
+struct RandomInputs {
   std::mt19937 random;
-  explicit Draw(unsigned seed) : random(seed) {}
+  explicit RandomInputs(unsigned seed) : random(seed) {}
   double unit() { return std::uniform_real_distribution<double>(0, 1)(random); }
   double between(double lo, double hi) { return lo + (hi - lo) * unit(); }
   int among(int lo, int hi) { return lo + int(random() % unsigned(hi - lo + 1)); }
@@ -76,16 +74,17 @@ struct Draw {
 
 /// A coordinate in a macrocell that begins at voxel `low`: anywhere, or where something changes, exact to the
 /// last bit. The outermost cells extend half a voxel beyond the outer voxels' centres.
-float coordinateIn(Draw& draw, int low, int size, int count) {
+float coordinateIn(RandomInputs& draw, int low, int size, int count) {
   const float begin = low == 0 ? -0.5f : float(low),
               end = low + size >= count - 1 ? float(count) - 0.5f : float(low + size);
+  constexpr float infinity = std::numeric_limits<float>::infinity();
   float at = begin + float(draw.unit()) * (end - begin);
   switch (draw.among(0, 4)) {
     case 0:
       at = std::round(at);  // a voxel's centre
       break;
     case 1:
-      at = std::nextafter(std::round(at), draw.chance(0.5) ? -kInfinity : kInfinity);
+      at = std::nextafter(std::round(at), draw.chance(0.5) ? -infinity : infinity);
       break;
     case 2:
       at = draw.chance(0.5) ? begin : end;
@@ -97,7 +96,7 @@ float coordinateIn(Draw& draw, int low, int size, int count) {
 }
 
 /// Searches all macrocells of a plan up to the first violation; returns how many samples had extinction.
-int expectBound(Draw& draw, const RenderPlan& plan, int samplesPerCell) {
+int expectPlanBounds(RandomInputs& draw, const RenderPlan& plan, int samplesPerCell) {
   const kernel::SceneView& view = plan.view();
   const glm::ivec3 cells = view.majorants.cells;
   const int size = int(view.majorants.cellSize);
@@ -130,7 +129,7 @@ int expectBound(Draw& draw, const RenderPlan& plan, int samplesPerCell) {
 /// A volume with one kind of values: noise, few values, ramps, constants with a spike, or large values with
 /// small differences; floats include some that are not finite.
 template <class T>
-ChannelSource drawChannel(Draw& draw, glm::ivec3 dims) {
+ChannelSource drawChannel(RandomInputs& draw, glm::ivec3 dims) {
   constexpr double kMost = std::is_integral_v<T> ? double(std::numeric_limits<T>::max()) : 1000.0;
   constexpr double kLeast = std::is_signed_v<T> ? -kMost : 0.0;
   const int kind = draw.among(0, 4);
@@ -158,7 +157,7 @@ ChannelSource drawChannel(Draw& draw, glm::ivec3 dims) {
 
 template <class T>
 void searchForViolations(unsigned seed) {
-  Draw draw(seed);
+  RandomInputs draw(seed);
   int seen = 0;
   for (int trial = 0; trial < 60; ++trial) {
     const Grid grid = draw.grid();
@@ -186,7 +185,7 @@ void searchForViolations(unsigned seed) {
                                       << " dims " << grid.dims.x << ' ' << grid.dims.y << ' ' << grid.dims.z);
       plan = std::make_shared<const RenderPlan>(volume, scene, plan.get());
       const glm::ivec3 cells = plan->view().majorants.cells;
-      seen += expectBound(draw, *plan, 100 + 4000 / (cells.x * cells.y * cells.z));
+      seen += expectPlanBounds(draw, *plan, 100 + 4000 / (cells.x * cells.y * cells.z));
       if (testing::Test::HasFailure()) return;
     }
   }
@@ -204,7 +203,7 @@ TEST(GradientBounds, AreNeverBelowTheClassifiedValueForFloats) {
 /// A block of one value inside another value, with macrocells of four voxels. Macrocells in the interior of
 /// either are flat, whatever the offset and scale.
 template <class T>
-std::shared_ptr<const Volume> block() {
+std::shared_ptr<const Volume> nestedBlocks() {
   const glm::ivec3 dims(33);
   return volumeOf(gridOf(dims, {1, 0.5, 2}), channelOf<T>(
                                                  dims,
@@ -219,7 +218,7 @@ std::shared_ptr<const Volume> block() {
 
 template <class T>
 void expectNothingWhereNothingIsSteep() {
-  const auto volume = block<T>();
+  const auto volume = nestedBlocks<T>();
   Scene scene = frontScene(*volume, 1, 1);
   scene.channels[0] = solid(5);
   scene.channels[0].gradientOpacity = GradientOpacity{1, 10, {{0, 0}, {1, 1}}};
@@ -266,7 +265,7 @@ TEST(GradientBounds, AreTightWhereTheGradientIsOne) {
 }
 
 TEST(GradientBounds, AreAfterAnySeriesOfEditsWhatAFreshPlanHas) {
-  Draw draw(6);
+  RandomInputs draw(6);
   const glm::ivec3 dims(14, 11, 12);
   const auto wave = [](double phase) {
     return [phase](int x, int y, int z) {

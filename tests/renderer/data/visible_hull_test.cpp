@@ -25,7 +25,7 @@ double placeInFrame(const Camera& camera, const Grid& grid, glm::dvec3 voxel) {
   return std::max(std::abs(glm::dot(p, right)) / kAspect, std::abs(glm::dot(p, up))) / (away * tan);
 }
 
-Camera viewOf(const Volume& volume, const std::vector<ChannelAppearance>& channels) {
+Camera cameraFor(const Volume& volume, const std::vector<ChannelAppearance>& channels) {
   const auto hull = visibleHull(volume, buildCoarseMacrocells(volume), channels);
   return framingCamera(volume.grid(), kFovY, kAspect, hull);
 }
@@ -38,23 +38,23 @@ ChannelAppearance above(double from, double to = 255) {
   return look;
 }
 
-constexpr glm::ivec3 kDims{120, 90, 70};
+constexpr glm::ivec3 kBallDims{120, 90, 70};
 
 bool inBall(glm::dvec3 p, glm::dvec3 centre, double radius) { return glm::length(p - centre) <= radius; }
 
 /// A ball of 200 in a volume of 3.
 template <class T>
 ChannelSource ball(glm::dvec3 centre, double radius) {
-  return test::channelOf<T>(kDims, [=](int x, int y, int z) {
+  return test::channelOf<T>(kBallDims, [=](int x, int y, int z) {
     return inBall({x, y, z}, centre, radius) ? 200.0 : 3.0;
   });
 }
 
 template <class F>
 void forVoxels(F&& f) {
-  for (int z = 0; z < kDims.z; ++z)
-    for (int y = 0; y < kDims.y; ++y)
-      for (int x = 0; x < kDims.x; ++x) f(glm::dvec3(x, y, z));
+  for (int z = 0; z < kBallDims.z; ++z)
+    for (int y = 0; y < kBallDims.y; ++y)
+      for (int x = 0; x < kBallDims.x; ++x) f(glm::dvec3(x, y, z));
 }
 
 /// Largest distance of the ball's voxels from the middle of the frame.
@@ -69,10 +69,10 @@ double reachOfBall(const Camera& camera, const Grid& grid, glm::dvec3 centre, do
 TEST(VisibleHull, FillsTheFrameWithWhatCanBeSeenAndNotWithTheBox) {
   const glm::dvec3 centre(80, 30, 25);
   for (const bool real : {false, true}) {
-    const auto made =
-        test::volumeOf(test::gridOf(kDims), real ? ball<float>(centre, 18) : ball<std::uint8_t>(centre, 18));
+    const auto made = test::volumeOf(test::gridOf(kBallDims),
+                                     real ? ball<float>(centre, 18) : ball<std::uint8_t>(centre, 18));
     const Volume& volume = *made;
-    const Camera camera = viewOf(volume, {above(10)});
+    const Camera camera = cameraFor(volume, {above(10)});
     const double reach = reachOfBall(camera, volume.grid(), centre, 18);
     EXPECT_LT(reach, 1);
     EXPECT_GT(reach, 0.8);
@@ -88,12 +88,12 @@ TEST(VisibleHull, LeavesOutNothingThatCanBeSeen) {
     if (x == 117 && y == 87 && z == 3) return 12.0;
     return inBall({x, y, z}, {30, 40, 30}, 10) ? 200.0 : 3.0;
   };
-  const auto made = test::volumeOf(test::gridOf(kDims), test::channelOf<std::uint8_t>(kDims, value));
+  const auto made = test::volumeOf(test::gridOf(kBallDims), test::channelOf<std::uint8_t>(kBallDims, value));
   const Volume& volume = *made;
-  const Camera camera = viewOf(volume, {above(11)});
+  const Camera camera = cameraFor(volume, {above(11)});
   EXPECT_LT(placeInFrame(camera, volume.grid(), {117, 87, 3}), 1);
   EXPECT_LT(reachOfBall(camera, volume.grid(), {30, 40, 30}, 10), 1);
-  const Camera without = viewOf(volume, {above(13)});
+  const Camera without = cameraFor(volume, {above(13)});
   EXPECT_GT(placeInFrame(without, volume.grid(), {117, 87, 3}), 1);
 }
 
@@ -110,10 +110,11 @@ TEST(VisibleHull, HoldsEveryVoxelOfRandomScenesThatHasOpacity) {
         most = std::max(most, 250 - 100 * glm::length(glm::dvec3(x, y, z) - glm::dvec3(b)) / b.w);
       return std::max(most, 0.0);
     };
-    const auto made = test::volumeOf(test::gridOf(kDims), test::channelOf<std::uint16_t>(kDims, value));
+    const auto made =
+        test::volumeOf(test::gridOf(kBallDims), test::channelOf<std::uint16_t>(kBallDims, value));
     const Volume& volume = *made;
     const ChannelAppearance look = above(100 + 100 * random());
-    const Camera camera = viewOf(volume, {look});
+    const Camera camera = cameraFor(volume, {look});
     forVoxels([&](glm::dvec3 p) {
       if (!(std::round(value(int(p.x), int(p.y), int(p.z))) > look.rangeLo)) return;
       ASSERT_LE(placeInFrame(camera, volume.grid(), p), 1) << round;
@@ -124,28 +125,29 @@ TEST(VisibleHull, HoldsEveryVoxelOfRandomScenesThatHasOpacity) {
 TEST(VisibleHull, FramesAllVisibleChannelsAndNoneThatIsNot) {
   const glm::dvec3 left(25, 45, 35), right(95, 45, 35);
   const auto made =
-      test::volumeOf(test::gridOf(kDims), ball<std::uint8_t>(left, 8), ball<std::uint8_t>(right, 8));
+      test::volumeOf(test::gridOf(kBallDims), ball<std::uint8_t>(left, 8), ball<std::uint8_t>(right, 8));
   const Volume& volume = *made;
   std::vector<ChannelAppearance> looks{above(10), above(10)};
-  Camera camera = viewOf(volume, looks);
+  Camera camera = cameraFor(volume, looks);
   EXPECT_LT(reachOfBall(camera, volume.grid(), left, 8), 1);
   EXPECT_LT(reachOfBall(camera, volume.grid(), right, 8), 1);
-  const auto alone = viewOf(*test::volumeOf(test::gridOf(kDims), ball<std::uint8_t>(left, 8)), {above(10)});
+  const auto alone =
+      cameraFor(*test::volumeOf(test::gridOf(kBallDims), ball<std::uint8_t>(left, 8)), {above(10)});
   looks[1].visible = false;
-  EXPECT_EQ(viewOf(volume, looks), alone);
+  EXPECT_EQ(cameraFor(volume, looks), alone);
   looks[1].visible = true;
   looks[1].density = 0;
-  EXPECT_EQ(viewOf(volume, looks), alone);
+  EXPECT_EQ(cameraFor(volume, looks), alone);
   looks[1].density = 1;
   looks[1].opacity = {{0, 0}};
-  EXPECT_EQ(viewOf(volume, looks), alone);
+  EXPECT_EQ(cameraFor(volume, looks), alone);
 }
 
 TEST(VisibleHull, IsEmptyWhereNothingCanBeSeenAndThenTheBoxIsFramed) {
-  const auto made = test::volumeOf(test::gridOf(kDims), ball<std::uint8_t>({60, 45, 35}, 8));
+  const auto made = test::volumeOf(test::gridOf(kBallDims), ball<std::uint8_t>({60, 45, 35}, 8));
   const Volume& volume = *made;
   EXPECT_TRUE(visibleHull(volume, buildCoarseMacrocells(volume), std::vector{above(220)}).empty());
-  EXPECT_EQ(viewOf(volume, {above(220)}), framingCamera(volume.grid(), kFovY, kAspect));
+  EXPECT_EQ(cameraFor(volume, {above(220)}), framingCamera(volume.grid(), kFovY, kAspect));
 }
 
 TEST(VisibleHull, IsTheBoxWhereAllCanBeSeen) {
@@ -153,7 +155,7 @@ TEST(VisibleHull, IsTheBoxWhereAllCanBeSeen) {
     const auto made = test::volumeOf(
         test::gridOf(dims), test::channelOf<std::uint8_t>(dims, [](int, int, int) { return 100.0; }));
     const Volume& volume = *made;
-    EXPECT_EQ(viewOf(volume, {above(10)}), framingCamera(volume.grid(), kFovY, kAspect)) << dims.x;
+    EXPECT_EQ(cameraFor(volume, {above(10)}), framingCamera(volume.grid(), kFovY, kAspect)) << dims.x;
   }
 }
 

@@ -15,11 +15,6 @@ namespace {
 
 using namespace test;
 
-const std::atomic<bool> kNever = false;
-constexpr Method kAllMethods[] = {Method::superposed, Method::cumulative, Method::syncDda,
-                                  Method::nDda,       Method::raymarch,   Method::hybrid};
-constexpr BlendMode kBlends[] = {BlendMode::density, BlendMode::max, BlendMode::mix, BlendMode::composite};
-
 std::unique_ptr<Renderer> rendered(const std::shared_ptr<const Volume>& volume, const Scene& scene,
                                    int samples, bool record = true) {
   auto renderer = makeCpuRenderer(volume, 2);

@@ -24,8 +24,6 @@ namespace {
 
 using namespace test;
 
-const std::atomic<bool> kNever = false;
-
 Scene automaticScene(const Volume& volume) {
   Scene scene = orbitalScene(volume);
   scene.method = Method::automatic;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <thread>
 
 #include "renderer/core/error.h"
@@ -9,18 +8,12 @@
 #include "renderer/reference/render.h"
 #include "renderer/renderer.h"
 #include "tests/support/orbitals.h"
+#include "tests/support/statistics.h"
 
 namespace scolopax {
 namespace {
 
 using namespace test;
-
-const std::atomic<bool> kNever = false;
-
-bool sameBits(const Image& a, const Image& b) {
-  return a.pixels.size() == b.pixels.size() &&
-         std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(a.pixels[0])) == 0;
-}
 
 Image render(const std::shared_ptr<const Volume>& volume, const Scene& scene, int samples, int threads) {
   const auto renderer = makeCpuRenderer(volume, threads);

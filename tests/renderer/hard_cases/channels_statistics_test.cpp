@@ -11,14 +11,14 @@ namespace {
 
 using namespace test;
 
-const glm::ivec3 kDims(8, 8, 8);
 const glm::dvec3 kPalette[] = {kRed, kGreen, kBlue, {1, 1, 0}, {0, 1, 1}, {1, 0, 1}, kWhite};
 
 template <class F>
 std::shared_ptr<const Volume> manyChannels(int count, F&& fieldOf) {
+  const glm::ivec3 dims(8, 8, 8);
   std::vector<ChannelSource> sources;
-  for (int n = 0; n < count; ++n) sources.push_back(channelOf<float>(kDims, fieldOf(n)));
-  return std::make_shared<const Volume>(gridOf(kDims), std::move(sources));
+  for (int n = 0; n < count; ++n) sources.push_back(channelOf<float>(dims, fieldOf(n)));
+  return std::make_shared<const Volume>(gridOf(dims), std::move(sources));
 }
 
 TEST(ChannelCounts, OfOneTwelveAndThirtyTwoMatchTheReference) {

@@ -2,7 +2,6 @@
 // Clip planes and crop: through voxel centres and faces, along rays, through the eye, and with nothing left.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <functional>
 
 #include "renderer/metrics/metrics.h"
@@ -14,20 +13,6 @@ namespace scolopax {
 namespace {
 
 using namespace test;
-
-constexpr Method kMethods[] = {Method::superposed, Method::cumulative, Method::syncDda,
-                               Method::nDda,       Method::raymarch,   Method::hybrid};
-
-/// Checks quadrature, which is exact in a homogeneous box: every pixel has optical thickness `depth`.
-void expectMarched(const std::shared_ptr<const Volume>& volume, Scene scene, double depth) {
-  for (const Method method : {Method::raymarch, Method::hybrid})
-    for (const double step : {0.3, 5.0}) {
-      scene.method = method;
-      scene.step = step;
-      for (const glm::vec4& pixel : renderSamples(volume, scene, 4).pixels)
-        ASSERT_NEAR(pixel.a, -std::expm1(-depth), 1e-4 * depth) << nameOf(method) << ' ' << step;
-    }
-}
 
 TEST(Clipping, LeavesOfABoxWhatIsOnTheKeptSideOfAPlane) {
   const glm::ivec3 dims(6, 6, 9);
@@ -41,13 +26,13 @@ TEST(Clipping, LeavesOfABoxWhatIsOnTheKeptSideOfAPlane) {
       scene.clip = {{{0, 0, 0.5 * voxel}, {0, 0, 3 * sign}, {}}};
       const double depth = 0.7 * 0.5 * (sign > 0 ? 8.5 - voxel : voxel + 0.5);
       if (depth == 0) {
-        for (const Method method : kMethods)
+        for (const Method method : kAllMethods)
           for (const glm::vec4& pixel : renderAnalog(volume, scene, method, 2).pixels)
             ASSERT_LT(pixel.a, 1e-6) << nameOf(method);
         continue;
       }
       expectThickness(volume, scene, depth, kRed, 300);
-      expectMarched(volume, scene, depth);
+      expectMarchedThickness(volume, scene, depth, {0.3, 5.0});
     }
 }
 
@@ -69,7 +54,7 @@ TEST(Clipping, AtAPlaneAlongTheRaysKeepsThoseInThePlane) {
       int kept = 0;
       for (int column = 0; column < 8; ++column) kept += reference.pixels[std::size_t(column)].a > 0.5f;
       EXPECT_EQ(kept, sign > 0 ? 5 : 4);
-      for (const Method method : kMethods) {
+      for (const Method method : kAllMethods) {
         const Image found = renderAnalog(volume, scene, method, 4);
         for (std::size_t i = 0; i < found.pixels.size(); ++i)
           ASSERT_NEAR(found.pixels[i].a, reference.pixels[i].a, 1e-3) << nameOf(method) << " pixel " << i;
@@ -82,7 +67,7 @@ TEST(Clipping, OfEverythingLeavesNothing) {
   Scene scene = testScene(TestScene::lumps)->scene;
   scene.shading = scene.shadows = true;
   const auto expectNothing = [&](const char* what) {
-    for (const Method method : kMethods)
+    for (const Method method : kAllMethods)
       for (const glm::vec4& pixel : renderAnalog(volume, scene, method, 2).pixels)
         ASSERT_EQ(pixel, glm::vec4(0)) << nameOf(method) << ' ' << what;
   };
@@ -107,7 +92,7 @@ TEST(Clipping, OfEverythingLeavesNothing) {
 
 TEST(Clipping, OfNothingChangesNoBit) {
   const auto volume = testScene(TestScene::lumps)->volume;
-  for (const Method method : kMethods) {
+  for (const Method method : kAllMethods) {
     Scene scene = testScene(TestScene::lumps)->scene;
     scene.shading = scene.shadows = true;
     const Image before = renderAnalog(volume, scene, method, 3);
@@ -148,7 +133,7 @@ TEST(Clipping, LeavesNoLightThroughWhatLiesAlongAFace) {
   const glm::ivec3 dims(8, 8, 16);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int) { return 1; }));
   for (const int kind : {0, 1, 2})
-    for (const Method method : kMethods) {
+    for (const Method method : kAllMethods) {
       Scene scene = frontScene(*volume, 8, 8);
       scene.shadows = true;
       scene.method = method;
@@ -180,7 +165,7 @@ TEST(Clipping, ByABoxKeepsTheVolumesOwnFaces) {
   scene.channels = {solid(10, kRed)};
   scene.crop = Crop{{-0.5, -0.5, 3}, {8.5, 8.5, 6}, Crop::kInnermost};
   const auto reference = reference::renderReference(*volume, scene, 1).image;
-  for (const Method method : kMethods) {
+  for (const Method method : kAllMethods) {
     const Image found = renderAnalog(volume, scene, method, 4);
     for (std::size_t i = 0; i < 4; ++i) {
       EXPECT_GT(reference.pixels[i].a, 0.9f);

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 
 #include "tests/renderer/hard_cases/hard_scenes.h"
 #include "tests/support/estimator_scenes.h"
@@ -12,9 +11,6 @@ namespace scolopax {
 namespace {
 
 using namespace test;
-
-constexpr Method kMethods[] = {Method::superposed, Method::cumulative, Method::syncDda,
-                               Method::nDda,       Method::raymarch,   Method::hybrid};
 
 void interpolateAll(Scene& scene, Interpolation interpolation) {
   for (ChannelAppearance& channel : scene.channels) channel.interpolation = interpolation;
@@ -58,7 +54,7 @@ std::shared_ptr<const Volume> block(glm::ivec3 dims) {
 TEST(Filters, OfTheNearestVoxelShowABlockOfVoxels) {
   // Rays along z through the middle of the block pass through three voxels, and nothing else is there.
   const auto volume = block(glm::ivec3(9));
-  for (const Method method : kMethods) {
+  for (const Method method : kAllMethods) {
     Scene scene = frontScene(*volume, 18, 18);
     scene.filter = PixelFilter::point;
     scene.channels[0] = ramp(0, 1, 0.4, kRed);
@@ -83,7 +79,7 @@ TEST(Filters, OfTheNearestVoxelKeepLabelsApart) {
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int x, int y, int z) {
                                  return (x / 2 + y / 2 + z / 2) % 2 * 2;
                                }));
-  for (const Method method : kMethods)
+  for (const Method method : kAllMethods)
     for (const double density : {1.0, 1e6}) {
       Scene scene = frontScene(*volume, 12, 12);
       scene.camera.eye = {30, 20, -40};
@@ -154,7 +150,7 @@ TEST(Filters, OfAConstantFieldChangeNothing) {
   // The spline of equal voxels is their value to the last bit, here at a jump of the curve.
   const glm::ivec3 dims(7, 6, 5);
   const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, [](int, int, int) { return 0.3; }));
-  for (const Method method : kMethods) {
+  for (const Method method : kAllMethods) {
     Scene scene = frontScene(*volume, 9, 9);
     scene.channels[0] = ramp(0, 1, 0.2, kRed);
     const double at = double(0.3f);

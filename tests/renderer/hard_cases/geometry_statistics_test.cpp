@@ -12,8 +12,6 @@ namespace {
 
 using namespace test;
 
-constexpr int kSide = 20, kSamples = 200;
-
 /// Two lumpy channels, red and blue; `density` per world unit.
 struct Lumpy {
   std::shared_ptr<const Volume> volume;

@@ -27,24 +27,6 @@ void setAll(Scene& scene, const Volume& volume, double lowShare, double highShar
     scene.channels[n].gradientOpacity = factorBetween(volume, n, lowShare, highShare, factor);
 }
 
-/// Compares every tracker with the reference, with rays through pixel centres; samples may have any value.
-void expectUnbiased(const std::shared_ptr<const Volume>& volume, Scene scene) {
-  scene.filter = PixelFilter::point;
-  const auto expected = reference::renderReference(*volume, scene, 1);
-  for (const Method method : kTrackers)
-    EXPECT_TRUE(haveMean(replicate(volume, scene, method), scene, expected)) << nameOf(method);
-}
-
-/// Checks quadrature, which is exact where the scene is linear between its samples.
-void expectMarched(const std::shared_ptr<const Volume>& volume, Scene scene, double depth) {
-  for (const Method method : {Method::raymarch, Method::hybrid}) {
-    scene.method = method;
-    scene.step = 0.3;
-    for (const glm::vec4& pixel : renderSamples(volume, scene, 4).pixels)
-      ASSERT_NEAR(pixel.a, -std::expm1(-depth), 1e-4 * depth) << nameOf(method);
-  }
-}
-
 TEST(GradientThickness, OfARampIsThatOfItsOneGradient) {
   for (const glm::dvec3 spacing : {glm::dvec3(1, 2, 1), glm::dvec3(1, 2, 0.25), glm::dvec3(1, 2, 5)})
     for (const double slope : {1.0, -0.25}) {
@@ -61,7 +43,7 @@ TEST(GradientThickness, OfARampIsThatOfItsOneGradient) {
           std::swap(scene.channels[0].gradientOpacity->rangeLo, scene.channels[0].gradientOpacity->rangeHi);
         const double depth = 0.5 * (reversed ? 0.75 : 0.25) * 9 * spacing.z;
         expectThickness(volume, scene, depth, kRed, 300);
-        expectMarched(volume, scene, depth);
+        expectMarchedThickness(volume, scene, depth, {0.3});
       }
     }
 }
@@ -78,7 +60,7 @@ TEST(GradientThickness, OfAParabolaIsThePlaceOfTheKnots) {
       scene.channels = {solid(0.4, kGreen)};
       scene.channels[0].gradientOpacity = opacity;
       expectThickness(volume, scene, 0.4 * length, kGreen, 300);
-      if (opacity.rangeLo != opacity.rangeHi) expectMarched(volume, scene, 0.4 * length);
+      if (opacity.rangeLo != opacity.rangeHi) expectMarchedThickness(volume, scene, 0.4 * length, {0.3});
     };
     expectDepth({4, 10, kRising}, 1.5 + 6.5);
     expectDepth({10, 4, kRising}, 2.5 + 1.5);

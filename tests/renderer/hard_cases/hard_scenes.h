@@ -1,34 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shared by the hard cases: colours of zeros and ones, fields with some structure, views, and comparisons.
+// Shared by the hard cases: fields with some structure, views, and comparisons.
 #pragma once
+#include <initializer_list>
+
 #include "tests/support/statistics.h"
 #include "tests/support/volumes.h"
 
 namespace scolopax::test {
 
-constexpr glm::dvec3 kRed(1, 0, 0), kGreen(0, 1, 0), kBlue(0, 0, 1), kWhite(1, 1, 1);
-
-/// Opacity rises from 0 at lo to 1 at hi.
-inline ChannelAppearance ramp(double lo, double hi, double density, glm::dvec3 color = kWhite) {
-  ChannelAppearance a;
-  a.rangeLo = lo;
-  a.rangeHi = hi;
-  a.density = density;
-  a.color = {{0, color}};
-  return a;
-}
+/// The size of small volumes, with a different number of voxels along every axis.
+inline constexpr glm::ivec3 kSmallDims(7, 6, 5);
+/// Pictures that are compared with the reference: pixels along a side, and samples per pixel.
+inline constexpr int kSide = 20, kSamples = 200;
 
 /// A lumpy field between 0 and 1, different for every `kind`.
 inline auto lumps(int kind = 0) {
   return [kind](int x, int y, int z) {
     return 0.5 + 0.5 * std::sin(0.9 * x + kind) * std::cos(1.3 * y - 0.5 * kind) * std::sin(0.7 * z + 1.1);
   };
-}
-
-/// A picture with one value everywhere: the closed form of a scene whose pixels are all the same.
-inline reference::ReferenceImage flat(const Scene& scene, glm::dvec4 value) {
-  const std::size_t pixels = std::size_t(scene.width) * std::size_t(scene.height);
-  return {{scene.width, scene.height, std::vector<glm::vec4>(pixels, glm::vec4(value))}, {}, 0};
 }
 
 /// Compares every tracker, and the reference, with optical thickness `depth` of one colour in every pixel.
@@ -47,6 +36,18 @@ inline void expectThickness(const std::shared_ptr<const Volume>& volume, Scene s
 inline void expectReference(const std::shared_ptr<const Volume>& volume, Scene scene, int samples) {
   scene.filter = PixelFilter::point;
   expectTrackersMatchReference(volume, scene, samples, 1);
+}
+
+/// Compares both kinds of quadrature with optical thickness `depth` in every pixel, where they are exact.
+inline void expectMarchedThickness(const std::shared_ptr<const Volume>& volume, Scene scene, double depth,
+                                   std::initializer_list<double> steps) {
+  for (const Method method : {Method::raymarch, Method::hybrid})
+    for (const double step : steps) {
+      scene.method = method;
+      scene.step = step;
+      for (const glm::vec4& pixel : renderSamples(volume, scene, 4).pixels)
+        ASSERT_NEAR(pixel.a, -std::expm1(-depth), 1e-4 * depth) << nameOf(method) << ' ' << step;
+    }
 }
 
 /// A perspective view; the caller still has to set the channels.

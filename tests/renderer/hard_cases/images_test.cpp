@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <limits>
 
 #include "renderer/core/error.h"
 #include "renderer/data/film.h"
@@ -19,13 +17,6 @@ namespace {
 
 using namespace test;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-bool sameBits(const Image& a, const Image& b) {
-  return a.pixels.size() == b.pixels.size() &&
-         std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(a.pixels[0])) == 0;
-}
 double largestAlpha(const Image& image) {
   float largest = 0;
   for (const glm::vec4& p : image.pixels) largest = std::max(largest, p.a);

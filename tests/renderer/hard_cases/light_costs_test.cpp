@@ -11,10 +11,6 @@ namespace {
 
 using namespace test;
 
-constexpr Method kMethods[] = {Method::superposed, Method::cumulative, Method::syncDda,
-                               Method::nDda,       Method::raymarch,   Method::hybrid};
-constexpr int kSamples = 4;
-
 class LightCosts : public testing::TestWithParam<BlendMode> {
  protected:
   LightCosts() : made_(*testScene(TestScene::lumps)) {
@@ -22,8 +18,9 @@ class LightCosts : public testing::TestWithParam<BlendMode> {
     scene_.blend = GetParam();
     scene_.width = scene_.height = 16;
   }
+  static constexpr int kCostSamples = 4;
   RenderStats stats(const Scene& scene, Method method) const {
-    return statsOf(made_.volume, scene, method, kSamples);
+    return statsOf(made_.volume, scene, method, kCostSamples);
   }
   /// Number of collisions in all samples, for methods in which a ray ends at one collision.
   double collisions(Scene scene, Method method) const {
@@ -31,9 +28,9 @@ class LightCosts : public testing::TestWithParam<BlendMode> {
     const auto renderer = makeCpuRenderer(made_.volume, 0);
     renderer->setScene(scene);
     const std::atomic<bool> never = false;
-    for (int i = 0; i < kSamples; ++i) renderer->renderSample(never);
+    for (int i = 0; i < kCostSamples; ++i) renderer->renderSample(never);
     double sum = 0;
-    for (const glm::vec4& p : renderer->image().pixels) sum += double(p.a) * kSamples;
+    for (const glm::vec4& p : renderer->image().pixels) sum += double(p.a) * kCostSamples;
     return sum;
   }
   static void expectSame(const RenderStats& a, const RenderStats& b, Method method) {
@@ -49,7 +46,7 @@ INSTANTIATE_TEST_SUITE_P(BlendModes, LightCosts, testing::ValuesIn(kBlends),
                          [](const auto& tested) { return std::string(nameOf(tested.param)); });
 
 TEST_P(LightCosts, AreNoneWhereLightIsOffHoweverManyLightsThereAre) {
-  for (const Method method : kMethods) {
+  for (const Method method : kAllMethods) {
     Scene bare = scene_;
     bare.lights.clear();
     for (auto& channel : bare.channels) channel.material = {};
@@ -59,7 +56,7 @@ TEST_P(LightCosts, AreNoneWhereLightIsOffHoweverManyLightsThereAre) {
 
 TEST_P(LightCosts, OfShadingAreSixFetchesForEveryChannelShownAndNoRay) {
   scene_.shading = false;
-  for (const Method method : kMethods) {
+  for (const Method method : kAllMethods) {
     Scene shaded = scene_;
     shaded.shading = true;
     const RenderStats off = stats(scene_, method), on = stats(shaded, method);
@@ -77,7 +74,7 @@ TEST_P(LightCosts, OfShadingAreSixFetchesForEveryChannelShownAndNoRay) {
 }
 
 TEST_P(LightCosts, OfShadowsAreRaysAndNoGradient) {
-  for (const Method method : kMethods) {
+  for (const Method method : kAllMethods) {
     Scene shadowed = scene_;
     shadowed.shadows = true;
     const RenderStats off = stats(scene_, method), on = stats(shadowed, method);
@@ -94,7 +91,7 @@ TEST_P(LightCosts, OfShadowsAreRaysAndNoGradient) {
 }
 
 TEST_P(LightCosts, OfShadowsOfBlackLightsAreNone) {
-  for (const Method method : kMethods) {
+  for (const Method method : kAllMethods) {
     Scene black = scene_;
     black.shadows = true;
     black.lights[0].intensity = 0;
@@ -110,7 +107,7 @@ TEST_P(LightCosts, OfShadowsOfBlackLightsAreNone) {
 
 TEST_P(LightCosts, OfShadowsOnMatterThatIsFullyAmbientAreNone) {
   for (auto& channel : scene_.channels) channel.material = {1, 0, 0, 1};
-  for (const Method method : kMethods) {
+  for (const Method method : kAllMethods) {
     Scene shadowed = scene_;
     shadowed.shadows = true;
     expectSame(stats(shadowed, method), stats(scene_, method), method);

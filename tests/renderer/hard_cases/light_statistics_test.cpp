@@ -2,8 +2,6 @@
 // Hard cases with lighting: every tracker, with shading and shadows, against the reference.
 #include <gtest/gtest.h>
 
-#include <limits>
-
 #include "tests/renderer/hard_cases/hard_scenes.h"
 #include "tests/support/agreement.h"
 #include "tests/support/estimator_scenes.h"
@@ -13,10 +11,7 @@ namespace {
 
 using namespace test;
 
-constexpr int kSide = 8;
-const glm::ivec3 kDims(7, 6, 5);
-constexpr double kLargest = std::numeric_limits<float>::max();
-constexpr double kDenormal = std::numeric_limits<float>::denorm_min();
+constexpr int kLitSide = 8;  // of pictures, in pixels
 
 /// Switches on shading and shadows, with different materials and, unless the scene has lights, both kinds of
 /// light.
@@ -26,14 +21,14 @@ Scene lit(const Volume& volume, Scene scene) {
   if (!lights.empty()) scene.lights = lights;
   scene.shading = scene.shadows = true;
   scene.filter = PixelFilter::point;
-  scene.width = scene.height = kSide;
+  scene.width = scene.height = kLitSide;
   return scene;
 }
 
 void expectMatches(const std::shared_ptr<const Volume>& volume, const Scene& scene) {
   const auto expected = reference::renderReference(*volume, scene, 1);
   double alpha = 0;
-  for (const glm::vec4& pixel : expected.image.pixels) alpha += double(pixel.a) / (kSide * kSide);
+  for (const glm::vec4& pixel : expected.image.pixels) alpha += double(pixel.a) / (kLitSide * kLitSide);
   EXPECT_GT(alpha, 0.05) << "there is next to nothing to see";
   for (const Method method : kTrackers)
     EXPECT_TRUE(haveMean(replicate(volume, scene, method), scene, expected)) << nameOf(method);
@@ -66,8 +61,9 @@ TEST_P(LightInEveryBlendMode, OnVoxelsOfEveryKindMatchesTheReference) {
     state = state * 1664525u + 1013904223u;
     return (state >> 20) % 32 ? float(state >> 8) * 0x1p-24f : kinds[(state >> 24) % 7];
   };
-  const auto volume = volumeOf(gridOf(kDims), channelOf<float>(kDims, value), channelOf<float>(kDims, value));
-  Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kSide);
+  const auto volume =
+      volumeOf(gridOf(kSmallDims), channelOf<float>(kSmallDims, value), channelOf<float>(kSmallDims, value));
+  Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kLitSide);
   scene.blend = GetParam();
   scene.channels = {ramp(0, 1, 0.3, kGreen), ramp(0, 2, 0.5, kRed)};
   expectMatches(volume, lit(*volume, scene));
@@ -77,9 +73,9 @@ TEST_P(LightInEveryBlendMode, OnTwelveChannelsMatchesTheReference) {
   std::vector<ChannelSource> sources;
   for (int n = 0; n < 12; ++n)
     sources.push_back(
-        channelOf<std::uint8_t>(kDims, [&](int x, int y, int z) { return 255 * lumps(n)(x, y, z); }));
-  const auto volume = std::make_shared<const Volume>(gridOf(kDims), std::move(sources));
-  Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kSide);
+        channelOf<std::uint8_t>(kSmallDims, [&](int x, int y, int z) { return 255 * lumps(n)(x, y, z); }));
+  const auto volume = std::make_shared<const Volume>(gridOf(kSmallDims), std::move(sources));
+  Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kLitSide);
   scene.blend = GetParam();
   scene = lit(*volume, scene);
   scene.lights.resize(1);
@@ -105,8 +101,8 @@ TEST(Light, OnTinyAndHugeRangesOfValuesMatchesTheReference) {
        {std::pair(0.0, 2000 * kDenormal), std::pair(-1e-38, 1e-38), std::pair(0.0, 1e-25),
         std::pair(-1e25, 1e25), std::pair(-kLargest, kLargest), std::pair(300.0, 299.9)}) {
     const auto value = [lo = lo, hi = hi](int x, int y, int z) { return lo + (hi - lo) * lumps(1)(x, y, z); };
-    const auto volume = volumeOf(gridOf(kDims), channelOf<float>(kDims, value));
-    Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kSide);
+    const auto volume = volumeOf(gridOf(kSmallDims), channelOf<float>(kSmallDims, value));
+    Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kLitSide);
     scene.channels = {ramp(lo, hi, 0.5, kGreen)};
     SCOPED_TRACE(testing::Message() << lo << " to " << hi);
     expectMatches(volume, lit(*volume, scene));
@@ -116,8 +112,8 @@ TEST(Light, OnTinyAndHugeRangesOfValuesMatchesTheReference) {
 TEST(Light, OnTheFullRangeOfIntegersMatchesTheReference) {
   const auto expectOf = [](auto zero, double lo, double hi) {
     const auto value = [=](int x, int y, int z) { return lo + (hi - lo) * lumps(1)(x, y, z); };
-    const auto volume = volumeOf(gridOf(kDims), channelOf<decltype(zero)>(kDims, value));
-    Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kSide);
+    const auto volume = volumeOf(gridOf(kSmallDims), channelOf<decltype(zero)>(kSmallDims, value));
+    Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kLitSide);
     scene.channels = {ramp(lo, hi, 0.5, kGreen)};
     expectMatches(volume, lit(*volume, scene));
   };
@@ -128,8 +124,8 @@ TEST(Light, OnTheFullRangeOfIntegersMatchesTheReference) {
 
 TEST(Light, OnAStepMatchesTheReference) {
   // lo == hi: every point with a gradient is shaded fully.
-  const auto volume = volumeOf(gridOf(kDims), channelOf<float>(kDims, lumps(1)));
-  Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kSide);
+  const auto volume = volumeOf(gridOf(kSmallDims), channelOf<float>(kSmallDims, lumps(1)));
+  Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kLitSide);
   scene.channels = {ramp(0.5, 0.5, 0.5, kGreen)};
   expectMatches(volume, lit(*volume, scene));
 }
@@ -211,7 +207,7 @@ TEST(Shadows, OfABoxAreKnownFromOneThousandthToOneMillion) {
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int) { return 1; }));
   for (const double depth : {1e-3, 0.1, 1.0, 10.0, 1e3, 1e6})
     for (const double to : {1.0, -1.0}) {
-      Scene scene = frontScene(*volume, kSide, kSide);
+      Scene scene = frontScene(*volume, kLitSide, kLitSide);
       scene.channels[0] = solid(depth / 8);
       scene.channels[0].material = {0.2, 0, 0, 1};
       scene.shadows = true;

@@ -14,8 +14,6 @@ namespace {
 
 using namespace test;
 
-constexpr Method kMethods[] = {Method::superposed, Method::cumulative, Method::syncDda,
-                               Method::nDda,       Method::raymarch,   Method::hybrid};
 const glm::dvec3 kColor(0.8, 0.4, 0.2);
 
 /// A slab half of which is in the shadow of a wall, and whose silhouette halves the only pixel.
@@ -80,7 +78,7 @@ struct LinearField {
     scene.lights = lights;
     scene.shading = true;
     scene.shadows = shadows;
-    for (const Method method : kMethods) {
+    for (const Method method : kAllMethods) {
       const Image image = renderAnalog(volume, scene, method, 4);
       int seen = 0;
       for (const glm::vec4& p : image.pixels) {
@@ -235,7 +233,7 @@ TEST(ExactLight, FromExactlyBehindHasNoHighlight) {
     scene.lights = {{LightType::directional, {3, 5, -7}, glm::dvec3(1), 1}};
     scene.shading = true;
     int seen = 0;
-    for (const Method method : kMethods)
+    for (const Method method : kAllMethods)
       for (const glm::vec4& p : renderAnalog(volume, scene, method, 2).pixels) {
         if (!(p.a > 0.1f)) continue;
         ++seen;
@@ -271,7 +269,7 @@ TEST(ExactLight, ThatNothingIsInTheWayOfIsNotDimmedBySwitchingShadowsOn) {
   scene.lights = {{LightType::directional, {0, 0, 1}, {1, 0.5, 2}, 0.6},
                   {LightType::point, {1, 2, -9}, glm::dvec3(1), 0.3}};
   for (const bool shading : {false, true})
-    for (const Method method : kMethods) {
+    for (const Method method : kAllMethods) {
       scene.shading = shading;
       const auto radiance = [&](bool shadows) {
         scene.shadows = shadows;
@@ -290,19 +288,17 @@ TEST(ExactLight, ThatCannotBeIsRefused) {
   const auto volume = volumeOf(gridOf({3, 3, 3}), channelOf<float>({3, 3, 3}, lumps()));
   const auto renderer = makeCpuRenderer(volume, 1);
   const Scene good = frontScene(*volume, 4, 4);
-  const double kNaN = std::numeric_limits<double>::quiet_NaN(),
-               kInf = std::numeric_limits<double>::infinity();
   const auto refused = [&](const Light& light) {
     Scene scene = good;
     scene.shading = true;
     scene.lights = {light};
     EXPECT_THROW(renderer->setScene(scene), Error);
   };
-  for (const double bad : {kNaN, kInf, -1.0}) {
+  for (const double bad : {kNaN, kInfinity, -1.0}) {
     refused({LightType::headlight, {}, glm::dvec3(1), bad});
     refused({LightType::headlight, {}, glm::dvec3(1, bad, 1), 1});
   }
-  for (const double bad : {kNaN, kInf}) {
+  for (const double bad : {kNaN, kInfinity}) {
     refused({LightType::directional, {1, bad, 0}, glm::dvec3(1), 1});
     refused({LightType::point, {1, bad, 0}, glm::dvec3(1), 1});
   }
@@ -322,7 +318,7 @@ TEST(ExactBlend, OfIdenticalChannelsInMaxShowsTheFirstAlone) {
       channel = ramp(0, 1, 0.5, n == first ? kRed : kBlue);
       channel.visible = n >= first;
     }
-    for (const Method method : kMethods) {
+    for (const Method method : kAllMethods) {
       double red = 0;
       for (const glm::vec4& p : renderAnalog(volume, scene, method, 2).pixels) {
         ASSERT_EQ(p.b, 0) << nameOf(method);
@@ -344,7 +340,7 @@ TEST(ExactBlend, OfIdenticalChannelsInMixIsTheirWeightedSum) {
     scene.channels[n] = ramp(0, 1, 0.5, glm::dvec3(n == 0, n == 1, n == 2));
     scene.channels[n].weight = weights[n];
   }
-  for (const Method method : kMethods)
+  for (const Method method : kAllMethods)
     for (const glm::vec4& p : renderAnalog(volume, scene, method, 2).pixels)
       for (int c = 0; c < 3; ++c)
         ASSERT_NEAR(double(p[c]), weights[c] * double(p.a), 1e-5) << nameOf(method) << " component " << c;

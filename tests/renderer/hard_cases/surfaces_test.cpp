@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "tests/renderer/hard_cases/hard_scenes.h"
-#include "tests/support/estimator_scenes.h"
 
 namespace scolopax {
 namespace {
@@ -25,8 +24,8 @@ ChannelAppearance surfaces(std::vector<Isovalue> isovalues, glm::dvec3 color = k
 /// Compares one sample of each kind of quadrature with the reference, in all components. At most
 /// `silhouettes` of the pixels may differ: where a ray grazes a surface, rounding decides whether it meets
 /// it.
-void expectSame(const std::shared_ptr<const Volume>& volume, Scene scene, int silhouettes = 0,
-                double tolerance = 2e-5) {
+void expectSameAsReference(const std::shared_ptr<const Volume>& volume, Scene scene, int silhouettes = 0,
+                           double tolerance = 2e-5) {
   scene.filter = PixelFilter::point;
   const auto expected = reference::renderReference(*volume, scene, 1);
   double seen = 0;
@@ -56,7 +55,7 @@ TEST(Surfaces, AreMetOnceInCellsOfAnySize) {
     Scene scene = viewFrom(*volume, {-9, -12, -20}, {6, 4, 8}, 40, 48);
     scene.macrocell = macrocell;
     scene.channels = {surfaces({{0.52, 0.3, kRed}, {0.8, 0.5, kGreen}, {0.15, 1, kBlue}})};
-    expectSame(volume, scene, 4);
+    expectSameAsReference(volume, scene, 4);
   }
 }
 
@@ -80,14 +79,14 @@ TEST(Surfaces, OfSplinesAreMetOnTheSpline) {
   scene.crop.reset();
   for (const double value : {129.0, 125.3}) {
     scene.channels[0].isovalues = {{value, 0.4, kRed}};
-    expectSame(volume, scene, 12);
+    expectSameAsReference(volume, scene, 12);
   }
   const glm::ivec3 size(9, 8, 10);
   const auto smooth = volumeOf(gridOf(size, {1, 0.6, 1.4}), channelOf<float>(size, lumps()));
   scene = viewFrom(*smooth, {-9, -12, -20}, {4, 2, 6}, 30, 32);
   scene.channels = {surfaces({{0.5, 0.3, kRed}, {0.7, 0.5, kGreen}})};
   scene.channels[0].interpolation = Interpolation::cubic;
-  expectSame(smooth, scene, 6);
+  expectSameAsReference(smooth, scene, 6);
 }
 
 TEST(Surfaces, OnGridsOfAnyShapeDoNotShadowThemselves) {
@@ -126,7 +125,7 @@ TEST(Surfaces, ThroughSaddlesAreMetBeyondRounding) {
   const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, lumps()));
   Scene scene = viewFrom(*volume, {-9, -12, -20}, {6, 4, 8}, 40, 48);
   scene.channels = {surfaces({{0.5, 0.3, kRed}})};
-  expectSame(volume, scene, 12);  // of 2304
+  expectSameAsReference(volume, scene, 12);  // of 2304
 }
 
 TEST(Surfaces, OfWholeNumbersAtAndBetweenStoredValues) {
@@ -138,7 +137,7 @@ TEST(Surfaces, OfWholeNumbersAtAndBetweenStoredValues) {
     SCOPED_TRACE(value);
     Scene scene = viewFrom(*volume, {-9, -12, -20}, {5.5, 5, 5.5}, 40, 48);
     scene.channels = {surfaces({{value, 0.4, kRed}})};
-    expectSame(volume, scene, 8);
+    expectSameAsReference(volume, scene, 8);
   }
 }
 
@@ -151,9 +150,9 @@ TEST(Surfaces, AlongTheFacesOfCells) {
     SCOPED_TRACE(value);
     Scene scene = frontScene(*volume, 16, 16);  // half of the rays pass through voxel centres
     scene.channels = {surfaces({{value, 0.4, kRed}, {5, 0.25, kBlue}})};
-    expectSame(volume, scene);
+    expectSameAsReference(volume, scene);
     scene.camera.eye = 2.0 * scene.camera.target - scene.camera.eye;
-    expectSame(volume, scene);
+    expectSameAsReference(volume, scene);
   }
 }
 
@@ -169,7 +168,7 @@ TEST(Surfaces, ThatCoincideAreMetInOrder) {
       scene.channels = {surfaces({{0.5, 0.5, kRed}, {0.5 + apart, 0.25, kGreen}}),
                         surfaces({{0.5, 0.75, kBlue}})};
       // Rays end at a transmittance of 1e-4. Roots that are closer than floats tell are met in either order.
-      expectSame(volume, scene, apart == 1e-5 ? 10 : 3, 1.2e-4);
+      expectSameAsReference(volume, scene, apart == 1e-5 ? 10 : 3, 1.2e-4);
     }
   }
 }
@@ -196,7 +195,7 @@ TEST(Surfaces, AtValuesOfEveryTypeAndSlope) {
       look.gamma = 1.7;
       look.color = {{0, kRed}, {1, kBlue}};
       scene.channels[n] = look;
-      expectSame(volume, scene, 3);
+      expectSameAsReference(volume, scene, 3);
     }
   }
 }
@@ -212,7 +211,7 @@ TEST(Surfaces, AtPeaksOfAnyWidth) {
     look.opacity = {{0, 0},   {0.4 - width, 0}, {0.4 - width, 0.2}, {0.4, 0.9}, {0.4 + width, 0.1},
                     {0.7, 0}, {0.75, 0.5},      {0.85, 0.5},        {0.9, 0}};
     look.peaks = Peaks::only;
-    expectSame(volume, scene, 3);
+    expectSameAsReference(volume, scene, 3);
   }
 }
 
@@ -227,11 +226,11 @@ TEST(Surfaces, NearVoxelsThatAreNotFiniteAndClipPlanes) {
   const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, holed), channelOf<float>(dims, lumps(1)));
   Scene scene = viewFrom(*volume, {-9, -12, -20}, {6.5, 6, 5.5}, 40, 48);
   scene.channels = {surfaces({{0.52, 0.6, kRed}}), surfaces({{0.3, 0.5, kBlue}})};
-  expectSame(volume, scene, 3);
+  expectSameAsReference(volume, scene, 3);
   scene.clip = {{{6, 6, 6}, {1, 0.3, -0.4}, {}}, {{5, 7, 6}, {-0.2, 1, 0.1}, std::vector<int>{1}}};
-  expectSame(volume, scene, 3);
+  expectSameAsReference(volume, scene, 3);
   scene.crop = Crop{{3, 2, 4}, {9, 10, 8}, 0x5a3c9e1u};
-  expectSame(volume, scene, 4);
+  expectSameAsReference(volume, scene, 4);
 }
 
 TEST(Surfaces, InVolumesOfSingleLayers) {
@@ -244,7 +243,7 @@ TEST(Surfaces, InVolumesOfSingleLayers) {
     const glm::dvec3 centre(volume->grid().worldFromVoxel * glm::dvec4(glm::dvec3(dims - 1) * 0.5, 1));
     Scene scene = viewFrom(*volume, centre + glm::dvec3(4, -5, 9), centre, 50, 32);
     scene.channels = {surfaces({{0.1, 0.6, kRed}, {-0.4, 0.5, kGreen}})};
-    expectSame(volume, scene, 3);
+    expectSameAsReference(volume, scene, 3);
   }
 }
 
@@ -270,7 +269,7 @@ TEST(Surfaces, BesideEmptyMacrocellsSeenFromAfar) {
         viewFrom(*volume, glm::dvec3(12) + away * glm::dvec3(-15, -21, -33), {12, 12, 12}, 40 / away, 32);
     for (const double value : {0.01, 0.1, 254.9}) {
       scene.channels = {surfaces({{value, 0.4, kRed}})};
-      expectSame(volume, scene, 3);
+      expectSameAsReference(volume, scene, 3);
     }
   }
 }
@@ -296,7 +295,7 @@ TEST(Surfaces, HideWhatIsBehindThemInMatter) {
       scene.blend = blend;
       scene.channels = {solid(0.2, kGreen)};
       scene.channels[0].isovalues = {{33, opacity, kRed}};
-      expectSame(volume, scene);
+      expectSameAsReference(volume, scene);
     }
 }
 

@@ -10,8 +10,6 @@ namespace {
 
 using namespace test;
 
-constexpr BlendMode kBlends[] = {BlendMode::density, BlendMode::max, BlendMode::mix, BlendMode::composite};
-
 /// Two balls of 8-bit values that fall to 0 outside, at different places.
 std::shared_ptr<const Volume> balls() {
   const glm::ivec3 dims(20);

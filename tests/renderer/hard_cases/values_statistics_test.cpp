@@ -2,8 +2,6 @@
 // Voxel values and ranges that lose precision or meaning, in the trackers and the reference.
 #include <gtest/gtest.h>
 
-#include <limits>
-
 #include "tests/renderer/hard_cases/hard_scenes.h"
 
 namespace scolopax {
@@ -11,15 +9,10 @@ namespace {
 
 using namespace test;
 
-constexpr int kSide = 20, kSamples = 200;
-const glm::ivec3 kDims(7, 6, 5);
-constexpr double kLargest = std::numeric_limits<float>::max();
-constexpr double kDenormal = std::numeric_limits<float>::denorm_min();
-
 /// Compares one channel of values f(i,j,k), seen from the side over [lo, hi], with the reference.
 template <class T, class F>
 void expectRangeMatches(F&& value, double lo, double hi, double slope = 1, double intercept = 0) {
-  const auto volume = volumeOf(gridOf(kDims), channelOf<T>(kDims, value, slope, intercept));
+  const auto volume = volumeOf(gridOf(kSmallDims), channelOf<T>(kSmallDims, value, slope, intercept));
   Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kSide);
   scene.channels = {ramp(lo, hi, 0.5)};
   scene.channels[0].color = {{0, kRed}, {0.4, kRed}, {0.4, kGreen}, {1, kGreen}};
@@ -34,7 +27,7 @@ auto between(double lo, double hi) {
 TEST(VoxelValues, OfAConstantVolumeAreSeenAtTheirPlaceOnTheCurve) {
   for (const double value : {0.0, 0.3, 1.0}) {
     const auto volume =
-        volumeOf(gridOf(kDims), channelOf<float>(kDims, [&](int, int, int) { return value; }));
+        volumeOf(gridOf(kSmallDims), channelOf<float>(kSmallDims, [&](int, int, int) { return value; }));
     Scene scene = frontScene(*volume, 16, 16);
     scene.camera.orthoHeight = 5;  // inside the silhouette
     scene.channels[0] = ramp(0, 1, 0.4, kRed);
@@ -48,8 +41,8 @@ TEST(VoxelValues, ThatAreNotFiniteLeaveHolesOfTheirCells) {
     const auto holed = [&](int x, int y, int z) {
       return (x == 3 && y == 2) || (x == 0 && y == 5 && z == 4) ? bad : lumps()(x, y, z);
     };
-    const auto volume =
-        volumeOf(gridOf(kDims), channelOf<float>(kDims, holed), channelOf<float>(kDims, lumps(2)));
+    const auto volume = volumeOf(gridOf(kSmallDims), channelOf<float>(kSmallDims, holed),
+                                 channelOf<float>(kSmallDims, lumps(2)));
     Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kSide);
     scene.channels = {ramp(0, 1, 0.5, kRed), ramp(0, 1, 0.3, kBlue)};
     for (const int macrocell : {1, 4}) {

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -20,10 +19,6 @@ namespace {
 
 using namespace test;
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr double kLargest = std::numeric_limits<float>::max();
-constexpr double kDenormal = std::numeric_limits<float>::denorm_min();
 constexpr double kUlp = 0x1p-23;
 
 /// A row of voxels, and the kernels' position of each in a range.
@@ -194,15 +189,15 @@ TEST(Values, OfMinusZeroAreZero) {
 }
 
 TEST(Values, AreNotFiniteExactlyWhereACornerOfTheCellIsNot) {
-  for (const float bad : {kNaN, kInfinity, -kInfinity}) {
-    const Row row = Row::of<float>({1, 1, double(bad), 1, 1, 1, 1});
+  for (const double bad : {kNaN, kInfinity, -kInfinity}) {
+    const Row row = Row::of<float>({1, 1, bad, 1, 1, 1, 1});
     const auto finite = [&](double x) { return std::isfinite(row.sample(x)); };
     EXPECT_TRUE(finite(-0.5));
     EXPECT_TRUE(finite(0.999));
     for (const double x : {1.0, 1.5, 2.0, 2.5, 2.999}) EXPECT_FALSE(finite(x)) << x;
     for (const double x : {3.0, 3.5, 6.0, 6.5}) EXPECT_TRUE(finite(x)) << x;
   }
-  const Row opposite = Row::of<float>({double(kInfinity), -double(kInfinity)});
+  const Row opposite = Row::of<float>({kInfinity, -kInfinity});
   for (const double x : {0.0, 0.5, 1.0}) EXPECT_FALSE(std::isfinite(opposite.sample(x)));
 }
 

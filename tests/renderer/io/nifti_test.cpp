@@ -55,7 +55,7 @@ std::vector<double> asDoubles(const std::vector<std::int16_t>& values) {
   return {values.begin(), values.end()};
 }
 
-LoadedFile loadBytes(const TempDir& folder, const std::string& bytes, const char* name = "a.nii") {
+LoadedFile loadNifti(const TempDir& folder, const std::string& bytes, const char* name = "a.nii") {
   return loadFile(writeBytes(folder / name, bytes), kTestLimit, {});
 }
 
@@ -192,8 +192,8 @@ TEST(NiftiFiles, BothByteOrdersOfBothVersionsLoad) {
   const TempDir folder;
   const auto voxels = ramp(24);
   const std::string little = Header1().bytes + bytesOf(voxels);
-  EXPECT_EQ(valuesOf(loadBytes(folder, little).channels[0]), asDoubles(voxels));
-  EXPECT_EQ(valuesOf(loadBytes(folder, gzipped(little), "a.nii.gz").channels[0]), asDoubles(voxels));
+  EXPECT_EQ(valuesOf(loadNifti(folder, little).channels[0]), asDoubles(voxels));
+  EXPECT_EQ(valuesOf(loadNifti(folder, gzipped(little), "a.nii.gz").channels[0]), asDoubles(voxels));
 
   // The same header with every number byte-swapped: fields by their sizes.
   Header1 big;
@@ -203,7 +203,7 @@ TEST(NiftiFiles, BothByteOrdersOfBothVersionsLoad) {
   };
   reverse(0, 4, 1), reverse(40, 2, 8), reverse(70, 2, 2), reverse(76, 4, 8), reverse(108, 4, 3),
       reverse(252, 2, 2);
-  const LoadedFile swapped = loadBytes(folder, big.bytes + bytesOf(voxels, true));
+  const LoadedFile swapped = loadNifti(folder, big.bytes + bytesOf(voxels, true));
   EXPECT_EQ(valuesOf(swapped.channels[0]), asDoubles(voxels));
   EXPECT_EQ(swapped.grid.spacing(), glm::dvec3(2));
 
@@ -220,7 +220,7 @@ TEST(NiftiFiles, BothByteOrdersOfBothVersionsLoad) {
     put(168, std::vector<std::int64_t>{544});
     put(176, std::vector<double>{0.5, -3});
     put(500, std::vector<std::int32_t>{3});
-    const LoadedFile file = loadBytes(folder, two + bytesOf(voxels, reversed));
+    const LoadedFile file = loadNifti(folder, two + bytesOf(voxels, reversed));
     EXPECT_EQ(file.channels[0].slope, 0.5);
     EXPECT_EQ(file.channels[0].intercept, -3);
     EXPECT_TRUE(std::ranges::equal(file.channels[0].voxels.as<std::int16_t>(), voxels));
@@ -234,7 +234,7 @@ TEST(NiftiFiles, OrientationIsSformThenQformThenPixdim) {
   const std::string voxels = bytesOf(ramp(24));
   Header1 header;
   const auto column = [&](int i) {
-    return glm::dvec3(loadBytes(folder, header.bytes + voxels).grid.worldFromVoxel[i]);
+    return glm::dvec3(loadNifti(folder, header.bytes + voxels).grid.worldFromVoxel[i]);
   };
   EXPECT_EQ(column(1), glm::dvec3(0, 2, 0));
   EXPECT_EQ(column(3), glm::dvec3(0));
@@ -261,7 +261,7 @@ TEST(NiftiFiles, SlopeNeverTouchesTheVoxelsAndZeroOrNanMeansNone) {
   const TempDir folder;
   const auto voxels = ramp(24);
   Header1 header;
-  const auto load = [&] { return loadBytes(folder, header.bytes + bytesOf(voxels)); };
+  const auto load = [&] { return loadNifti(folder, header.bytes + bytesOf(voxels)); };
   header.set<float>(112, 0.25f).set<float>(116, 100);
   LoadedFile file = load();
   EXPECT_EQ(file.channels[0].slope, 0.25);
@@ -281,7 +281,7 @@ TEST(NiftiFiles, TheFifthDimensionIsChannelsAndLaterTimesAreLeftOut) {
   const TempDir folder;
   const auto voxels = ramp(2 * 2 * 1 * 3 * 2);  // 3 times, 2 components
   const std::string bytes = Header1().dim({5, 2, 2, 1, 3, 2}).bytes + bytesOf(voxels);
-  const LoadedFile file = loadBytes(folder, bytes);
+  const LoadedFile file = loadNifti(folder, bytes);
   ASSERT_EQ(file.channels.size(), 2u);
   const auto all = asDoubles(voxels);
   EXPECT_EQ(valuesOf(file.channels[0]), std::vector(all.begin(), all.begin() + 4));
@@ -299,7 +299,7 @@ TEST(NiftiFiles, RgbaVoxelsAreThreeChannels) {
   const TempDir folder;
   const std::string bytes =
       Header1().dim({3, 2, 1, 1}).type(2304, 32).bytes + std::string("\1\2\3\4\5\6\7\10", 8);
-  const LoadedFile file = loadBytes(folder, bytes);
+  const LoadedFile file = loadNifti(folder, bytes);
   ASSERT_EQ(file.channels.size(), 3u);
   EXPECT_EQ(valuesOf(file.channels[0]), (std::vector<double>{1, 5}));
   EXPECT_EQ(valuesOf(file.channels[2]), (std::vector<double>{3, 7}));

@@ -86,7 +86,7 @@ std::vector<double> counting(int first, int count) {
   for (int i = 0; i < count; ++i) values.push_back(first + i);
   return values;
 }
-LoadedFile loadBytes(const TempDir& folder, const std::string& bytes, std::string* warnings = nullptr) {
+LoadedFile loadTiff(const TempDir& folder, const std::string& bytes, std::string* warnings = nullptr) {
   return loadFile(writeBytes(folder / "a.tif", bytes), kTestLimit, [&](const std::string& text) {
     if (warnings) *warnings += text + "\n";
   });
@@ -139,7 +139,7 @@ TEST(TiffFiles, PagesAreSlicesInEveryVariantOfTheContainer) {
     for (const bool bigTiff : {false, true}) {
       TiffBytes tiff;
       tiff.bigEndian = bigEndian, tiff.bigTiff = bigTiff;
-      const LoadedFile file = loadBytes(folder, tiff.build(countingPages(5, bigEndian)));
+      const LoadedFile file = loadTiff(folder, tiff.build(countingPages(5, bigEndian)));
       EXPECT_EQ(file.grid.dims, glm::ivec3(3, 2, 5));
       EXPECT_EQ(file.grid.worldFromVoxel, glm::dmat4(1.0));
       ASSERT_EQ(file.channels.size(), 1u);
@@ -151,7 +151,7 @@ TEST(TiffFiles, PagesAreSlicesInEveryVariantOfTheContainer) {
 
 TEST(TiffFiles, ThousandsOfPagesComeInOrder) {
   const TempDir folder;
-  const LoadedFile file = loadBytes(folder, TiffBytes().build(countingPages(8000)));
+  const LoadedFile file = loadTiff(folder, TiffBytes().build(countingPages(8000)));
   EXPECT_EQ(file.grid.dims, glm::ivec3(3, 2, 8000));
   EXPECT_EQ(valuesOf(file.channels[0]), counting(0, 48000));
 }
@@ -163,7 +163,7 @@ TEST(TiffFiles, ImageJsPagesRunOverChannelsThenSlicesThenTimes) {
       "ImageJ=1.54f\nimages=12\nchannels=2\nslices=3\nframes=2\nhyperstack=true\nunit=micron\nspacing=2.5\n";
   tiff.xResolution = 4000;
   std::string warnings;
-  const LoadedFile file = loadBytes(folder, tiff.build(countingPages(12)), &warnings);
+  const LoadedFile file = loadTiff(folder, tiff.build(countingPages(12)), &warnings);
   EXPECT_EQ(file.grid.dims, glm::ivec3(3, 2, 3));
   EXPECT_EQ(file.grid.spacing(), glm::dvec3(0.25, 0.25, 2.5));
   ASSERT_EQ(file.channels.size(), 2u);
@@ -186,7 +186,7 @@ TEST(TiffFiles, ImageJsLargeStacksLieBehindTheirOnlyPage) {
     tiff.tags[279] = 12;
     std::string all;
     for (const std::string& page : countingPages(4, bigEndian)) all += page;
-    EXPECT_EQ(valuesOf(loadBytes(folder, tiff.build({all})).channels[0]), counting(0, 24));
+    EXPECT_EQ(valuesOf(loadTiff(folder, tiff.build({all})).channels[0]), counting(0, 24));
     EXPECT_THAT(loadError(writeBytes(folder / "b.tif", tiff.build({all.substr(0, 47)}))),
                 HasSubstr("expected 12 bytes"));
   }
@@ -220,7 +220,7 @@ TEST(TiffFiles, NumbersAreThoseStoredWhateverTheDisplayWas) {
   for (const std::uint64_t photometric : {0u, 3u}) {
     TiffBytes tiff;
     tiff.tags[262] = photometric;
-    EXPECT_EQ(valuesOf(loadBytes(folder, tiff.build(countingPages(2))).channels[0]), counting(0, 12))
+    EXPECT_EQ(valuesOf(loadTiff(folder, tiff.build(countingPages(2))).channels[0]), counting(0, 12))
         << photometric;
   }
 }
@@ -312,7 +312,7 @@ TEST(TiffFiles, DeflatedStripsAndTilesLoadAndDamagedOnesAreRefused) {
   const TempDir folder;
   for (const int tileSize : {0, 16}) {
     const std::string whole = deflatedPicture(folder, tileSize);
-    const auto values = valuesOf(loadBytes(folder, whole).channels[0]);
+    const auto values = valuesOf(loadTiff(folder, whole).channels[0]);
     ASSERT_EQ(values.size(), 64u * 60u);
     for (std::size_t i = 0; i < values.size(); ++i) ASSERT_EQ(values[i], double(i * i / 7 % 256)) << i;
     // The compressed pixels are the larger part of the file, at its end.

@@ -19,7 +19,7 @@ using kernel::Cubic;
 using kernel::One;
 
 /// Random numbers of a fixed sequence.
-struct Draw {
+struct RandomNumbers {
   std::mt19937 random{7};
   double between(double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(random); }
 };
@@ -28,7 +28,7 @@ struct DoubleCubic {
   double c0, c1, c2, c3;
   double at(double y) const { return c0 + y * (c1 + y * (c2 + y * c3)); }
 };
-DoubleCubic anyCubic(Draw& draw) {
+DoubleCubic anyCubic(RandomNumbers& draw) {
   const auto coefficient = [&] { return draw.between(-1, 1) * draw.between(0, 1); };
   return {draw.between(-0.3, 1.3), coefficient(), coefficient(), coefficient()};
 }
@@ -40,7 +40,7 @@ Cubic<One> sampled(const DoubleCubic& f, double scale = 1, double offset = 0) {
 }
 
 TEST(Cubic, GoesThroughItsNodesAndLiesWithinItsBounds) {
-  Draw draw;
+  RandomNumbers draw;
   for (int n = 0; n < 2000; ++n) {
     const DoubleCubic f = anyCubic(draw);
     const Cubic<One> found = sampled(f);
@@ -55,7 +55,7 @@ TEST(Cubic, GoesThroughItsNodesAndLiesWithinItsBounds) {
 }
 
 TEST(Cubic, IsMonotoneBetweenItsTurns) {
-  Draw draw;
+  RandomNumbers draw;
   for (int n = 0; n < 2000; ++n) {
     const DoubleCubic f = anyCubic(draw);
     const Cubic<One> found = sampled(f);
@@ -75,7 +75,7 @@ TEST(Cubic, IsMonotoneBetweenItsTurns) {
 }
 
 TEST(Cubic, MeetsEveryValueBetweenItsTurns) {
-  Draw draw;
+  RandomNumbers draw;
   for (int n = 0; n < 5000; ++n) {
     const Cubic<One> f = sampled(anyCubic(draw));
     const auto turns = kernel::turnsOf(f);
@@ -93,7 +93,7 @@ TEST(Cubic, MeetsEveryValueBetweenItsTurns) {
 }
 
 TEST(Cubic, TurnsAtTheSamePlacesAtAnyScale) {
-  Draw draw;
+  RandomNumbers draw;
   for (int n = 0; n < 200; ++n) {
     const DoubleCubic f = anyCubic(draw);
     const auto expected = kernel::turnsOf(sampled(f));
@@ -106,7 +106,7 @@ TEST(Cubic, TurnsAtTheSamePlacesAtAnyScale) {
 }
 
 /// A random appearance: a narrow peak, or knots and jumps anywhere.
-ChannelAppearance anyAppearance(Draw& draw, bool narrow) {
+ChannelAppearance anyPeakOrKnots(RandomNumbers& draw, bool narrow) {
   ChannelAppearance a;
   const double lo = draw.between(-2, 2), range = std::pow(10, draw.between(-2, 4));
   const bool falls = draw.between(0, 1) < 0.5;
@@ -128,10 +128,10 @@ ChannelAppearance anyAppearance(Draw& draw, bool narrow) {
 }
 
 TEST(MeansOfCubic, AreThoseOfManyPoints) {
-  Draw draw;
+  RandomNumbers draw;
   for (int n = 0; n < 600; ++n) {
     const bool narrow = draw.between(0, 1) < 0.3;
-    ChannelAppearance a = anyAppearance(draw, narrow);
+    ChannelAppearance a = anyPeakOrKnots(draw, narrow);
     a.gamma = narrow || draw.between(0, 1) < 0.5 ? 1 : std::pow(2, draw.between(-1, 1));
     Channel channel;
     channel.slope = 1;

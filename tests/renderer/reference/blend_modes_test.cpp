@@ -8,23 +8,18 @@
 #include "renderer/core/error.h"
 #include "renderer/reference/integrator.h"
 #include "tests/renderer/reference/test_volumes.h"
+#include "tests/support/volumes.h"
 
 namespace scolopax::reference {
 namespace {
 
-const glm::dvec3 kRed(1, 0, 0), kGreen(0, 1, 0), kBlue(0, 0, 1), kOrange(1, 0.5, 0.25);
-
-void expectColor(const RayResult& found, const glm::dvec3& color, double alpha, double tolerance) {
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(found.rgba[c], color[c], tolerance) << "component " << c;
-  EXPECT_NEAR(found.rgba.a, alpha, tolerance);
-  EXPECT_LE(found.error, 1e-6);
-}
+using namespace test;
 
 /// Three constant channels of extinction 0.25, 1.5 and 0.9 in a box 3 long.
 struct Constant {
   Volume volume =
-      makeVolume(makeGrid({3, 3, 3}), std::vector<VoxelFunction>(3, [](int, int, int) { return 1; }));
-  Scene scene = makeScene({uniform(0.25, kRed), uniform(1.5, kOrange), uniform(0.9, kBlue)});
+      makeVolume(gridOf({3, 3, 3}), std::vector<VoxelFunction>(3, [](int, int, int) { return 1; }));
+  Scene scene = makeScene({solid(0.25, kRed), solid(1.5, kOrange), solid(0.9, kBlue)});
   RayResult trace(BlendMode mode) {
     scene.blend = mode;
     return traceReference(volume, scene, {1, 1, -7}, {0, 0, 1});
@@ -53,7 +48,7 @@ TEST(ReferenceBlend, MaxOfEqualChannelsShowsTheFirst) {
 TEST(ReferenceBlend, MaxOfChannelsThatAreEqualButForRoundingShowsTheFirstAndEnds) {
   // One field in units that differ by factors of a third and a tenth, over ranges scaled by the same factors.
   const VoxelFunction lumpy = [](int i, int j, int k) { return (i * 7 + j * 5 + k * 3) % 11; };
-  const Grid grid = makeGrid({5, 5, 5});
+  const Grid grid = gridOf({5, 5, 5});
   std::vector<ChannelSource> sources;
   for (const double slope : {0.3, 0.1, 1.0 / 3}) {
     ChannelSource source;
@@ -107,7 +102,7 @@ TEST(ReferenceBlend, AllModesOfASingleChannelAreTheSame) {
 struct Crossing {
   static constexpr double red = 0.8, green = 0.3, length = 6;
   Volume volume =
-      makeVolume(makeGrid({7, 1, 1}), std::vector<VoxelFunction>(2, [](int i, int, int) { return i; }));
+      makeVolume(gridOf({7, 1, 1}), std::vector<VoxelFunction>(2, [](int i, int, int) { return i; }));
   Scene scene = makeScene({ramp(length, 0, red, kRed), ramp(0, length, green, kGreen)});
   void expectHandover(double redDepth, double greenDepth, double tolerance) {
     scene.blend = BlendMode::max;
@@ -135,8 +130,8 @@ TEST(ReferenceBlend, MaxOfRampsBentByGammaChangesChannelWhereTheyCross) {
 TEST(ReferenceBlend, MaxFindsASliverInWhichAnotherChannelIsBarelyLarger) {
   // Along the diagonal x = y = t of one cell: x y = t^2, and a line that is above it for |t - 1/2| < 1/64.
   const double half = 1.0 / 64, constant = 0.25 - half * half, density = 0.9;
-  const Volume volume = makeVolume(makeGrid({2, 2, 1}), {[](int i, int j, int) { return i * j; },
-                                                         [&](int i, int, int) { return i - constant; }});
+  const Volume volume = makeVolume(gridOf({2, 2, 1}), {[](int i, int j, int) { return i * j; },
+                                                       [&](int i, int, int) { return i - constant; }});
   Scene scene = makeScene({ramp(-1, 2, density, kRed), ramp(-1, 2, density, kGreen)});
   scene.blend = BlendMode::max;
   const RayResult found = traceReference(volume, scene, {-5, -5, 0}, {1, 1, 0});

@@ -17,7 +17,7 @@ namespace {
 void expectSameAsAtPoints(const glm::ivec3& dims, Interpolation interpolation, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);
-  const Volume volume = makeVolume(makeGrid(dims), {[&](int, int, int) { return unit(random); }});
+  const Volume volume = makeVolume(gridOf(dims), {[&](int, int, int) { return unit(random); }});
   const ScalarField field(volume.channels()[0], dims, interpolation);
   const glm::dmat3 toWorld(glm::dvec3(1, 0.2, 0), glm::dvec3(0, 2, 0.1), glm::dvec3(0.3, 0, 0.5));
   for (int ray = 0; ray < 30; ++ray) {
@@ -54,7 +54,7 @@ TEST(GradientAlong, IsTheGradientInsideAndAtEveryBorder) {
 
 TEST(GradientAlong, IsNoneWhereADifferenceIsNotFinite) {
   const Volume volume =
-      makeVolume(makeGrid(glm::ivec3(6, 4, 4)),
+      makeVolume(gridOf(glm::ivec3(6, 4, 4)),
                  {[](int i, int, int) { return i == 0 ? std::numeric_limits<double>::quiet_NaN() : i; }});
   const ScalarField field(volume.channels()[0], {6, 4, 4});
   EXPECT_FALSE(
@@ -66,7 +66,7 @@ TEST(GradientAlong, IsNoneWhereADifferenceIsNotFinite) {
 
 TEST(GradientAlong, OfCubicIsNoneWhereACellHasNoValue) {
   const Volume volume =
-      makeVolume(makeGrid(glm::ivec3(6, 4, 4)),
+      makeVolume(gridOf(glm::ivec3(6, 4, 4)),
                  {[](int i, int, int) { return i == 0 ? std::numeric_limits<double>::quiet_NaN() : i; }});
   const ScalarField field(volume.channels()[0], {6, 4, 4}, Interpolation::cubic);
   EXPECT_FALSE(gradientAlong(field, {1.1, 1, 1}, {1.9, 2, 1.5}, glm::dmat3(1.0)));

@@ -14,41 +14,40 @@
 #include "renderer/reference/integrator.h"
 #include "tests/renderer/reference/random_light.h"
 #include "tests/support/gradients.h"
+#include "tests/support/volumes.h"
 
 namespace scolopax::reference {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-const glm::dvec3 kRed(1, 0, 0), kBlue(0, 0, 1);
+using namespace test;
 
 /// A channel with extinction `density` times the factor.
 ChannelAppearance factored(double density, GradientOpacity opacity, glm::dvec3 color = kRed) {
-  ChannelAppearance appearance = uniform(density, color);
+  ChannelAppearance appearance = solid(density, color);
   appearance.gradientOpacity = std::move(opacity);
   return appearance;
 }
 GradientOpacity step(double at) { return {at, at, {{0, 0}, {1, 1}}}; }
 
-RayResult alongX(const Volume& volume, const std::vector<ChannelAppearance>& channels,
-                 BlendMode blend = BlendMode::density) {
+RayResult alongRow(const Volume& volume, const std::vector<ChannelAppearance>& channels,
+                   BlendMode blend = BlendMode::density) {
   Scene scene = makeScene(channels);
   scene.blend = blend;
   return traceReference(volume, scene, {-3, 0, 0}, {1, 0, 0});
 }
-double depthOf(const RayResult& ray) { return -std::log1p(-ray.rgba.a); }
 
 /// Voxel i of `count` is i^2. |gradient| is 2x from the second voxel to the last but one, (1 + 3x) / (1 + x)
 /// before, and constant in the outer half voxels; for a `count` of 12 it is (40 - 19w) / (2 - w) after, with
 /// w = x - 10.
 Volume squares(int count = 12, std::size_t channels = 1) {
   const VoxelFunction square = [](int i, int, int) { return i * i; };
-  return makeVolume(makeGrid({count, 1, 1}), std::vector<VoxelFunction>(channels, square));
+  return makeVolume(gridOf({count, 1, 1}), std::vector<VoxelFunction>(channels, square));
 }
 
 /// A linear field on a grid that is neither orthogonal nor isotropic; floats represent all voxels exactly.
 struct Linear {
   glm::dvec3 gradient{1.5, -0.5, 2};
-  Grid grid = makeGrid({5, 6, 4});
+  Grid grid = gridOf({5, 6, 4});
   Volume volume;
   Linear() : volume(make()) {}
   Volume make() {
@@ -87,7 +86,7 @@ TEST(ReferenceGradientOpacity, OfALinearFieldIsOneFactor) {
 TEST(ReferenceGradientOpacity, CutsAtTheKnotsOfItsCurve) {
   const Volume volume = squares();
   const auto depth = [&](const GradientOpacity& opacity) {
-    return depthOf(alongX(volume, {factored(0.3, opacity)})) / 0.3;
+    return depthOf(alongRow(volume, {factored(0.3, opacity)})) / 0.3;
   };
   // Positions of cuts are accurate to 1e-13 of the largest |gradient|^2.
   constexpr double kClose = 1e-10;
@@ -102,7 +101,7 @@ TEST(ReferenceGradientOpacity, CutsAtTheKnotsOfItsCurve) {
 
 TEST(ReferenceGradientOpacity, CutsWhereDifferencesAreOneSided) {
   const Volume volume = squares();
-  const auto depth = [&](double at) { return depthOf(alongX(volume, {factored(0.3, step(at))})) / 0.3; };
+  const auto depth = [&](double at) { return depthOf(alongRow(volume, {factored(0.3, step(at))})) / 0.3; };
   EXPECT_NEAR(depth(1.5), 11.5 - 1.0 / 3, 1e-10);          // 1 + 3x = 1.5 (1 + x)
   EXPECT_NEAR(depth(20.5), 11.5 - (10 + 2.0 / 3), 1e-10);  // 40 - 19w = 20.5 (2 - w)
   EXPECT_NEAR(depth(0.999), 12, 1e-10);
@@ -113,7 +112,7 @@ TEST(ReferenceGradientOpacity, OfAConstantOneChangesNothing) {
   RandomLight draw(5);
   for (int trial = 0; trial < 20; ++trial) {
     const Volume volume =
-        makeVolume(makeGrid({4, 5, 3}, {1, 0.5, 2}), {[&](int, int, int) { return draw.unit(); }});
+        makeVolume(gridOf({4, 5, 3}, {1, 0.5, 2}), {[&](int, int, int) { return draw.unit(); }});
     Scene scene = makeScene({ramp(0, 1, 2)});
     const glm::dvec3 origin(-9, 1, 2), direction(1, 0.1 * draw.unit(), 0.1 * draw.unit());
     const RayResult expected = traceReference(volume, scene, origin, direction);
@@ -125,11 +124,11 @@ TEST(ReferenceGradientOpacity, OfAConstantOneChangesNothing) {
 
 TEST(ReferenceGradientOpacity, SeesADipOfTheGradientHoweverNarrow) {
   // |gradient| is |x - 5| from 4 to 6, and 1 elsewhere.
-  const Volume volume = makeVolume(makeGrid({11, 1, 1}), {[](int i, int, int) { return std::abs(i - 5); }});
+  const Volume volume = makeVolume(gridOf({11, 1, 1}), {[](int i, int, int) { return std::abs(i - 5); }});
   for (const double width : {1e-1, 1e-2, 1e-3, 1e-4}) {
     const GradientOpacity flat{0, 1, {{0, 1}, {width, 1}, {width, 0}}};
     // 1e-13 in the square of |gradient| is 1e-13 / (2 width) in x.
-    EXPECT_NEAR(depthOf(alongX(volume, {factored(1 / width, flat)})), 2, 1e-13 / (width * width) + 1e-10)
+    EXPECT_NEAR(depthOf(alongRow(volume, {factored(1 / width, flat)})), 2, 1e-13 / (width * width) + 1e-10)
         << width;
   }
 }
@@ -138,7 +137,7 @@ TEST(ReferenceGradientOpacity, IsExactWhereTheGradientIsNearlyZero) {
   // |gradient| is sqrt((x - 5)^2 + c^2) from 4 to 6, nearly a kink, and sqrt(1 + c^2) elsewhere.
   constexpr double c = 0x1p-10;
   const Volume volume =
-      makeVolume(makeGrid({11, 4, 1}), {[](int i, int j, int) { return std::abs(i - 5) + c * j; }});
+      makeVolume(gridOf({11, 4, 1}), {[](int i, int j, int) { return std::abs(i - 5) + c * j; }});
   const Scene scene = makeScene({factored(0.3, {0, 1, {{0, 0}, {1, 1}}})});
   const RayResult found = traceReference(volume, scene, {-3, 1.5, 0}, {1, 0, 0});
   const double end = std::sqrt(1 - c * c);  // there it is 1
@@ -149,35 +148,35 @@ TEST(ReferenceGradientOpacity, IsExactWhereTheGradientIsNearlyZero) {
 
 TEST(ReferenceGradientOpacity, IsZeroWhereADifferenceIsNotFinite) {
   // Cells [5, 7] have no scalar, and there is no gradient where x - 1 or x + 1 is in one of them.
-  const Volume volume = makeVolume(makeGrid({12, 1, 1}), {[](int i, int, int) { return i == 6 ? kNaN : i; }});
-  EXPECT_NEAR(depthOf(alongX(volume, {uniform(0.3, kRed)})), 0.3 * 10, 1e-12);
+  const Volume volume = makeVolume(gridOf({12, 1, 1}), {[](int i, int, int) { return i == 6 ? kNaN : i; }});
+  EXPECT_NEAR(depthOf(alongRow(volume, {solid(0.3, kRed)})), 0.3 * 10, 1e-12);
   for (const std::vector<OpacityKnot>& one : {std::vector<OpacityKnot>{{0, 1}}, {{0, 1}, {1, 1}}})
-    EXPECT_NEAR(depthOf(alongX(volume, {factored(0.3, {0, 5, one})})), 0.3 * 8, 1e-12);
+    EXPECT_NEAR(depthOf(alongRow(volume, {factored(0.3, {0, 5, one})})), 0.3 * 8, 1e-12);
 }
 
 TEST(ReferenceGradientOpacity, OfASingleVoxelIsThatOfNoGradient) {
-  const Volume volume = makeVolume(makeGrid({1, 1, 1}), {[](int, int, int) { return 7; }});
-  EXPECT_NEAR(depthOf(alongX(volume, {factored(2, {0, 1, {{0, 0.25}, {1, 1}}})})), 0.5, 1e-12);
-  EXPECT_NEAR(depthOf(alongX(volume, {factored(2, step(0))})), 2, 1e-12);  // 1 at lo and above
-  EXPECT_NEAR(depthOf(alongX(volume, {factored(2, {0, 1, {{0, 0.25}, {0, 0.5}, {1, 1}}})})), 1, 1e-12);
+  const Volume volume = makeVolume(gridOf({1, 1, 1}), {[](int, int, int) { return 7; }});
+  EXPECT_NEAR(depthOf(alongRow(volume, {factored(2, {0, 1, {{0, 0.25}, {1, 1}}})})), 0.5, 1e-12);
+  EXPECT_NEAR(depthOf(alongRow(volume, {factored(2, step(0))})), 2, 1e-12);  // 1 at lo and above
+  EXPECT_NEAR(depthOf(alongRow(volume, {factored(2, {0, 1, {{0, 0.25}, {0, 0.5}, {1, 1}}})})), 1, 1e-12);
 }
 
 TEST(ReferenceGradientOpacity, HandsOverBetweenChannelsWhereTheFactorMakesOneTheLargest) {
   // The extinction of red is (2x - 4) / 6 from 2 to 5 and then 1, that of blue is 0.5: they are equal at 3.5.
   const Volume volume = squares(12, 2);
-  const ChannelAppearance red = factored(1, {4, 10, {{0, 0}, {1, 1}}}, kRed), blue = uniform(0.5, kBlue);
+  const ChannelAppearance red = factored(1, {4, 10, {{0, 0}, {1, 1}}}, kRed), blue = solid(0.5, kBlue);
   const double blueAlone = -std::expm1(-0.5 * 4), behind = std::exp(-0.5 * 4),
                redBehind = behind * -std::expm1(-(1.5 * 0.75 + 6.5));
   for (const bool blueFirst : {false, true}) {
     const std::vector<ChannelAppearance> channels =
         blueFirst ? std::vector<ChannelAppearance>{blue, red} : std::vector<ChannelAppearance>{red, blue};
-    const RayResult most = alongX(volume, channels, BlendMode::max);
+    const RayResult most = alongRow(volume, channels, BlendMode::max);
     EXPECT_NEAR(most.rgba.b, blueAlone, most.error + 1e-10);
     EXPECT_NEAR(most.rgba.r, redBehind, most.error + 1e-10);
-    const RayResult mixed = alongX(volume, channels, BlendMode::mix);
+    const RayResult mixed = alongRow(volume, channels, BlendMode::mix);
     EXPECT_NEAR(mixed.rgba.a, most.rgba.a, most.error + mixed.error);
     EXPECT_GT(mixed.rgba.b, most.rgba.b + 0.01);
-    const RayResult each = alongX(volume, channels, BlendMode::composite);
+    const RayResult each = alongRow(volume, channels, BlendMode::composite);
     EXPECT_NEAR(each.rgba.b, -std::expm1(-0.5 * 12), each.error + 1e-10);
     EXPECT_NEAR(each.rgba.r, -std::expm1(-(1.5 + 6.5)), each.error + 1e-10);
   }
@@ -185,7 +184,7 @@ TEST(ReferenceGradientOpacity, HandsOverBetweenChannelsWhereTheFactorMakesOneThe
 
 TEST(ReferenceGradientOpacity, RefusesWhatHasNoMeaning) {
   const Volume volume = squares();
-  const auto trace = [&](const GradientOpacity& opacity) { alongX(volume, {factored(1, opacity)}); };
+  const auto trace = [&](const GradientOpacity& opacity) { alongRow(volume, {factored(1, opacity)}); };
   EXPECT_NO_THROW(trace({3, 3, {{0, 1}}}));
   EXPECT_THROW(trace({0, kNaN, {{0, 1}}}), Error);
   EXPECT_THROW(trace({-std::numeric_limits<double>::infinity(), 1, {{0, 1}}}), Error);

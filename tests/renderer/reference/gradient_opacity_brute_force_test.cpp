@@ -12,7 +12,7 @@ namespace {
 
 /// Compares one ray through each of `count` random scenes with tiny steps: the claimed error bounds must
 /// hold.
-void expectClaimsHold(bool shading, bool shadows, unsigned count, int steps, double largestClaim) {
+void expectFactorClaimsHold(bool shading, bool shadows, unsigned count, int steps, double largestClaim) {
   int seen = 0;
   for (unsigned seed = 1; seed <= count; ++seed) {
     RandomLight draw(seed);
@@ -36,14 +36,14 @@ void expectClaimsHold(bool shading, bool shadows, unsigned count, int steps, dou
 
 // kTolerance and kToleranceLit are tolerances of one piece; blend mode composite adds three channels.
 TEST(ReferenceGradientOpacity, KeepsWhatItClaimsOnRandomScenes) {
-  expectClaimsHold(false, false, 150, 20000, 4 * Integrator::kTolerance);
+  expectFactorClaimsHold(false, false, 150, 20000, 4 * Integrator::kTolerance);
 }
 TEST(ReferenceGradientOpacity, KeepsWhatItClaimsInShadedRandomScenes) {
-  expectClaimsHold(true, false, 100, 20000, 4 * Integrator::kToleranceLit);
+  expectFactorClaimsHold(true, false, 100, 20000, 4 * Integrator::kToleranceLit);
 }
 TEST(ReferenceGradientOpacity, KeepsWhatItClaimsInRandomScenesWithShadows) {
-  expectClaimsHold(false, true, 12, 500, 4 * Integrator::kToleranceLit);
-  expectClaimsHold(true, true, 12, 500, 4 * Integrator::kToleranceLit);
+  expectFactorClaimsHold(false, true, 12, 500, 4 * Integrator::kToleranceLit);
+  expectFactorClaimsHold(true, true, 12, 500, 4 * Integrator::kToleranceLit);
 }
 
 }  // namespace

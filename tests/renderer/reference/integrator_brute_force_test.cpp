@@ -83,13 +83,13 @@ Volume randomVolume(std::mt19937& random) {
   std::uniform_int_distribution<int> byte(0, 255);
   std::vector<ChannelSource> channels(3);
   for (ChannelSource& channel : channels) {
-    Grid grid = makeGrid(kDims);
+    Grid grid = gridOf(kDims);
     channel.voxels = VoxelBuffer(ScalarType::u8, grid.voxelCount());
     for (std::uint8_t& v : channel.voxels.as<std::uint8_t>()) v = std::uint8_t(byte(random));
     channel.slope = 0.5;
     channel.intercept = -20;
   }
-  return Volume(makeGrid(kDims), std::move(channels));
+  return Volume(gridOf(kDims), std::move(channels));
 }
 
 ChannelAppearance randomAppearance(std::mt19937& random, bool jumps) {

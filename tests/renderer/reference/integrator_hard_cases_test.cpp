@@ -8,18 +8,16 @@
 
 #include "renderer/reference/integrator.h"
 #include "tests/renderer/reference/test_volumes.h"
+#include "tests/support/volumes.h"
 
 namespace scolopax::reference {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-const glm::dvec3 kRed(1, 0, 0);
+using namespace test;
 
-/// Optical depth along a ray, from its alpha.
-double depthOf(const Volume& volume, const ChannelAppearance& appearance, const glm::dvec3& origin,
-               const glm::dvec3& direction) {
-  return -std::log1p(-traceReference(volume, makeScene({appearance}), origin, direction).rgba.a);
+double depthAlong(const Volume& volume, const ChannelAppearance& appearance, const glm::dvec3& origin,
+                  const glm::dvec3& direction) {
+  return depthOf(traceReference(volume, makeScene({appearance}), origin, direction));
 }
 
 TEST(ReferenceCurve, NearDiracOpacityIsNeverMissed) {
@@ -32,9 +30,9 @@ TEST(ReferenceCurve, NearDiracOpacityIsNeverMissed) {
       // Area of the hat divided by |df/dt|.
       const double straight = 0.5 * (n - 1);
       const double tolerance = straight * 1e-15 * 4 / width + 1e-10;  // positions are rounded to 1e-16
-      EXPECT_NEAR(depthOf(volume, hat, {-3, 5.2, 7.1}, {1, 0, 0}), straight, tolerance);
+      EXPECT_NEAR(depthAlong(volume, hat, {-3, 5.2, 7.1}, {1, 0, 0}), straight, tolerance);
       const glm::dvec3 oblique(1, 0.4, -0.3);
-      EXPECT_NEAR(depthOf(volume, hat, glm::dvec3(16, 20, 20) - 30.0 * oblique, oblique),
+      EXPECT_NEAR(depthAlong(volume, hat, glm::dvec3(16, 20, 20) - 30.0 * oblique, oblique),
                   straight * glm::length(oblique), 2 * tolerance);
     }
 }
@@ -44,15 +42,15 @@ TEST(ReferenceCurve, StepsAndBoxesCutAtTheirPlace) {
   const Volume volume = rampAlongX({n, 1, 1});
   ChannelAppearance appearance = ramp(0, n - 1, 0.3);
   appearance.opacity = {{0, 0}, {0.437, 0}, {0.437, 1}, {1, 1}};
-  EXPECT_NEAR(depthOf(volume, appearance, {-3, 0, 0}, {1, 0, 0}), 0.3 * (0.563 * 10 + 0.5), 1e-12);
+  EXPECT_NEAR(depthAlong(volume, appearance, {-3, 0, 0}, {1, 0, 0}), 0.3 * (0.563 * 10 + 0.5), 1e-12);
   appearance.opacity = {{0.3, 0}, {0.3, 1}, {0.4, 1}, {0.4, 0}};
-  EXPECT_NEAR(depthOf(volume, appearance, {-3, 0, 0}, {1, 0, 0}), 0.3, 1e-12);
+  EXPECT_NEAR(depthAlong(volume, appearance, {-3, 0, 0}, {1, 0, 0}), 0.3, 1e-12);
 }
 
 TEST(ReferenceCurve, AStepInColorSplitsTheLightAtItsPlace) {
   const int n = 11;
   const Volume volume = rampAlongX({n, 1, 1});
-  ChannelAppearance appearance = uniform(0.3, kRed);
+  ChannelAppearance appearance = solid(0.3, kRed);
   appearance.rangeHi = n - 1;
   appearance.color = {{0, {1, 0, 0}}, {0.25, {1, 0, 0}}, {0.25, {0, 0, 1}}};
   const RayResult found = traceReference(volume, makeScene({appearance}), {-3, 0, 0}, {1, 0, 0});
@@ -68,7 +66,7 @@ TEST(ReferenceCurve, AReversedRangeReverses) {
               backward = makeScene({ramp(n - 1, 0, 0.4, kRed)});
   EXPECT_NEAR(traceReference(volume, forward, {-3, 0, 0}, {1, 0, 0}).rgba.r,
               traceReference(volume, backward, {n + 3, 0, 0}, {-1, 0, 0}).rgba.r, 1e-12);
-  ChannelAppearance colors = uniform(0.4, kRed);
+  ChannelAppearance colors = solid(0.4, kRed);
   colors.rangeLo = n - 1;
   colors.rangeHi = 0;
   colors.color = {{0, {1, 0, 0}}, {0.5, {1, 0, 0}}, {0.5, {0, 0, 1}}};
@@ -78,14 +76,14 @@ TEST(ReferenceCurve, AReversedRangeReverses) {
 
 TEST(ReferenceCurve, AnEmptyRangeIsAStep) {
   const int n = 7;
-  EXPECT_NEAR(depthOf(rampAlongX({n, 1, 1}), ramp(2.25, 2.25, 0.4), {-3, 0, 0}, {1, 0, 0}),
+  EXPECT_NEAR(depthAlong(rampAlongX({n, 1, 1}), ramp(2.25, 2.25, 0.4), {-3, 0, 0}, {1, 0, 0}),
               0.4 * (6.5 - 2.25), 1e-12);
   // A volume in which every voxel has exactly the value of the step is above it.
-  const Volume constant = makeVolume(makeGrid({3, 4, 5}), {[](int, int, int) { return 0.1f; }});
+  const Volume constant = makeVolume(gridOf({3, 4, 5}), {[](int, int, int) { return 0.1f; }});
   const double value = double(0.1f);
-  EXPECT_NEAR(depthOf(constant, ramp(value, value, 0.4), {-3, 1.3, 2.2}, {1, 0.1, 0.2}),
+  EXPECT_NEAR(depthAlong(constant, ramp(value, value, 0.4), {-3, 1.3, 2.2}, {1, 0.1, 0.2}),
               0.4 * 3 * std::sqrt(1.05), 1e-12);
-  EXPECT_EQ(depthOf(constant, ramp(value + 1e-9, value + 1e-9, 0.4), {-3, 1.3, 2.2}, {1, 0, 0}), 0);
+  EXPECT_EQ(depthAlong(constant, ramp(value + 1e-9, value + 1e-9, 0.4), {-3, 1.3, 2.2}, {1, 0, 0}), 0);
 }
 
 TEST(ReferenceCurve, GammaBendsTheRamp) {
@@ -94,10 +92,10 @@ TEST(ReferenceCurve, GammaBendsTheRamp) {
   for (const double gamma : {0.1, 0.5, 1.7, 2.0, 5.0}) {
     ChannelAppearance appearance = ramp(0, n - 1, 0.2);
     appearance.gamma = gamma;
-    EXPECT_NEAR(depthOf(volume, appearance, {-3, 0, 0}, {1, 0, 0}), 0.2 * (8 / (gamma + 1) + 0.5), 1e-8)
+    EXPECT_NEAR(depthAlong(volume, appearance, {-3, 0, 0}, {1, 0, 0}), 0.2 * (8 / (gamma + 1) + 0.5), 1e-8)
         << gamma;
     appearance.density = 1e-7;
-    EXPECT_NEAR(depthOf(volume, appearance, {-3, 0, 0}, {1, 0, 0}) / (1e-7 * (8 / (gamma + 1) + 0.5)), 1,
+    EXPECT_NEAR(depthAlong(volume, appearance, {-3, 0, 0}, {1, 0, 0}) / (1e-7 * (8 / (gamma + 1) + 0.5)), 1,
                 1e-6);
   }
 }
@@ -105,8 +103,8 @@ TEST(ReferenceCurve, GammaBendsTheRamp) {
 TEST(ReferenceVoxels, ThatAreNotFiniteEmptyTheCellsTheyBelongTo) {
   for (const double bad : {kNaN, kInfinity, -kInfinity}) {
     const VoxelFunction holed = [&](int i, int, int) { return i == 2 ? bad : 1.0; };
-    const Volume volume = makeVolume(makeGrid({6, 1, 1}), {holed, [](int, int, int) { return 1; }});
-    Scene scene = makeScene({uniform(0.5, kRed), uniform(0.25, {0, 1, 0})});
+    const Volume volume = makeVolume(gridOf({6, 1, 1}), {holed, [](int, int, int) { return 1; }});
+    Scene scene = makeScene({solid(0.5, kRed), solid(0.25, {0, 1, 0})});
     EXPECT_NEAR(-std::log1p(-traceReference(volume, scene, {-3, 0, 0}, {1, 0, 0}).rgba.a), 0.5 * 4 + 0.25 * 6,
                 1e-12);
     scene.channels[1].visible = false;
@@ -116,9 +114,9 @@ TEST(ReferenceVoxels, ThatAreNotFiniteEmptyTheCellsTheyBelongTo) {
 
 TEST(ReferenceVoxels, ThatAreNotFiniteCountWithWeightZeroInTheCellOfTheSample) {
   const auto depthAt = [&](int badRow, double y) {
-    const Volume volume = makeVolume(makeGrid({5, 5, 1}),
+    const Volume volume = makeVolume(gridOf({5, 5, 1}),
                                      {[&](int i, int j, int) { return i == 2 && j == badRow ? kNaN : 1.0; }});
-    return depthOf(volume, uniform(1, kRed), {-3, y, 0}, {1, 0, 0});
+    return depthAlong(volume, solid(1, kRed), {-3, y, 0}, {1, 0, 0});
   };
   EXPECT_NEAR(depthAt(1, 0), 3, 1e-12);  // row 0 is in the cells [0,1), whose corners include row 1
   EXPECT_NEAR(depthAt(1, 1), 3, 1e-12);
@@ -131,35 +129,34 @@ TEST(ReferenceVoxels, ThatAreNotFiniteCountWithWeightZeroInTheCellOfTheSample) {
 }
 
 TEST(ReferenceVoxels, ThatAreNotFiniteBesideTheEdgeEmptyTheOuterHalfVoxel) {
-  const Volume volume =
-      makeVolume(makeGrid({6, 1, 1}), {[](int i, int, int) { return i == 1 ? kNaN : 1.0; }});
-  EXPECT_NEAR(depthOf(volume, uniform(1, kRed), {-3, 0, 0}, {1, 0, 0}), 3.5, 1e-12);
+  const Volume volume = makeVolume(gridOf({6, 1, 1}), {[](int i, int, int) { return i == 1 ? kNaN : 1.0; }});
+  EXPECT_NEAR(depthAlong(volume, solid(1, kRed), {-3, 0, 0}, {1, 0, 0}), 3.5, 1e-12);
 }
 
 TEST(ReferenceVoxels, WithoutAFiniteOneNothingIsSeen) {
-  const Volume volume = makeVolume(makeGrid({3, 3, 3}), {[](int, int, int) { return kNaN; }});
-  EXPECT_EQ(traceReference(volume, makeScene({uniform(5, kRed)}), {-3, 1, 1}, {1, 0, 0}).rgba, glm::dvec4(0));
+  const Volume volume = makeVolume(gridOf({3, 3, 3}), {[](int, int, int) { return kNaN; }});
+  EXPECT_EQ(traceReference(volume, makeScene({solid(5, kRed)}), {-3, 1, 1}, {1, 0, 0}).rgba, glm::dvec4(0));
 }
 
 TEST(ReferenceVoxels, OfExtremeSizeInterpolateWithoutOverflow) {
   const double huge = std::numeric_limits<float>::max();
-  const Volume volume = makeVolume(makeGrid({2, 1, 1}), {[&](int i, int, int) { return i ? huge : -huge; }});
-  EXPECT_NEAR(depthOf(volume, ramp(-huge, huge, 0.5), {-3, 0, 0}, {1, 0, 0}), 0.5 * (0.5 + 0.5), 1e-12);
+  const Volume volume = makeVolume(gridOf({2, 1, 1}), {[&](int i, int, int) { return i ? huge : -huge; }});
+  EXPECT_NEAR(depthAlong(volume, ramp(-huge, huge, 0.5), {-3, 0, 0}, {1, 0, 0}), 0.5 * (0.5 + 0.5), 1e-12);
   const double tiny = std::numeric_limits<float>::denorm_min();
-  const Volume small = makeVolume(makeGrid({2, 1, 1}), {[&](int i, int, int) { return i * tiny; }});
-  EXPECT_NEAR(depthOf(small, ramp(0, tiny, 0.5), {-3, 0, 0}, {1, 0, 0}), 0.5 * (0.5 + 0.5), 1e-12);
+  const Volume small = makeVolume(gridOf({2, 1, 1}), {[&](int i, int, int) { return i * tiny; }});
+  EXPECT_NEAR(depthAlong(small, ramp(0, tiny, 0.5), {-3, 0, 0}, {1, 0, 0}), 0.5 * (0.5 + 0.5), 1e-12);
 }
 
 TEST(ReferenceVoxels, ASingleOneIsABoxOfItsOwn) {
   const Volume volume =
-      makeVolume(makeGrid({1, 1, 1}, {2, 3, 4}, {10, 20, 30}), {[](int, int, int) { return 7; }});
-  EXPECT_NEAR(depthOf(volume, uniform(0.1, kRed), {0, 20, 30}, {1, 0, 0}), 0.2, 1e-12);
-  EXPECT_NEAR(depthOf(volume, uniform(0.1, kRed), {10, 0, 30}, {0, 1, 0}), 0.3, 1e-12);
-  EXPECT_NEAR(depthOf(volume, uniform(0.1, kRed), {10, 20, 99}, {0, 0, -1}), 0.4, 1e-12);
+      makeVolume(gridOf({1, 1, 1}, {2, 3, 4}, {10, 20, 30}), {[](int, int, int) { return 7; }});
+  EXPECT_NEAR(depthAlong(volume, solid(0.1, kRed), {0, 20, 30}, {1, 0, 0}), 0.2, 1e-12);
+  EXPECT_NEAR(depthAlong(volume, solid(0.1, kRed), {10, 0, 30}, {0, 1, 0}), 0.3, 1e-12);
+  EXPECT_NEAR(depthAlong(volume, solid(0.1, kRed), {10, 20, 99}, {0, 0, -1}), 0.4, 1e-12);
 }
 
 TEST(ReferenceVoxels, OfZeroAreExactlyTransparent) {
-  const Volume volume = makeVolume(makeGrid({4, 4, 4}), {[](int, int, int) { return 0; }});
+  const Volume volume = makeVolume(gridOf({4, 4, 4}), {[](int, int, int) { return 0; }});
   EXPECT_EQ(traceReference(volume, makeScene({ramp(0, 1, 1e6)}), {-3, 1.5, 1.5}, {1, 0.1, 0}).rgba,
             glm::dvec4(0));
 }
@@ -171,8 +168,8 @@ TEST(ReferenceVoxels, OfIntegerTypesBecomeDataBySlopeAndIntercept) {
   stored[0] = -100, stored[1] = 0, stored[2] = 100;
   channels[0].slope = 0.01;
   channels[0].intercept = 300;  // 299, 300, 301
-  const Volume volume(makeGrid({3, 1, 1}), std::move(channels));
-  EXPECT_NEAR(depthOf(volume, ramp(299, 301, 0.5), {-3, 0, 0}, {1, 0, 0}), 0.5 * (1 + 0.5), 1e-12);
+  const Volume volume(gridOf({3, 1, 1}), std::move(channels));
+  EXPECT_NEAR(depthAlong(volume, ramp(299, 301, 0.5), {-3, 0, 0}, {1, 0, 0}), 0.5 * (1 + 0.5), 1e-12);
 }
 
 /// A lumpy field, traced along rays that are given in voxel coordinates and mapped to a world space.
@@ -232,11 +229,11 @@ TEST(ReferenceWorld, RotatedAndMirroredLooksTheSame) {
 }
 
 TEST(ReferenceWorld, AnisotropicSpacingOfOneToAHundredStretchesLengths) {
-  const Volume volume = makeVolume(makeGrid({5, 5, 5}, {1, 1, 100}), {[](int, int, int k) { return k; }});
-  EXPECT_NEAR(depthOf(volume, ramp(0, 4, 0.01), {2, 2, -300}, {0, 0, 1}), 0.01 * (200 + 50), 1e-12);
+  const Volume volume = makeVolume(gridOf({5, 5, 5}, {1, 1, 100}), {[](int, int, int k) { return k; }});
+  EXPECT_NEAR(depthAlong(volume, ramp(0, 4, 0.01), {2, 2, -300}, {0, 0, 1}), 0.01 * (200 + 50), 1e-12);
   // Across all layers obliquely: z decreases by 100 when x changes by 1.
   const double length = std::sqrt(1 + 1e4);
-  EXPECT_NEAR(depthOf(volume, ramp(0, 4, 0.01), {-0.5, 2, 450}, {1, 0, -100}), 0.01 * length * (2 + 0.5),
+  EXPECT_NEAR(depthAlong(volume, ramp(0, 4, 0.01), {-0.5, 2, 450}, {1, 0, -100}), 0.01 * length * (2 + 0.5),
               1e-11);
 }
 

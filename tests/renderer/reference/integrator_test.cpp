@@ -10,28 +10,23 @@
 
 #include "renderer/core/error.h"
 #include "tests/renderer/reference/test_volumes.h"
+#include "tests/support/volumes.h"
 
 namespace scolopax::reference {
 namespace {
 
+using namespace test;
+
 constexpr double kPi = 3.14159265358979323846;
-const glm::dvec3 kRed(1, 0, 0), kGreen(0, 1, 0), kBlue(0, 0, 1), kOrange(1, 0.5, 0.25);
-
-void expectColor(const RayResult& found, const glm::dvec3& color, double alpha, double tolerance = 1e-7) {
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(found.rgba[c], color[c], tolerance) << "component " << c;
-  EXPECT_NEAR(found.rgba.a, alpha, tolerance);
-  EXPECT_LE(found.error, 1e-6);
-}
-
 /// A box of 4 x 6 x 2.5 world units around `centre`.
 Volume box(glm::dvec3 centre) {
-  return makeVolume(makeGrid({4, 3, 5}, {1, 2, 0.5}, centre - glm::dvec3(1.5, 2, 1)),
+  return makeVolume(gridOf({4, 3, 5}, {1, 2, 0.5}, centre - glm::dvec3(1.5, 2, 1)),
                     {[](int, int, int) { return 3; }});
 }
 
 TEST(Reference, HomogeneousBoxFromOutsideAlongEachAxis) {
   const Volume volume = box({7, -8, 9});
-  const Scene scene = makeScene({uniform(0.7, kOrange)});
+  const Scene scene = makeScene({solid(0.7, kOrange)});
   const double lengths[3] = {4, 6, 2.5};
   for (int axis = 0; axis < 3; ++axis)
     for (const double sign : {1.0, -1.0}) {
@@ -47,7 +42,7 @@ TEST(Reference, HomogeneousBoxFromOutsideAlongEachAxis) {
 TEST(Reference, HomogeneousBoxObliquely) {
   const glm::dvec3 centre(7, -8, 9);
   const Volume volume = box(centre);
-  const Scene scene = makeScene({uniform(0.7, kOrange)});
+  const Scene scene = makeScene({solid(0.7, kOrange)});
   for (const glm::dvec3 d : {glm::dvec3(1, 1, 1), glm::dvec3(-1, 2, 0.3), glm::dvec3(0.01, -0.02, 1)}) {
     const glm::dvec3 unit = glm::normalize(d);
     const double length = 2 * std::min({2 / std::abs(unit.x), 3 / std::abs(unit.y), 1.25 / std::abs(unit.z)});
@@ -59,7 +54,7 @@ TEST(Reference, HomogeneousBoxObliquely) {
 TEST(Reference, HomogeneousBoxFromInsideAFaceAnEdgeAndACorner) {
   const glm::dvec3 centre(7, -8, 9);
   const Volume volume = box(centre);
-  const Scene scene = makeScene({uniform(0.7, kRed)});
+  const Scene scene = makeScene({solid(0.7, kRed)});
   const auto alpha = [&](const glm::dvec3& from, const glm::dvec3& d) {
     return traceReference(volume, scene, centre + from, d).rgba.a;
   };
@@ -72,7 +67,7 @@ TEST(Reference, HomogeneousBoxFromInsideAFaceAnEdgeAndACorner) {
 }
 
 TEST(Reference, RaysAlongFacesAndEdgesCountAsInsideAndThoseBesideAsOutside) {
-  const Scene scene = makeScene({uniform(0.7, kRed)});
+  const Scene scene = makeScene({solid(0.7, kRed)});
   for (const double offset : {0.0, 1e6}) {
     const Volume volume = box(glm::dvec3(offset));
     const double alpha = 1 - std::exp(-0.7 * 4);
@@ -89,7 +84,7 @@ TEST(Reference, RaysAlongFacesAndEdgesCountAsInsideAndThoseBesideAsOutside) {
 
 TEST(Reference, WhatLiesBehindTheOriginIsNotSeen) {
   const Volume volume = box(glm::dvec3(0));
-  EXPECT_EQ(traceReference(volume, makeScene({uniform(5, kRed)}), {10, 0, 0}, {1, 0, 0}).rgba, glm::dvec4(0));
+  EXPECT_EQ(traceReference(volume, makeScene({solid(5, kRed)}), {10, 0, 0}, {1, 0, 0}).rgba, glm::dvec4(0));
 }
 
 TEST(Reference, LinearDensityWithALinearColormapMatchesTheErrorFunction) {
@@ -114,7 +109,7 @@ TEST(Reference, OpticalThicknessFromOneMillionthToOneMillion) {
   const Volume volume = box(glm::dvec3(0));
   for (double thickness = 1e-6; thickness < 2e6; thickness *= 10) {
     const RayResult found =
-        traceReference(volume, makeScene({uniform(thickness / 4, kOrange)}), {-9, 0.1, 0.1}, {1, 0, 0});
+        traceReference(volume, makeScene({solid(thickness / 4, kOrange)}), {-9, 0.1, 0.1}, {1, 0, 0});
     const double alpha = -std::expm1(-thickness);
     EXPECT_NEAR(found.rgba.a / alpha, 1, 1e-10) << thickness;
     EXPECT_NEAR(found.rgba.g / (0.5 * alpha), 1, 1e-7) << thickness;
@@ -123,8 +118,8 @@ TEST(Reference, OpticalThicknessFromOneMillionthToOneMillion) {
 
 TEST(Reference, AThickFrontHidesWhatIsBehindAndAThinOneAddsUp) {
   // Two halves along x: value 0 is red, 1 is blue, and the change between them takes one voxel.
-  const Volume volume = makeVolume(makeGrid({8, 1, 1}), {[](int i, int, int) { return i < 4 ? 0 : 1; }});
-  ChannelAppearance appearance = uniform(1e6, kRed);
+  const Volume volume = makeVolume(gridOf({8, 1, 1}), {[](int i, int, int) { return i < 4 ? 0 : 1; }});
+  ChannelAppearance appearance = solid(1e6, kRed);
   appearance.color = {{0, kRed}, {0.5, kRed}, {0.5, kBlue}, {1, kBlue}};
   expectColor(traceReference(volume, makeScene({appearance}), {-5, 0, 0}, {1, 0, 0}), kRed, 1, 1e-9);
   expectColor(traceReference(volume, makeScene({appearance}), {15, 0, 0}, {-1, 0, 0}), kBlue, 1, 1e-9);
@@ -136,8 +131,8 @@ TEST(Reference, AThickFrontHidesWhatIsBehindAndAThinOneAddsUp) {
 
 TEST(Reference, ConstantChannelsShareTheLightByTheirExtinctions) {
   const VoxelFunction one = [](int, int, int) { return 1; };
-  const Volume volume = makeVolume(makeGrid({3, 3, 3}), {one, one, one});
-  Scene scene = makeScene({uniform(0.25, kRed), uniform(1.5, kOrange), uniform(9, kBlue)});
+  const Volume volume = makeVolume(gridOf({3, 3, 3}), {one, one, one});
+  Scene scene = makeScene({solid(0.25, kRed), solid(1.5, kOrange), solid(9, kBlue)});
   scene.channels[2].visible = false;
   const double alpha = 1 - std::exp(-1.75 * 3);
   expectColor(traceReference(volume, scene, {1, 1, -7}, {0, 0, 1}),
@@ -186,7 +181,7 @@ TEST(Reference, Figure3SeenObliquelyMatchesAMillionMidpoints) {
 TEST(Reference, RefusesScenesAndRaysThatDoNotFit) {
   const Volume volume = box(glm::dvec3(0));
   EXPECT_THROW(traceReference(volume, makeScene({}), {0, 0, 0}, {1, 0, 0}), Error);
-  const Scene scene = makeScene({uniform(1, kRed)});
+  const Scene scene = makeScene({solid(1, kRed)});
   EXPECT_THROW(traceReference(volume, scene, {0, 0, 0}, {0, 0, 0}), Error);
   EXPECT_THROW(traceReference(volume, scene, {std::numeric_limits<double>::quiet_NaN(), 0, 0}, {1, 0, 0}),
                Error);

@@ -27,7 +27,7 @@ std::vector<Isovalue> randomSurfaces(RandomLight& draw) {
 
 /// Compares one ray through each of `count` random scenes with tiny steps. `largestClaim` holds for one
 /// channel.
-void expectClaimsHold(const Features& has, unsigned count, int steps, double largestClaim) {
+void expectFeatureClaimsHold(const Features& has, unsigned count, int steps, double largestClaim) {
   int seen = 0;
   for (unsigned seed = 1; seed <= count; ++seed) {
     RandomLight draw(seed);
@@ -57,24 +57,24 @@ void expectClaimsHold(const Features& has, unsigned count, int steps, double lar
 
 // kTolerance and kToleranceLit are tolerances of one piece.
 TEST(ReferenceInterpolation, KeepsWhatItClaimsOnRandomScenes) {
-  expectClaimsHold({}, 120, 10000, 2 * Integrator::kTolerance);
+  expectFeatureClaimsHold({}, 120, 10000, 2 * Integrator::kTolerance);
 }
 TEST(ReferenceInterpolation, KeepsWhatItClaimsOfOpacityByTheGradient) {
-  expectClaimsHold({.factors = true}, 80, 10000, 2 * Integrator::kTolerance);
+  expectFeatureClaimsHold({.factors = true}, 80, 10000, 2 * Integrator::kTolerance);
 }
 TEST(ReferenceInterpolation, KeepsWhatItClaimsWithShading) {
-  expectClaimsHold({.shading = true}, 80, 10000, 2 * Integrator::kToleranceLit);
-  expectClaimsHold({.shading = true, .factors = true}, 40, 10000, 2 * Integrator::kToleranceLit);
+  expectFeatureClaimsHold({.shading = true}, 80, 10000, 2 * Integrator::kToleranceLit);
+  expectFeatureClaimsHold({.shading = true, .factors = true}, 40, 10000, 2 * Integrator::kToleranceLit);
 }
 TEST(ReferenceInterpolation, KeepsWhatItClaimsWithSurfaces) {
-  expectClaimsHold({.surfaces = true}, 80, 10000, 2 * Integrator::kTolerance);
-  expectClaimsHold({.shading = true, .factors = true, .surfaces = true}, 80, 10000,
-                   2 * Integrator::kToleranceLit);
+  expectFeatureClaimsHold({.surfaces = true}, 80, 10000, 2 * Integrator::kTolerance);
+  expectFeatureClaimsHold({.shading = true, .factors = true, .surfaces = true}, 80, 10000,
+                          2 * Integrator::kToleranceLit);
 }
 TEST(ReferenceInterpolation, KeepsWhatItClaimsWithShadows) {
-  expectClaimsHold({.shadows = true}, 10, 300, 2 * Integrator::kToleranceLit);
-  expectClaimsHold({.shading = true, .shadows = true, .factors = true}, 10, 300,
-                   2 * Integrator::kToleranceLit);
+  expectFeatureClaimsHold({.shadows = true}, 10, 300, 2 * Integrator::kToleranceLit);
+  expectFeatureClaimsHold({.shading = true, .shadows = true, .factors = true}, 10, 300,
+                          2 * Integrator::kToleranceLit);
 }
 
 }  // namespace

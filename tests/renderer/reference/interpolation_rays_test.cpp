@@ -4,28 +4,19 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <limits>
 #include <random>
 
 #include "renderer/reference/integrator.h"
 #include "tests/renderer/reference/test_volumes.h"
+#include "tests/support/volumes.h"
 
 namespace scolopax::reference {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr Interpolation kAll[] = {Interpolation::trilinear, Interpolation::cubic, Interpolation::nearest};
-const glm::dvec3 kRed(1, 0, 0), kGreen(0, 1, 0), kBlue(0, 0, 1);
+using namespace test;
 
 ChannelAppearance with(Interpolation interpolation, ChannelAppearance look) {
   look.interpolation = interpolation;
-  return look;
-}
-/// Nothing but surfaces, over the range from 0 to 10.
-ChannelAppearance surfaces(Interpolation interpolation, std::vector<Isovalue> isovalues) {
-  ChannelAppearance look = with(interpolation, ramp(0, 10, 1));
-  look.opacity = {{0, 0}};
-  look.isovalues = std::move(isovalues);
   return look;
 }
 
@@ -34,12 +25,8 @@ Volume rows(const std::vector<std::vector<double>>& values) {
   std::vector<VoxelFunction> functions;
   for (const std::vector<double>& row : values)
     functions.emplace_back([row](int i, int, int) { return row[std::size_t(i)]; });
-  return makeVolume(makeGrid({int(values[0].size()), 1, 1}), functions);
+  return makeVolume(gridOf({int(values[0].size()), 1, 1}), functions);
 }
-RayResult alongX(const Volume& volume, const Scene& scene) {
-  return traceReference(volume, scene, {-5, 0, 0}, {1, 0, 0});
-}
-double depthOf(const RayResult& ray) { return -std::log1p(-ray.rgba.a); }
 
 TEST(ReferenceNearest, IsConstantInEveryVoxel) {
   const Scene scene = makeScene({with(Interpolation::nearest, ramp(0, 4, 0.6))});
@@ -48,7 +35,7 @@ TEST(ReferenceNearest, IsConstantInEveryVoxel) {
 }
 
 TEST(ReferenceNearest, ChangesColourAtFaces) {
-  ChannelAppearance look = with(Interpolation::nearest, uniform(0.3, kRed));
+  ChannelAppearance look = with(Interpolation::nearest, solid(0.3, kRed));
   look.rangeHi = 2;
   look.color = {{0, kRed}, {0.5, kGreen}, {1, kBlue}};
   const RayResult found = alongX(rows({{0, 0, 1, 2, 2, 2}}), makeScene({look}));
@@ -59,7 +46,7 @@ TEST(ReferenceNearest, ChangesColourAtFaces) {
 }
 
 TEST(ReferenceNearest, HandsOverAtFacesInMax) {
-  Scene scene = makeScene({with(Interpolation::nearest, ramp(0, 4, 1, kRed)), uniform(0.5, kBlue)});
+  Scene scene = makeScene({with(Interpolation::nearest, ramp(0, 4, 1, kRed)), solid(0.5, kBlue)});
   scene.blend = BlendMode::max;
   const RayResult found = alongX(rows({{1, 3, 4, 2, 0}, {0, 0, 0, 0, 0}}), scene);
   const double afterBlue = std::exp(-0.5), afterRed = afterBlue * std::exp(-1.75);
@@ -71,8 +58,8 @@ TEST(ReferenceNearest, HandsOverAtFacesInMax) {
 TEST(ReferenceNearest, HasTheFactorOfTheTrilinearGradient) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(0, 1);
-  const Volume volume = makeVolume(makeGrid({5, 4, 5}), {[&](int, int, int) { return unit(random); }});
-  ChannelAppearance look = uniform(0.4, kRed);  // does not depend on the scalar
+  const Volume volume = makeVolume(gridOf({5, 4, 5}), {[&](int, int, int) { return unit(random); }});
+  ChannelAppearance look = solid(0.4, kRed);  // does not depend on the scalar
   look.gradientOpacity = GradientOpacity{0.1, 0.4, {{0, 0}, {0.5, 1}, {1, 0.3}}};
   for (int ray = 0; ray < 20; ++ray) {
     const glm::dvec3 through = 4.0 * glm::dvec3(unit(random), unit(random), unit(random)),
@@ -86,14 +73,14 @@ TEST(ReferenceNearest, HasTheFactorOfTheTrilinearGradient) {
 }
 
 TEST(ReferenceNearest, SurfacesAreFacesBetweenVoxels) {
-  ChannelAppearance look = with(Interpolation::nearest, uniform(0.3, kGreen));
+  ChannelAppearance look = with(Interpolation::nearest, solid(0.3, kGreen));
   look.rangeHi = 10;
   look.isovalues = {{2, 0.4, kRed}};
   const RayResult found = alongX(rows({{0, 1, 2, 3, 4, 5}}), makeScene({look}));
   const double before = std::exp(-0.3 * 2), all = std::exp(-0.3 * 6);  // from -0.5 to 1.5
   EXPECT_NEAR(found.rgba.r, before * 0.4, 1e-12);
   EXPECT_NEAR(found.rgba.g, 1 - before + 0.6 * (before - all), 1e-12);
-  const Scene half = makeScene({surfaces(Interpolation::nearest, {{1, 0.5, kRed}})});
+  const Scene half = makeScene({with(Interpolation::nearest, surfaces({{1, 0.5, kRed}}))});
   for (const auto& [row, crossings] : {std::pair<std::vector<double>, int>{{0, 1, 1, 0}, 2},
                                        {{2, 1, 1, 2}, 0},
                                        {{0, 2, 0, 2}, 3},
@@ -106,18 +93,18 @@ TEST(ReferenceNearest, SurfacesAreNotMetWhereVoxelsTouchAtAnEdge) {
   // From voxel to voxel along a diagonal, where rounding may lead through a third one.
   for (const double spacing : {1.0, 0.3, 0.7})
     for (const int sign : {1, -1}) {
-      const Volume volume = makeVolume(makeGrid({7, 7, 1}, glm::dvec3(spacing), {0.1, -0.4, 0}),
+      const Volume volume = makeVolume(gridOf({7, 7, 1}, glm::dvec3(spacing), {0.1, -0.4, 0}),
                                        {[&](int i, int j, int) { return sign > 0 ? i == j : i + j == 6; }});
       const glm::dvec3 centre = glm::dvec3(3, 3, 0) * spacing + glm::dvec3(0.1, -0.4, 0);
       const glm::dvec3 direction = glm::normalize(glm::dvec3(1, sign, 0));
-      const Scene scene = makeScene({surfaces(Interpolation::nearest, {{1, 0.5, kRed}})});
+      const Scene scene = makeScene({with(Interpolation::nearest, surfaces({{1, 0.5, kRed}}))});
       EXPECT_EQ(traceReference(volume, scene, centre - 11.0 * direction, direction).rgba.a, 0);
     }
 }
 
 TEST(ReferenceNearest, SurfacesCastShadowsButNotOnThemselves) {
   const Volume volume = rows({{0, 1, 2, 3, 4, 5, 6, 7}});
-  Scene scene = makeScene({surfaces(Interpolation::nearest, {{2, 0.4, kRed}, {5, 1, kGreen}})});
+  Scene scene = makeScene({with(Interpolation::nearest, surfaces({{2, 0.4, kRed}, {5, 1, kGreen}}))});
   scene.channels[0].material = {0, 1, 0, 1};
   scene.shadows = true;
   scene.lights = {Light{LightType::directional, {1, 0, 0}, glm::dvec3(1), 1}};
@@ -156,14 +143,14 @@ TEST(ReferenceCubic, IntegratesTheSplineOfARow) {
 
 TEST(ReferenceCubic, VoxelsThatAreNotFiniteEmptyTheCellsThatTheyReach) {
   const Volume volume = rows({{1, 1, 1, 1, kNaN, 1, 1, 1, 1, 1}});
-  const Scene scene = makeScene({with(Interpolation::cubic, uniform(0.3, kRed))});
+  const Scene scene = makeScene({with(Interpolation::cubic, solid(0.3, kRed))});
   EXPECT_NEAR(depthOf(alongX(volume, scene)), 0.3 * (10 - 4), 1e-12);  // without [2, 6]
 }
 
 TEST(ReferenceInterpolation, OfAConstantMeetsAStepAtExactlyItsValue) {
-  const Volume volume = makeVolume(makeGrid({4, 4, 4}), {[](int, int, int) { return 0.1f; }});
+  const Volume volume = makeVolume(gridOf({4, 4, 4}), {[](int, int, int) { return 0.1f; }});
   const double value = double(0.1f);
-  for (const Interpolation interpolation : kAll) {
+  for (const Interpolation interpolation : kInterpolations) {
     // A step at exactly the value.
     const RayResult at = traceReference(volume, makeScene({with(interpolation, ramp(value, value, 0.4))}),
                                         {-3, 1.3, 2.2}, {1, 0.1, 0.2});
@@ -181,8 +168,8 @@ TEST(ReferenceInterpolation, CrossingsAreThoseThatSmallStepsFind) {
   std::uniform_real_distribution<double> place(-0.4, 3.4);
   int crossings[3] = {};
   for (int i = 0; i < 300; ++i) {
-    const Interpolation interpolation = kAll[i % 3];
-    const Volume volume = makeVolume(makeGrid({4, 4, 4}), {[&](int, int, int) { return value(random); }});
+    const Interpolation interpolation = kInterpolations[i % 3];
+    const Volume volume = makeVolume(gridOf({4, 4, 4}), {[&](int, int, int) { return value(random); }});
     const double isovalue = i % 4 == 0 ? 1.0 : 1.5;
     const glm::dvec3 from(place(random), place(random), -0.5), to(place(random), place(random), 3.5);
     const ScalarField field(volume.channels()[0], {4, 4, 4}, interpolation);
@@ -194,7 +181,7 @@ TEST(ReferenceInterpolation, CrossingsAreThoseThatSmallStepsFind) {
       expected += inside != last;
       last = inside;
     }
-    const Scene scene = makeScene({surfaces(interpolation, {{isovalue, 0.5, kRed}})});
+    const Scene scene = makeScene({with(interpolation, surfaces({{isovalue, 0.5, kRed}}))});
     const RayResult found = traceReference(volume, scene, from - (to - from), to - from);
     EXPECT_NEAR(-std::log2(1 - found.rgba.a), expected, 1e-9) << i << ' ' << nameOf(interpolation);
     crossings[i % 3] += expected;

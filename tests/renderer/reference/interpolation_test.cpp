@@ -10,19 +10,19 @@
 #include "renderer/reference/scalar_field.h"
 #include "tests/renderer/reference/point_field.h"
 #include "tests/renderer/reference/test_volumes.h"
+#include "tests/support/volumes.h"
 
 namespace scolopax::reference {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr Interpolation kAll[] = {Interpolation::trilinear, Interpolation::cubic, Interpolation::nearest};
+using namespace test;
 
 /// A channel of its own.
 struct Field {
   Volume volume;
   ScalarField scalar;
   Field(const glm::ivec3& dims, const VoxelFunction& voxels, Interpolation interpolation)
-      : volume(makeVolume(makeGrid(dims), {voxels})), scalar(volume.channels()[0], dims, interpolation) {}
+      : volume(makeVolume(gridOf(dims), {voxels})), scalar(volume.channels()[0], dims, interpolation) {}
   double operator()(double x, double y, double z) const { return scalar({x, y, z}); }
   glm::dvec3 gradient(double x, double y, double z) const { return scalar.gradient({x, y, z}); }
 };
@@ -30,7 +30,7 @@ struct Field {
 TEST(Interpolation, IsWhatItsDefinitionSays) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(0, 1);
-  for (const Interpolation interpolation : kAll)
+  for (const Interpolation interpolation : kInterpolations)
     for (const glm::ivec3 dims : {glm::ivec3(5, 4, 6), glm::ivec3(2, 3, 1), glm::ivec3(1)}) {
       const Field field(
           dims, [&](int, int, int) { return 100 * unit(random); }, interpolation);
@@ -48,7 +48,7 @@ TEST(Interpolation, IsWhatItsDefinitionSays) {
 TEST(Interpolation, OfAConstantIsExactlyThatConstant) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> place(-0.5, 3.5);
-  for (const Interpolation interpolation : kAll) {
+  for (const Interpolation interpolation : kInterpolations) {
     const Field field(
         {4, 4, 4}, [](int, int, int) { return 0.1f; }, interpolation);
     for (int i = 0; i < 200; ++i) {
@@ -162,7 +162,7 @@ TEST(NearestInterpolation, HasTheGradientOfTrilinear) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> unit(0, 1);
   const auto voxels = [&](int, int, int) { return unit(random) < 0.02 ? kNaN : unit(random); };
-  const Volume volume = makeVolume(makeGrid({6, 5, 7}), {voxels});
+  const Volume volume = makeVolume(gridOf({6, 5, 7}), {voxels});
   const ScalarField nearest(volume.channels()[0], {6, 5, 7}, Interpolation::nearest),
       trilinear(volume.channels()[0], {6, 5, 7});
   int zero = 0;

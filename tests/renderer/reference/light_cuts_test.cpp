@@ -27,7 +27,7 @@ struct Lines {
       : random(seed),
         worldFromVoxel(glm::dvec3(1, 0.1, 0), glm::dvec3(0, 1.5, 0.2), glm::dvec3(0.1, 0, 0.8)),
         volume(makeVolume(grid(), {[this](int, int, int) { return unit(); }})),
-        scene(makeScene({uniform(1, glm::dvec3(1))})) {
+        scene(makeScene({solid(1, glm::dvec3(1))})) {
     scene.shading = true;
     scene.channels[0].interpolation = seed < 20 ? Interpolation::trilinear : Interpolation::cubic;
     scene.channels[0].rangeHi = 0.5;  // the fade saturates in places

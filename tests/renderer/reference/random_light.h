@@ -24,7 +24,7 @@ struct RandomLight {
   Volume volume() {
     glm::ivec3 dims;
     for (int axis = 0; axis < 3; ++axis) dims[axis] = chance(0.05) ? 1 : among(2, 5);
-    Grid grid = makeGrid(dims, {0.5 + unit(), 0.5 + unit(), 0.5 + unit()}, 10.0 * vector());
+    Grid grid = gridOf(dims, {0.5 + unit(), 0.5 + unit(), 0.5 + unit()}, 10.0 * vector());
     if (chance(0.3)) grid.worldFromVoxel[0] += glm::dvec4(0.3 * vector(), 0);
     std::vector<ChannelSource> channels(std::size_t(among(1, 3)));
     for (ChannelSource& channel : channels) {

@@ -24,8 +24,8 @@ Camera perspective(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up, double fovY
 /// A cube of 4 world units around the origin, seen along -z in 8x8 pixels of 1 unit.
 struct CubeView {
   Volume volume =
-      makeVolume(makeGrid(glm::ivec3(4), glm::dvec3(1), glm::dvec3(-1.5)), {[](int, int, int) { return 1; }});
-  Scene scene = makeScene({uniform(0.4, {1, 0.5, 0})});
+      makeVolume(gridOf(glm::ivec3(4), glm::dvec3(1), glm::dvec3(-1.5)), {[](int, int, int) { return 1; }});
+  Scene scene = makeScene({solid(0.4, {1, 0.5, 0})});
   CubeView() {
     scene.camera = {.eye = {0, 0, 10}, .target = {0, 0, 0}, .up = {0, 1, 0}, .orthoHeight = 8.0};
     scene.width = scene.height = 8;
@@ -108,7 +108,7 @@ TEST(RenderReference, PointFilterLooksThroughPixelCentres) {
 
 TEST(RenderReference, FirstPixelIsTopLeft) {
   // Only the voxel at low x and high y in world space is visible.
-  const Volume volume = makeVolume(makeGrid(glm::ivec3(2), glm::dvec3(2), glm::dvec3(-1)),
+  const Volume volume = makeVolume(gridOf(glm::ivec3(2), glm::dvec3(2), glm::dvec3(-1)),
                                    {[](int i, int j, int) { return i == 0 && j == 1; }});
   CubeView view;
   view.scene.channels = {ramp(0, 1, 1)};

@@ -15,8 +15,6 @@
 namespace scolopax::reference {
 namespace {
 
-constexpr Interpolation kAll[] = {Interpolation::trilinear, Interpolation::cubic, Interpolation::nearest};
-
 /// A volume of random voxels, and rays through it that are cut at all planes.
 struct Rays {
   std::mt19937 random;
@@ -25,7 +23,7 @@ struct Rays {
   Rays(unsigned seed, const glm::ivec3& size)
       : random(seed),
         dims(size),
-        volume(makeVolume(makeGrid(size), {[this](int, int, int) { return 280 + 30 * unit(); }})) {}
+        volume(makeVolume(gridOf(size), {[this](int, int, int) { return 280 + 30 * unit(); }})) {}
   double unit() { return std::uniform_real_distribution<double>(0, 1)(random); }
   ScalarField field(Interpolation interpolation) const { return {volume.channels()[0], dims, interpolation}; }
   /// Calls visit(scalar, point) for every part of a ray, where point(u) is in voxel coordinates.
@@ -47,7 +45,7 @@ struct Rays {
 };
 
 TEST(ScalarAlong, IsTheScalarAtEveryPoint) {
-  for (const Interpolation interpolation : kAll)
+  for (const Interpolation interpolation : kInterpolations)
     for (const glm::ivec3 dims : {glm::ivec3(5, 6, 4), glm::ivec3(2), glm::ivec3(1, 4, 2), glm::ivec3(1)}) {
       Rays rays(1, dims);
       const ScalarField field = rays.field(interpolation);
@@ -105,7 +103,7 @@ TEST(ScalarAlong, FindsEveryCrossingThatAFineScanSees) {
 /// The scalar along the row of these voxels, in its cell `cell`.
 ScalarAlong cubicAlong(const std::vector<double>& row, int cell) {
   const glm::ivec3 dims(int(row.size()), 1, 1);
-  const Volume volume = makeVolume(makeGrid(dims), {[&](int i, int, int) { return row[std::size_t(i)]; }});
+  const Volume volume = makeVolume(gridOf(dims), {[&](int i, int, int) { return row[std::size_t(i)]; }});
   RayCells ray = cutAtCells({-9, 0, 0}, {1, 0, 0}, dims);
   return *scalarAlong({volume.channels()[0], dims, Interpolation::cubic},
                       CellOnRay(ray, ray.cuts[std::size_t(cell) + 1], ray.cuts[std::size_t(cell) + 2], dims));
@@ -137,7 +135,7 @@ TEST(ScalarAlong, TouchesAValueWithoutCrossingIt) {
 
 TEST(ScalarAlong, OfNearestAlongAFaceIsThatOfTheLaterVoxelWithinRounding) {
   const glm::ivec3 dims(4, 3, 1);
-  const Volume volume = makeVolume(makeGrid(dims), {[](int i, int j, int) { return i + 10 * j; }});
+  const Volume volume = makeVolume(gridOf(dims), {[](int i, int j, int) { return i + 10 * j; }});
   const ScalarField field(volume.channels()[0], dims, Interpolation::nearest);
   for (const double y : {0.5, 0.5 - 1e-15, 0.5 + 1e-15}) {
     const RayCells ray = cutAtCells({-9, y, 0}, {1, 0, 0}, dims, 99, CutAt::voxelCentresAndFaces);

@@ -15,7 +15,7 @@ namespace {
 double curved(int i, int j, int k) { return i * i + 10 * j * k; }
 
 TEST(ScalarField, InterpolatesBetweenVoxelsAndIsClampedBeyond) {
-  const Volume volume = makeVolume(makeGrid({5, 4, 3}), {curved});
+  const Volume volume = makeVolume(gridOf({5, 4, 3}), {curved});
   const ScalarField field(volume.channels()[0], {5, 4, 3});
   EXPECT_EQ(field({3, 2, 1}), 29);
   EXPECT_NEAR(field({1.25, 2, 1}), 20 + 1 + 0.25 * 3, 1e-14);
@@ -25,7 +25,7 @@ TEST(ScalarField, InterpolatesBetweenVoxelsAndIsClampedBeyond) {
 }
 
 TEST(ScalarField, GradientIsTheCentralDifferenceAndOneSidedAtTheBorder) {
-  const Volume volume = makeVolume(makeGrid({5, 4, 3}), {curved});
+  const Volume volume = makeVolume(gridOf({5, 4, 3}), {curved});
   const ScalarField field(volume.channels()[0], {5, 4, 3});
   EXPECT_EQ(field.gradient({2, 1, 1}), glm::dvec3(4, 10, 10));
   EXPECT_EQ(field.gradient({2.5, 1, 1}).x, 5);          // f(3.5) - f(1.5) = 12.5 - 2.5, over 2
@@ -37,7 +37,7 @@ TEST(ScalarField, GradientIsTheCentralDifferenceAndOneSidedAtTheBorder) {
 }
 
 TEST(ScalarField, GradientIsZeroWhereAValueIsNotFiniteAndAlongASingleLayer) {
-  const Volume volume = makeVolume(makeGrid({6, 3, 1}), {[](int i, int j, int) {
+  const Volume volume = makeVolume(gridOf({6, 3, 1}), {[](int i, int j, int) {
                                      return i == 4 ? std::numeric_limits<double>::infinity() : i + j;
                                    }});
   const ScalarField field(volume.channels()[0], {6, 3, 1});
@@ -53,7 +53,7 @@ TEST(ScalarField, GradientIsOfDataValues) {
   stored[0] = 10, stored[1] = 20, stored[2] = 50;
   channels[0].slope = -0.5;
   channels[0].intercept = 7;
-  const Volume volume(makeGrid({3, 1, 1}), std::move(channels));
+  const Volume volume(gridOf({3, 1, 1}), std::move(channels));
   EXPECT_EQ(ScalarField(volume.channels()[0], {3, 1, 1}).gradient({1, 0, 0}), glm::dvec3(-10, 0, 0));
 }
 

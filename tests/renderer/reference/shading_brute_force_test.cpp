@@ -19,7 +19,7 @@ Volume volumeOfBytes(const glm::ivec3& dims, const std::vector<std::uint8_t>& by
   std::vector<ChannelSource> channels(1);
   channels[0].voxels = VoxelBuffer(ScalarType::u8, bytes.size());
   std::memcpy(channels[0].voxels.data(), bytes.data(), bytes.size());
-  return Volume(makeGrid(dims), std::move(channels));
+  return Volume(gridOf(dims), std::move(channels));
 }
 
 void expectAgreement(const RayResult& found, const March& expected, const std::string& what) {
@@ -30,7 +30,7 @@ void expectAgreement(const RayResult& found, const March& expected, const std::s
 TEST(ReferenceShading, OfEightBytesIsWhatTinyStepsSay) {
   // The normal flips to the viewer inside a cell. Superposed converges to .2281.
   const Volume volume = volumeOfBytes(glm::ivec3(2), {255, 0, 255, 0, 0, 255, 255, 255});
-  Scene scene = makeScene({uniform(1, glm::dvec3(1))});
+  Scene scene = makeScene({solid(1, glm::dvec3(1))});
   scene.channels[0].rangeHi = 255;
   scene.channels[0].material = {0, 1, 0, 20};
   scene.shading = true;
@@ -57,7 +57,7 @@ TEST(ReferenceShading, OfEightBytesIsWhatTinyStepsSay) {
 
 /// Compares one ray through each of `count` random scenes, in all blend modes, with tiny steps: the claimed
 /// error bounds must hold.
-void expectClaimsHold(bool shading, bool shadows, unsigned count, int steps, double largestClaim) {
+void expectLightClaimsHold(bool shading, bool shadows, unsigned count, int steps, double largestClaim) {
   for (unsigned seed = 1; seed <= count; ++seed) {
     RandomLight draw(seed);
     const Volume volume = draw.volume();
@@ -72,11 +72,13 @@ void expectClaimsHold(bool shading, bool shadows, unsigned count, int steps, dou
   }
 }
 
-TEST(Reference, KeepsWhatItClaimsOnRandomScenes) { expectClaimsHold(false, false, 100, 20000, 1e-7); }
-TEST(ReferenceShading, KeepsWhatItClaimsOnRandomScenes) { expectClaimsHold(true, false, 150, 20000, 2e-4); }
+TEST(Reference, KeepsWhatItClaimsOnRandomScenes) { expectLightClaimsHold(false, false, 100, 20000, 1e-7); }
+TEST(ReferenceShading, KeepsWhatItClaimsOnRandomScenes) {
+  expectLightClaimsHold(true, false, 150, 20000, 2e-4);
+}
 TEST(ReferenceShadows, KeepsWhatItClaimsOnRandomScenes) {
-  expectClaimsHold(false, true, 20, 600, 2e-4);
-  expectClaimsHold(true, true, 20, 600, 2e-4);
+  expectLightClaimsHold(false, true, 20, 600, 2e-4);
+  expectLightClaimsHold(true, true, 20, 600, 2e-4);
 }
 
 TEST(ReferenceShadows, KeepsWhatItClaimsAgainstTheSameWithAThousandthOfTheTolerance) {
@@ -103,9 +105,9 @@ TEST(ReferenceShading, SeesAHighlightHoweverNarrow) {
       RandomLight draw(seed);
       const glm::dvec3 ball = glm::dvec3(2) + 0.5 * draw.vector();
       const Volume volume =
-          makeVolume(makeGrid(glm::ivec3(5)),
+          makeVolume(gridOf(glm::ivec3(5)),
                      {[&](int i, int j, int k) { return glm::length(glm::dvec3(i, j, k) - ball); }});
-      Scene scene = makeScene({uniform(0.5, glm::dvec3(1))});
+      Scene scene = makeScene({solid(0.5, glm::dvec3(1))});
       scene.channels[0].material = {0, 0, 1, shininess};
       scene.shading = true;
       const glm::dvec3 direction = glm::normalize(draw.vector()), at = glm::dvec3(2) + draw.vector();
@@ -124,8 +126,8 @@ TEST(ReferenceShading, SeesAHighlightHoweverNarrow) {
 
 TEST(ReferenceShading, SeesTheGlowOfALightBesideTheRay) {
   // A highlight on matter that faces the light; it is as wide as the light's distance from the ray.
-  const Volume volume = makeVolume(makeGrid(glm::ivec3(6)), {[](int i, int j, int) { return j - 1e-5 * i; }});
-  Scene scene = makeScene({uniform(0.3, glm::dvec3(1))});
+  const Volume volume = makeVolume(gridOf(glm::ivec3(6)), {[](int i, int j, int) { return j - 1e-5 * i; }});
+  Scene scene = makeScene({solid(0.3, glm::dvec3(1))});
   scene.channels[0].material = {0, 1, 0, 20};
   scene.shading = true;
   for (const double distance : {0.1, 1e-2, 1e-3, 1e-4})
@@ -147,8 +149,8 @@ TEST(ReferenceShading, OfNormalsAcrossTheViewIsOneOfBothSides) {
     channels[0].voxels.as<std::uint8_t>()[i] = std::uint8_t(i % 8 + i / 8 % 8);
   channels[0].slope = 0.1;
   channels[0].intercept = 0.3;
-  const Volume volume(makeGrid(glm::ivec3(8)), std::move(channels));
-  Scene scene = makeScene({uniform(0.3, glm::dvec3(1))});
+  const Volume volume(gridOf(glm::ivec3(8)), std::move(channels));
+  Scene scene = makeScene({solid(0.3, glm::dvec3(1))});
   scene.channels[0].rangeHi = 0.1;
   scene.channels[0].material = {0, 1, 0, 20};
   scene.shading = true;
@@ -161,8 +163,8 @@ TEST(ReferenceShading, OfNormalsAcrossTheViewIsOneOfBothSides) {
 
 TEST(ReferenceShading, ClaimsMoreWhereLightIsBright) {
   // Matter hidden behind opaque matter may be as bright as the light.
-  const Volume volume = makeVolume(makeGrid({2, 2, 40}), {[](int, int, int k) { return k; }});
-  Scene scene = makeScene({uniform(1, glm::dvec3(1))});
+  const Volume volume = makeVolume(gridOf({2, 2, 40}), {[](int, int, int k) { return k; }});
+  Scene scene = makeScene({solid(1, glm::dvec3(1))});
   scene.shading = true;
   const auto trace = [&](double intensity) {
     scene.lights = {{LightType::headlight, {}, glm::dvec3(1), intensity}};

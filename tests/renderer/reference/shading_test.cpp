@@ -18,17 +18,13 @@ namespace {
 const glm::dvec3 kColor(0.8, 0.4, 0.2);
 const Material kMaterial{0.1, 0.6, 0.35, 7};
 
-Light directional(const glm::dvec3& to, const glm::dvec3& color = glm::dvec3(1), double intensity = 1) {
-  return {LightType::directional, to, color, intensity};
-}
-
 /// A field of value dot(a, world), on a grid with the given columns around the origin; opacity does not
 /// depend on the value.
 struct LinearField {
   glm::dvec3 a{1, 0, 0};
   glm::dmat3 columns{1.0};
   double range = 1;
-  Scene scene = makeScene({uniform(0.3, kColor)});
+  Scene scene = makeScene({solid(0.3, kColor)});
 
   LinearField() {
     scene.channels[0].material = kMaterial;
@@ -178,8 +174,8 @@ TEST(ReferenceShading, IsTheSameOnIsotropicAnisotropicAndRotatedGrids) {
 /// Two overlapping channels, of extinction 0.2 and 0.3, whose gradients point to the eye and to the side.
 struct TwoMaterials {
   Volume volume =
-      makeVolume(makeGrid({6, 6, 6}), {[](int i, int, int) { return i; }, [](int, int j, int) { return j; }});
-  Scene scene = makeScene({uniform(0.2, {1, 0, 0}), uniform(0.3, {0, 1, 0})});
+      makeVolume(gridOf({6, 6, 6}), {[](int i, int, int) { return i; }, [](int, int j, int) { return j; }});
+  Scene scene = makeScene({solid(0.2, {1, 0, 0}), solid(0.3, {0, 1, 0})});
   glm::dvec3 first = shaded({0.1, 0.6, 0.35, 7}, {1, 0, 0}, 1, 1),  // n along the light and the view
       second = shaded({0.5, 0.9, 0.2, 3}, {0, 1, 0}, 0, 0);         // n across both
   TwoMaterials() {

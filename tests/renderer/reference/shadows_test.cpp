@@ -13,17 +13,14 @@ namespace {
 
 constexpr double kTolerance = 1e-4;  // the integrator's tolerance with light
 
-Light directional(const glm::dvec3& to, const glm::dvec3& color = glm::dvec3(1), double intensity = 1) {
-  return {LightType::directional, to, color, intensity};
-}
 Light pointAt(const glm::dvec3& position) { return {LightType::point, position, glm::dvec3(1), 1}; }
 
 /// A box 8 long from z = -0.5 on, seen along +z at (2, 3); extinction 0.35, white, ambient 0.2.
 struct Slab {
   static constexpr double sigma = 0.35, length = 8, depth = sigma * length, ambient = 0.2;
   Volume volume =
-      makeVolume(makeGrid({8, 8, 8}), std::vector<VoxelFunction>(2, [](int, int, int) { return 1; }));
-  Scene scene = makeScene({uniform(sigma, glm::dvec3(1)), uniform(0, glm::dvec3(1))});
+      makeVolume(gridOf({8, 8, 8}), std::vector<VoxelFunction>(2, [](int, int, int) { return 1; }));
+  Scene scene = makeScene({solid(sigma, glm::dvec3(1)), solid(0, glm::dvec3(1))});
   Slab() {
     scene.shadows = true;
     for (ChannelAppearance& channel : scene.channels) channel.material.ambient = ambient;
@@ -150,9 +147,9 @@ TEST(ReferenceShadows, DoNotReachWhatIsFullyAmbient) {
 
 TEST(ReferenceShadows, AnOpaqueWallBlackensWhatIsBehindItAndNothingElse) {
   // A wall at x = 3, for y < 4, between the light and the ray at x = 6.
-  const Volume volume = makeVolume(makeGrid({8, 8, 8}), {[](int i, int j, int) { return i == 3 && j < 4; },
-                                                         [](int i, int, int) { return i > 5; }});
-  Scene scene = makeScene({ramp(0, 1, 1e5), uniform(0.2, glm::dvec3(1))});
+  const Volume volume = makeVolume(gridOf({8, 8, 8}), {[](int i, int j, int) { return i == 3 && j < 4; },
+                                                       [](int i, int, int) { return i > 5; }});
+  Scene scene = makeScene({ramp(0, 1, 1e5), solid(0.2, glm::dvec3(1))});
   scene.channels[1].opacity = {{0.5, 0}, {0.5, 1}};
   scene.channels[1].material.ambient = 0;
   scene.shadows = true;

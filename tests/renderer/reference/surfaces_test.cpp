@@ -13,31 +13,20 @@
 #include "renderer/data/surfaces.h"
 #include "renderer/reference/integrator.h"
 #include "tests/renderer/reference/test_volumes.h"
+#include "tests/support/volumes.h"
 
 namespace scolopax::reference {
 namespace {
 
-const glm::dvec3 kRed(1, 0, 0), kGreen(0, 1, 0), kBlue(0, 0, 1), kWhite(1, 1, 1);
-
-/// Nothing but these surfaces, over the range from 0 to 10.
-ChannelAppearance surfaces(std::vector<Isovalue> isovalues, glm::dvec3 color = kWhite) {
-  ChannelAppearance look = ramp(0, 10, 1, color);
-  look.opacity = {{0, 0}};
-  look.isovalues = std::move(isovalues);
-  return look;
-}
+using namespace test;
 
 /// One row of voxels along x.
 Volume row(const std::vector<double>& values) {
-  return makeVolume(makeGrid({int(values.size()), 1, 1}),
+  return makeVolume(gridOf({int(values.size()), 1, 1}),
                     {[&](int i, int, int) { return values[std::size_t(i)]; }});
 }
 
-RayResult alongX(const Volume& volume, const Scene& scene) {
-  return traceReference(volume, scene, {-5, 0, 0}, {1, 0, 0});
-}
-
-void expectColor(const RayResult& found, const glm::dvec3& color, double alpha) {
+void expectSeen(const RayResult& found, const glm::dvec3& color, double alpha) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(found.rgba[c], color[c], 1e-7) << "component " << c;
   EXPECT_NEAR(found.rgba.a, alpha, 1e-7);
 }
@@ -107,9 +96,9 @@ TEST(SurfaceList, ThePeaksOfKernelsAreTheSame) {
 TEST(ReferenceSurfaces, ARayLosesTheirOpacityInOrder) {
   const Volume volume = row({0, 1, 2, 3, 4, 5});
   const Scene scene = makeScene({surfaces({{3.5, 0.5, kRed}, {1.25, 0.25, kGreen}, {9, 1, kBlue}})});
-  expectColor(alongX(volume, scene), 0.25 * kGreen + 0.75 * 0.5 * kRed, 1 - 0.75 * 0.5);
-  expectColor(traceReference(volume, scene, {15, 0, 0}, {-1, 0, 0}), 0.5 * kRed + 0.5 * 0.25 * kGreen,
-              1 - 0.75 * 0.5);
+  expectSeen(alongX(volume, scene), 0.25 * kGreen + 0.75 * 0.5 * kRed, 1 - 0.75 * 0.5);
+  expectSeen(traceReference(volume, scene, {15, 0, 0}, {-1, 0, 0}), 0.5 * kRed + 0.5 * 0.25 * kGreen,
+             1 - 0.75 * 0.5);
   EXPECT_EQ(traceReference(volume, scene, {2, 0, -5}, {0, 0, 1}).rgba, glm::dvec4(0));  // along the layers
 }
 
@@ -123,24 +112,24 @@ TEST(ReferenceSurfaces, APlateauAtTheValueBelongsToTheUpperSide) {
                         {{1, 0, 0, 1}, 2}, {{0, 0, 1, 2}, 1}};
   for (const Case& c : cases) {
     const double passed = std::pow(0.5, c.crossings);
-    expectColor(alongX(row(c.values), makeScene({surfaces({{1, 0.5, kRed}})})), (1 - passed) * kRed,
-                1 - passed);
+    expectSeen(alongX(row(c.values), makeScene({surfaces({{1, 0.5, kRed}})})), (1 - passed) * kRed,
+               1 - passed);
   }
 }
 
 TEST(ReferenceSurfaces, CoincidentOnesAreMetInTheirOrder) {
   const Volume volume =
-      makeVolume(makeGrid({4, 1, 1}), {[](int i, int, int) { return i; }, [](int i, int, int) { return i; }});
+      makeVolume(gridOf({4, 1, 1}), {[](int i, int, int) { return i; }, [](int i, int, int) { return i; }});
   const Scene scene =
       makeScene({surfaces({{1.5, 0.5, kRed}, {1.5, 0.5, kGreen}}), surfaces({{1.5, 1, kBlue}})});
   for (const BlendMode blend : {BlendMode::density, BlendMode::max, BlendMode::mix}) {
     Scene blended = scene;
     blended.blend = blend;
-    expectColor(alongX(volume, blended), 0.5 * kRed + 0.25 * kGreen + 0.25 * kBlue, 1);
+    expectSeen(alongX(volume, blended), 0.5 * kRed + 0.25 * kGreen + 0.25 * kBlue, 1);
   }
   Scene composite = scene;
   composite.blend = BlendMode::composite;
-  expectColor(alongX(volume, composite), 0.5 * kRed + 0.25 * kGreen + 1.0 * kBlue, 1);
+  expectSeen(alongX(volume, composite), 0.5 * kRed + 0.25 * kGreen + 1.0 * kBlue, 1);
 }
 
 TEST(ReferenceSurfaces, AreNotMetAtVoxelsThatAreNotFiniteAndAtClipPlanes) {
@@ -156,12 +145,12 @@ TEST(ReferenceSurfaces, AreNotMetAtVoxelsThatAreNotFiniteAndAtClipPlanes) {
 }
 
 TEST(ReferenceSurfaces, MatterIsSeenThroughThem) {
-  ChannelAppearance look = uniform(0.3, kGreen);
+  ChannelAppearance look = solid(0.3, kGreen);
   look.rangeHi = 10;
   look.isovalues = {{2, 0.4, kRed}};
   const double before = std::exp(-0.3 * 2.5), all = std::exp(-0.3 * 6);  // the box begins at -0.5
-  expectColor(alongX(row({0, 1, 2, 3, 4, 5}), makeScene({look})),
-              (1 - before) * kGreen + before * 0.4 * kRed + 0.6 * (before - all) * kGreen, 1 - 0.6 * all);
+  expectSeen(alongX(row({0, 1, 2, 3, 4, 5}), makeScene({look})),
+             (1 - before) * kGreen + before * 0.4 * kRed + 0.6 * (before - all) * kGreen, 1 - 0.6 * all);
 }
 
 TEST(ReferenceSurfaces, OnlyPeaksHaveNoMatter) {
@@ -169,7 +158,7 @@ TEST(ReferenceSurfaces, OnlyPeaksHaveNoMatter) {
   look.opacity = {{0, 0}, {0.5, 1}, {1, 0}};
   look.peaks = Peaks::only;
   const double alpha = -std::expm1(-1.0);
-  expectColor(alongX(row({0, 1, 2, 3, 4}), makeScene({look})), alpha * kRed, alpha);
+  expectSeen(alongX(row({0, 1, 2, 3, 4}), makeScene({look})), alpha * kRed, alpha);
   look.peaks = Peaks::both;
   const Scene both = makeScene({look});
   EXPECT_NEAR(alongX(row({0, 1, 2, 3, 4}), both).rgba.a, 1 - std::exp(-2.0) * (1 - alpha), 1e-7);
@@ -177,7 +166,7 @@ TEST(ReferenceSurfaces, OnlyPeaksHaveNoMatter) {
 
 TEST(ReferenceSurfaces, AreLitInFullHoweverSmallTheGradient) {
   // The gradient is (0.1, 0, 0) over a range of 10: matter would hardly be shaded.
-  const Volume volume = makeVolume(makeGrid({21, 3, 3}), {[](int i, int, int) { return 0.1 * i; }});
+  const Volume volume = makeVolume(gridOf({21, 3, 3}), {[](int i, int, int) { return 0.1 * i; }});
   Scene scene = makeScene({surfaces({{1, 1, kRed}})});
   scene.channels[0].material = {0.1, 0.7, 0.2, 10};
   scene.shading = true;
@@ -216,7 +205,7 @@ TEST(ReferenceSurfaces, CrossingsAreThoseThatSmallStepsFind) {
   std::uniform_real_distribution<double> place(-0.4, 3.4);
   int crossings = 0;
   for (int i = 0; i < 300; ++i) {
-    const Volume volume = makeVolume(makeGrid({4, 4, 4}), {[&](int, int, int) { return value(random); }});
+    const Volume volume = makeVolume(gridOf({4, 4, 4}), {[&](int, int, int) { return value(random); }});
     const double isovalue = i % 3 == 0 ? 1.0 : i % 3 == 1 ? 1.5 : 2.0;
     const glm::dvec3 from(place(random), place(random), -0.5), to(place(random), place(random), 3.5);
     const ScalarField field(volume.channels()[0], {4, 4, 4});
