@@ -49,7 +49,7 @@ check: export SCOLOPAX_STATISTICS := 2
 check: export SCOLOPAX_RANDOM_SCENES := 2000
 check-asan-ubsan: export SCOLOPAX_STATISTICS := 1
 check-asan-ubsan: export SCOLOPAX_RANDOM_SCENES := 20
-check: test check-bench check-hostile check-format check-tidy check-asan-ubsan check-tsan check-fuzz check-cuda
+check: check-format test check-bench check-hostile check-tidy check-tsan check-fuzz check-cuda check-asan-ubsan
 
 # Benchmarks are built for a report only: this shows that they still can be.
 check-bench: test-deps

@@ -86,7 +86,7 @@ class Jumps {
     cut_ = without(on, on);
     if (++parts_ > kMostCuts) return;
     for (std::uint32_t left = channels_; left != 0; left &= left - 1) {
-      const int n = std::countr_zero(left);
+      const int n = lowestBit(left);
       const Int to = pieceAlong(n, *end);
       const Mask here = on & segment_.of(n), up = here & (to > piece_[n]), down = here & (piece_[n] > to);
       if (!any(up | down)) continue;
@@ -117,7 +117,7 @@ class Jumps {
   /// Moves on to the place at which parts end.
   SCOLOPAX_LANES void advance(Float end) {
     for (std::uint32_t left = channels_; left != 0; left &= left - 1) {
-      const int n = std::countr_zero(left);
+      const int n = lowestBit(left);
       // The two knots of a jump have a piece between them.
       const Int beyond = knot_ + select(rises_ > Int(0), Int(1), Int(-2));
       piece_[n] = select(at(n), beyond, pieceAlong(n, end));

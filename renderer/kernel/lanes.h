@@ -54,6 +54,15 @@ SCOLOPAX_HD inline std::int32_t where(bool m, std::int32_t a) { return m ? a : 0
 SCOLOPAX_HD inline std::uint32_t where(bool m, std::uint32_t a) { return m ? a : 0u; }
 SCOLOPAX_HD inline std::int32_t onesOf(bool m) { return m ? 1 : 0; }
 SCOLOPAX_HD inline std::uint32_t unionOf(std::uint32_t a) { return a; }
+/// Index of the lowest bit of a word that is set; the word must not be 0.
+SCOLOPAX_HD inline int lowestBit(std::uint32_t word) {
+#if defined(__CUDA_ARCH__)
+  // nvcc 13 takes std::countr_zero() to be 31 on devices.
+  return int(std::bit_cast<std::uint32_t>(float(word & (0u - word))) >> 23) - 127;
+#else
+  return std::countr_zero(word);
+#endif
+}
 template <class Number>
 SCOLOPAX_HD inline Number firstIn(bool, Number a) {
   return a;

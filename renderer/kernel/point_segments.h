@@ -2,7 +2,6 @@
 // Finds the segments of one ray per lane, in lockstep. segments.h does the same for a single ray, cell by
 // cell.
 #pragma once
-#include <bit>
 #include <type_traits>
 
 #include "renderer/kernel/point_walk.h"
@@ -76,7 +75,7 @@ class PointSegments {
   SCOLOPAX_LANES void settle() {
     live_ = more_;
     for (std::uint32_t left = known_; left != 0; left &= left - 1)
-      ends_.passOn(scene_, std::countr_zero(left));
+      ends_.passOn(scene_, lowestBit(left));
     taken_ = taken_ + onesOf(counted_);
     giveUp(live_ & (taken_ > kMaxSegments - 1));
   }
@@ -132,7 +131,7 @@ class PointSegments {
     sampleChannels(scene_, channels, point, stored);
     unsigned fetches = 0;
     for (std::uint32_t left = channels; left != 0; left &= left - 1) {
-      const int n = std::countr_zero(left);
+      const int n = lowestBit(left);
       const ChannelView& channel = scene_.channels[n];
       fetches += channel.field.cost();
       points[n] = pointOn<L>(channel.optical, stretchPosition(channel, stored[n]));

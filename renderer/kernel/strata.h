@@ -293,7 +293,7 @@ class Strata {
     } else {
       for (unsigned left = bitsOf(which); left != 0; left &= left - 1) {
         if (count_ == L::kLanes) shine();
-        const int i = std::countr_zero(left), slot = count_++;
+        const int i = lowestBit(left), slot = count_++;
         StratumPlaces<L>& waiting = memory_.waiting.places;
         put(i, slot, &memory_.waiting.ray);
         put(at(mass, i), slot, &waiting.mass);
@@ -306,7 +306,7 @@ class Strata {
           put(at(emission_[c], i), slot, &waiting.emission[c]);
         }
         for (std::uint32_t bits = std::uint32_t(kept); bits != 0; bits &= bits - 1) {
-          const int n = std::countr_zero(bits);
+          const int n = lowestBit(bits);
           put(at(places.share[n], i), slot, &waiting.share[n]);
           for (int c = 0; c < 3; ++c) put(at(places.color[n][c], i), slot, &waiting.color[n][c]);
         }

@@ -108,7 +108,7 @@ class VoxelSegments {
     segment.end = select(to_ < 1.0f, centre + reach * to_, end);
     const Float middle = 0.5f * (from_ + to_), half = 0.5f * way_;
     for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
-      const int n = std::countr_zero(left);
+      const int n = lowestBit(left);
       scalars_.stored[n] = partOf<L>(cell_.stored[n], middle, half);
       if (scene_.hasFactor(n)) [[unlikely]]
         scalars_.factorPosition[n] = partOf<L>(cell_.factorPosition[n], middle, half);

@@ -151,7 +151,7 @@ SCOLOPAX_LANES void sampleCubics(const SceneView& scene, const RayOf<L>& rays, s
   Float corners[kMaxVisibleChannels][kCorners];
   std::uint32_t trilinear = 0;
   for (std::uint32_t left = channels; left != 0; left &= left - 1)
-    if (scene.channels[std::countr_zero(left)].field.has(Filter::trilinear)) trilinear |= left & -left;
+    if (scene.channels[lowestBit(left)].field.has(Filter::trilinear)) trilinear |= left & -left;
   const Float middle = 0.5f * (start + end), half = 0.5f * (end - start);
   const Vec centre = rays.origin + middle * rays.direction;
   cellVoxels(scene, trilinear, centre, corners);
@@ -162,7 +162,7 @@ SCOLOPAX_LANES void sampleCubics(const SceneView& scene, const RayOf<L>& rays, s
     places[i] = cell.of(points[i]);
   }
   for (std::uint32_t left = channels; left != 0; left &= left - 1) {
-    const int n = std::countr_zero(left);
+    const int n = lowestBit(left);
     const ChannelView& channel = scene.channels[n];
     Float stored[kCubicNodes], values[kCubicNodes];
     if (trilinear >> n & 1) [[likely]]
