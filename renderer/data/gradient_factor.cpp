@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "renderer/core/error.h"
-#include "renderer/kernel/classify.h"
+#include "renderer/kernel/classifiers/curve_times_curve.h"
 
 namespace scolopax {
 namespace {

@@ -2,30 +2,10 @@
 // The blend modes: how the extinctions and colours of N channels at a point are combined. Each is a struct,
 // listed in data/method.h; trackers and shading use only what is declared here.
 #pragma once
+#include "renderer/kernel/classifiers.h"
 #include "renderer/kernel/clip.h"
-#include "renderer/kernel/gradient.h"
 
 namespace scolopax::kernel {
-
-/// Extinction of one channel at a point, and the position on the channel's curves; both are 0 where the
-/// voxels are not finite.
-struct Classified {
-  float extinction, position;
-};
-template <class View>
-SCOLOPAX_HD Classified classify(const View& scene, int n, glm::vec3 point, SampleCost* cost) {
-  const ChannelView& channel = scene.channels[n];
-  cost->fetches += channel.field.cost();
-  const float stored = sampleStored<One>(channel.field, scene.dims, point);
-  if (!isFinite(stored)) return {0.0f, 0.0f};
-  const float position = curvePosition(channel, stored);
-  float extinction = extinctionAt(channel, position);
-  if (scene.hasFactor(n) && extinction > 0.0f) [[unlikely]] {
-    extinction *= gradientFactorAt(channel, scene.dims, point);
-    cost->fetches += gradientFetches(channel.field, scene.dims);
-  }
-  return {extinction, position};
-}
 
 /// A set of visible channels: all of them, so that loops over them need no test, or some, given by their
 /// bits.

@@ -55,11 +55,6 @@ SCOLOPAX_HD inline float extinctionAt(const ChannelView& channel, float position
   return evaluate(channel.opacity, position) * channel.density;
 }
 
-/// Position of |gradient|, in stored values per smallest spacing, on the factor's curve.
-SCOLOPAX_HD inline float factorPosition(const GradientFactorView& factor, float magnitude) {
-  return clamp((magnitude - factor.origin) * factor.scale + factor.offset, 0.0f, 1.0f);
-}
-
 /// Largest value of the curve between positions a and b, in either order.
 SCOLOPAX_HD inline float largestBetween(const CurveView<float>& curve, float a, float b) {
   if (a > b) {
@@ -83,11 +78,6 @@ SCOLOPAX_HD inline float largestExtinction(const ChannelView& channel, float lo,
     b = clamp(most * (1.0f + 4e-6f), 0.0f, 1.0f);
   }
   return largestBetween(channel.opacity, a, b) * channel.density;
-}
-
-/// Largest gradient factor for |gradient| from lo to hi, in stored values per smallest spacing.
-SCOLOPAX_HD inline float largestFactor(const GradientFactorView& factor, float lo, float hi) {
-  return largestBetween(factor.curve, factorPosition(factor, lo), factorPosition(factor, hi));
 }
 
 }  // namespace scolopax::kernel

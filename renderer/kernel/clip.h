@@ -41,10 +41,7 @@ template <class L>
 SCOLOPAX_LANES typename L::Float sideOf(const ClipPlaneView& plane, const typename L::Vec& point) {
   return dot(typename L::Vec(plane.normal), point) + plane.offset;
 }
-template <class Vec>
-SCOLOPAX_LANES auto sumOfMagnitudes(const Vec& v) {
-  return magnitude(v[0]) + magnitude(v[1]) + magnitude(v[2]);
-}
+
 /// Rounding error of a slope or side, relative to the sum of the magnitudes that it is computed from.
 inline constexpr float kAlongPlane = 0x1p-21f;
 

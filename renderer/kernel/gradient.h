@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The gradient of a channel at a point, and the factor of the opacity that depends on its magnitude.
-// Functions that only scenes with such a factor need are not inlined and do not take the scene as a
-// parameter: passing its address would force it into memory.
+// The gradient of a field at a point.
 #pragma once
-#include "renderer/kernel/classify.h"
 #include "renderer/kernel/filters.h"
 
 namespace scolopax::kernel {
@@ -64,26 +61,6 @@ SCOLOPAX_LANES typename L::Float lengthOf(const typename L::Vec& v) {
   const Float largest = largestComponent(v), divisor = maximum(largest, Float(kLeastNormal));
   const Vec scaled(v[0] / divisor, v[1] / divisor, v[2] / divisor);
   return select(largest < kInfinity, divisor * squareRoot(dot(scaled, scaled)), largest);
-}
-
-/// Position of |gradient| on the factor's curve. It may lie outside [0,1], like that of stretchPosition() in
-/// optical_curve.h. NaN where the gradient is not finite.
-template <class L>
-SCOLOPAX_LANES_RARE void findFactorPosition(const ChannelView& channel, glm::ivec3 dims,
-                                            const typename L::Vec& point, typename L::Float* position) {
-  using Float = typename L::Float;
-  const GradientFactorView& factor = channel.factor;
-  const Gradient<L> gradient = gradientAt<L>(channel.field, dims, factor.fromVoxel, point);
-  const Float unbounded = (lengthOf<L>(gradient.perSpacing) - factor.origin) * factor.scale + factor.offset;
-  *position = select(gradient.finite, clamp(unbounded, -kFarPosition, kFarPosition), Float(kNaN));
-}
-
-/// Factor of the opacity at a point; 0 where the gradient is not finite.
-SCOLOPAX_RARE inline float gradientFactorAt(const ChannelView& channel, glm::ivec3 dims, glm::vec3 point) {
-  const GradientFactorView& factor = channel.factor;
-  const Gradient<One> gradient = gradientAt<One>(channel.field, dims, factor.fromVoxel, point);
-  if (!gradient.finite) return 0.0f;
-  return evaluate(factor.curve, factorPosition(factor, lengthOf<One>(gradient.perSpacing)));
 }
 
 }  // namespace scolopax::kernel

@@ -7,59 +7,6 @@
 
 namespace scolopax::kernel {
 
-/// The coordinate in which channel n and its knots are compared, at a fraction `along` of a segment and at a
-/// knot: the position on the curves or, for cubics, the stored value.
-template <class L, class View>
-SCOLOPAX_LANES typename L::Float coordinateOn(const SegmentEnds<L, View>& ends, int n,
-                                              typename L::Float along) {
-  const auto p = ends.from[n].position, q = ends.to[n].position;
-  const auto known = isFinite(p), other = isFinite(q);
-  const auto from = select(known, p, q);
-  return from + along * (select(other, q, p) - from);
-}
-template <class L, class View>
-SCOLOPAX_LANES typename L::Float coordinateOf(const SegmentEnds<L, View>&, const Knots<L>& knot) {
-  return knot.position;
-}
-template <class L, class View>
-SCOLOPAX_LANES typename L::Float coordinateOn(const SegmentCubics<L, View>& scalars, int n,
-                                              typename L::Float along) {
-  return scalars.stored[n].at(2.0f * along - 1.0f);
-}
-template <class L, class View>
-SCOLOPAX_LANES typename L::Float coordinateOf(const SegmentCubics<L, View>&, const Knots<L>& knot) {
-  return knot.stored;
-}
-
-/// Piece of channel n's curves at a coordinate.
-template <class L, class View>
-SCOLOPAX_LANES typename L::Int pieceOf(const ChannelView& channel, const SegmentEnds<L, View>&,
-                                       typename L::Float coordinate) {
-  return pointOn<L>(channel.optical, coordinate).piece;
-}
-template <class L, class View>
-SCOLOPAX_LANES typename L::Int pieceOf(const ChannelView& channel, const SegmentCubics<L, View>&,
-                                       typename L::Float coordinate) {
-  return pieceAt<L>(channel, coordinate);
-}
-
-/// Fraction of the segment, between two fractions, at which channel n's coordinate takes a value.
-template <class L, class View>
-SCOLOPAX_LANES typename L::Float fractionOf(const SegmentEnds<L, View>& ends, int n, typename L::Float begin,
-                                            typename L::Float end, typename L::Float value,
-                                            typename L::Mask) {
-  const auto from = coordinateOn<L>(ends, n, begin), to = coordinateOn<L>(ends, n, end);
-  return begin + (end - begin) * clamp((value - from) / (to - from), 0.0f, 1.0f);
-}
-template <class L, class View>
-SCOLOPAX_LANES typename L::Float fractionOf(const SegmentCubics<L, View>& scalars, int n,
-                                            typename L::Float begin, typename L::Float end,
-                                            typename L::Float value, typename L::Mask which) {
-  const Cubic<L>& f = scalars.stored[n];
-  const auto low = 2.0f * begin - 1.0f, high = 2.0f * end - 1.0f;
-  return clamp(0.5f * (crossing(f, low, high, f.at(low), f.at(high), value, which) + 1.0f), begin, end);
-}
-
 /// Follows the channels of a segment, for rays in `which`, from jump to jump.
 template <class L, class View, class Scalars>
 class Jumps {
@@ -94,7 +41,7 @@ class Jumps {
       const Mask jumps = find(scene_.channels[n].optical, up, down, to, &knot);
       if (!any(jumps)) continue;
       const Knots<L> at = knotsAt<L>(scene_.channels[n].optical, maximum(knot, Int(0)));
-      const Float y = fractionOf<L>(scalars_, n, begin, *end, coordinateOf<L>(scalars_, at), jumps);
+      const Float y = scalars_.fractionAt(n, begin, *end, scalars_.coordinateOf(at), jumps);
       const Mask first = jumps & (y <= *end);
       *end = select(first, y, *end);
       channel_ = select(first, Int(n), channel_);
@@ -126,7 +73,7 @@ class Jumps {
 
  private:
   SCOLOPAX_LANES Int pieceAlong(int n, Float along) const {
-    return pieceOf<L>(scene_.channels[n], scalars_, coordinateOn<L>(scalars_, n, along));
+    return scalars_.pieceOf(scene_.channels[n], scalars_.coordinateAt(n, along));
   }
   /// Moves `*knot` to the first knot of a jump, up or down, before piece `to`. Returns where there is one.
   SCOLOPAX_LANES Mask find(const OpticalCurveView& curve, Mask up, Mask down, Int to, Int* knot) const {

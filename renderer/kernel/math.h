@@ -12,6 +12,10 @@ template <class Float>
 SCOLOPAX_LANES Float magnitude(Float x) {
   return maximum(x, -x);
 }
+template <class Vec>
+SCOLOPAX_LANES auto sumOfMagnitudes(const Vec& v) {
+  return magnitude(v[0]) + magnitude(v[1]) + magnitude(v[2]);
+}
 SCOLOPAX_HD inline int clampInt(int x, int lo, int hi) { return x < lo ? lo : (x > hi ? hi : x); }
 
 namespace detail {

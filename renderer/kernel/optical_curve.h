@@ -187,26 +187,6 @@ SCOLOPAX_LANES void addLinear(const Optical<L>& a, const Optical<L>& b, typename
     means->moment = means->moment + where(which, sixth * (left * s + right * e));
 }
 
-/// The same, with the opacity multiplied by a factor that changes linearly from `first` to `second`. Exact.
-template <Detail kDetail, class L>
-SCOLOPAX_LANES void addProduct(const Optical<L>& a, const Optical<L>& b, typename L::Float first,
-                               typename L::Float second, typename L::Float s, typename L::Float e,
-                               typename L::Mask which, PartOf<L>* means) {
-  using Float = typename L::Float;
-  // Simpson's rule, exact up to cubics.
-  const Float sixth = (e - s) * 0.166666667f;
-  const Float left = a.opacity * first, right = b.opacity * second;
-  const Float middle = (a.opacity + b.opacity) * (first + second);  // four times the product in the middle
-  means->opacity = means->opacity + where(which, sixth * (left + middle + right));
-  if constexpr (kDetail >= Detail::emission)
-    for (int c = 0; c < 3; ++c)
-      means->emission[c] =
-          means->emission[c] +
-          where(which, sixth * (left * a.color[c] + middle * (0.5f * (a.color[c] + b.color[c])) +
-                                right * b.color[c]));
-  if constexpr (kDetail >= Detail::moment)
-    means->moment = means->moment + where(which, sixth * (left * s + middle * (0.5f * (s + e)) + right * e));
-}
 }  // namespace detail
 
 /// Calls visit(a, b, piece, from, to, s, e, lanes) for every piece of the curve between p and q, which must
@@ -262,40 +242,19 @@ SCOLOPAX_LANES PartOf<L> meansBetween(const OpticalCurveView& curve, const Curve
   return means;
 }
 
-/// The same, with the opacity multiplied by the curve `factor`, on which the segment goes from g to h.
-template <Detail kDetail, class L>
-SCOLOPAX_LANES PartOf<L> meansOfProduct(const OpticalCurveView& curve, const CurvePoint<L>& p,
-                                        const CurvePoint<L>& q, const OpticalCurveView& factor,
-                                        const CurvePoint<L>& g, const CurvePoint<L>& h,
-                                        typename L::Mask which) {
-  using Float = typename L::Float;
+/// Piece of the channel's curves at a stored value, as in OpticalKnot.
+template <class L>
+SCOLOPAX_LANES typename L::Int pieceAt(const ChannelView& channel, typename L::Float stored) {
   using Int = typename L::Int;
-  using Mask = typename L::Mask;
-  PartOf<L> all = noPart<L>();
-  const auto addPiece = [&](const Knots<L>& first, const Knots<L>& second, Int piece, Float from, Float to,
-                            Float begin, Float end, Mask on) SCOLOPAX_LANES_LAMBDA {
-    const Float u = opticalIn<Detail::extinction, L>(first, second, piece, from).opacity;
-    const Float v = opticalIn<Detail::extinction, L>(first, second, piece, to).opacity;
-    on = on & ((u > 0.0f) | (v > 0.0f));
-    if (!any(on)) return;
-    const Float width = end - begin, way = q.position - p.position;
-    PartOf<L> means = noPart<L>();
-    const CurvePoint<L> x0 = pointOn<L>(curve, p.position + begin * way);
-    const CurvePoint<L> x1 = pointOn<L>(curve, p.position + end * way);
-    forEachPiece<L>(curve, x0, x1, on,
-                    [&](const Knots<L>& a, const Knots<L>& b, Int k, Float x, Float y, Float s, Float e,
-                        Mask lanes) SCOLOPAX_LANES_LAMBDA {
-                      detail::addProduct<kDetail, L>(opticalIn<kDetail, L>(a, b, k, x),
-                                                     opticalIn<kDetail, L>(a, b, k, y), u + s * (v - u),
-                                                     u + e * (v - u), s, e, lanes, &means);
-                    });
-    all.opacity = all.opacity + width * means.opacity;
-    if constexpr (kDetail >= Detail::emission) all.emission = all.emission + means.emission * width;
-    if constexpr (kDetail >= Detail::moment)
-      all.moment = all.moment + width * (begin * means.opacity + width * means.moment);
-  };
-  forEachPiece<L>(factor, g, h, which, addPiece);
-  return all;
+  const OpticalCurveView& curve = channel.optical;
+  Int piece = pointOn<L>(curve, positionAt<L>(channel, stored)).piece;
+  if (channel.gamma == 1.0f) return piece;
+  // The position is rounded, and it is 0 at all places before the range.
+  Knots<L> a, b;
+  knotsOf<L>(curve, piece, L::everywhere(), &a, &b);
+  piece = piece + onesOf((Int(curve.count - 1) > piece) & (stored >= b.stored)) -
+          onesOf((piece > Int(-1)) & (stored < a.stored));
+  return select(stored < curve.knots[0].stored, Int(-1), piece);
 }
 
 }  // namespace scolopax::kernel

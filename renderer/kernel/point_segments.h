@@ -51,8 +51,8 @@ class PointSegments {
       const Mask met = apart ? without(live_, met_ == Word(0u)) : live_;
       const std::uint32_t wanted = apart ? unionOf(met_) : channels_;
       if (last_ != k_ - 1) known_ = 0;
-      if ((wanted & ~known_) != 0) sample(start, wanted & ~known_, ends_.from, ends_.factorPositionFrom);
-      sample(end, wanted, ends_.to, ends_.factorPositionTo);
+      if ((wanted & ~known_) != 0) sample(start, wanted & ~known_, ends_.from);
+      sample(end, wanted, ends_.to);
       last_ = k_;
       known_ = wanted;
       segment = {start, end, wanted, met, apart, met_};
@@ -74,8 +74,10 @@ class PointSegments {
   /// Finishes the current segment.
   SCOLOPAX_LANES void settle() {
     live_ = more_;
-    for (std::uint32_t left = known_; left != 0; left &= left - 1)
-      ends_.passOn(scene_, lowestBit(left));
+    for (std::uint32_t left = known_; left != 0; left &= left - 1) {
+      const int n = lowestBit(left);
+      withClassifier(scene_, n, [&](auto classifier) SCOLOPAX_LANES_LAMBDA { classifier.passOn(n, ends_); });
+    }
     taken_ = taken_ + onesOf(counted_);
     giveUp(live_ & (taken_ > kMaxSegments - 1));
   }
@@ -125,7 +127,7 @@ class PointSegments {
     return k > 0 && any(live_ & (t < endOf(k - 1))) ? k - 1 : k;
   }
 
-  SCOLOPAX_LANES void sample(Float t, std::uint32_t channels, CurvePoint<L>* points, Float* factorPositions) {
+  SCOLOPAX_LANES void sample(Float t, std::uint32_t channels, SegmentEnd<L, View>& at) {
     Float stored[kMaxVisibleChannels];
     const typename L::Vec point = rays_.origin + t * rays_.direction;
     sampleChannels(scene_, channels, point, stored);
@@ -133,12 +135,10 @@ class PointSegments {
     for (std::uint32_t left = channels; left != 0; left &= left - 1) {
       const int n = lowestBit(left);
       const ChannelView& channel = scene_.channels[n];
-      fetches += channel.field.cost();
-      points[n] = pointOn<L>(channel.optical, stretchPosition(channel, stored[n]));
-      if (scene_.hasFactor(n)) [[unlikely]] {
-        findFactorPosition<L>(channel, scene_.dims, point, &factorPositions[n]);
-        fetches += gradientFetches(channel.field, scene_.dims);
-      }
+      withClassifier(scene_, n, [&](auto classifier) SCOLOPAX_LANES_LAMBDA {
+        classifier.template sample<L>(channel, scene_.dims, point, stored[n], n, at);
+        fetches += channel.field.cost() + classifier.fetches(channel.field, scene_.dims);
+      });
     }
     cost_->fetches = cost_->fetches + Word(onesOf(live_)) * Word(fetches);
   }

@@ -1,22 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contribution of one channel to a segment inside one cell of eight voxels, where its scalar is a cubic: the
-// segment is divided where the scalar turns and where it meets a knot of the curves.
+// Integrates the curves of a channel over a segment on which its scalar is a cubic: the segment is divided
+// where the scalar turns and where it meets a knot of the curves.
 #pragma once
-#include "renderer/kernel/cubic.h"
-#include "renderer/kernel/gradient.h"
-#include "renderer/kernel/optical_curve.h"
+#include "renderer/kernel/segment_scalars.h"
 
 namespace scolopax::kernel {
-
-/// The channels' scalars along a segment of every ray, for y from -1 at its start to 1 at its end: as stored
-/// values (OpticalKnot::stored) and, for channels with a gradient factor, as positions of |gradient| on the
-/// factor's curve. NaN where a value is not finite. As with SegmentEnds, arrays that are indexed by
-/// variables.
-template <class L, class View>
-struct SegmentCubics {
-  Cubic<L> stored[kMaxVisibleChannels];
-  Cubic<L> factorPosition[View::kFactors];
-};
 
 /// A cubic that moves along a curve, from piece to piece.
 template <class L>
@@ -90,21 +78,6 @@ SCOLOPAX_LANES void addCubicPiece(typename L::Float from, typename L::Float to, 
   }
 }
 
-/// Piece of the channel's curves at a stored value, as in OpticalKnot.
-template <class L>
-SCOLOPAX_LANES typename L::Int pieceAt(const ChannelView& channel, typename L::Float stored) {
-  using Int = typename L::Int;
-  const OpticalCurveView& curve = channel.optical;
-  Int piece = pointOn<L>(curve, positionAt<L>(channel, stored)).piece;
-  if (channel.gamma == 1.0f) return piece;
-  // The position is rounded, and it is 0 at all places before the range.
-  Knots<L> a, b;
-  knotsOf<L>(curve, piece, L::everywhere(), &a, &b);
-  piece = piece + onesOf((Int(curve.count - 1) > piece) & (stored >= b.stored)) -
-          onesOf((piece > Int(-1)) & (stored < a.stored));
-  return select(stored < curve.knots[0].stored, Int(-1), piece);
-}
-
 /// Means over a segment on which the scalar is the cubic `f`; 0 in lanes that are not in `which`.
 template <Detail kDetail, class L>
 SCOLOPAX_LANES PartOf<L> meansOfCubic(const ChannelView& channel, const Cubic<L>& f, typename L::Mask which) {
@@ -127,102 +100,6 @@ SCOLOPAX_LANES PartOf<L> meansOfCubic(const ChannelView& channel, const Cubic<L>
     on = without(on, without(from >= 1.0f, meets));
   }
   return means;
-}
-
-/// The same with the gradient factor of the channel, whose position is the cubic `g`.
-template <Detail kDetail, class L>
-SCOLOPAX_LANES_RARE void findMeansWithFactor(const ChannelView& channel, const Cubic<L>& f, const Cubic<L>& g,
-                                             const typename L::Mask& which, PartOf<L>* means) {
-  using Float = typename L::Float;
-  using Mask = typename L::Mask;
-  const OpticalCurveView& factor = channel.factor.optical;
-  const Float begin(-1.0f);
-  CurveWalk<L> walk(channel.optical, f, pieceAt<L>(channel, f.at(begin)));
-  CurveWalk<L> ofFactor(factor, g, pointOn<L>(factor, g.at(begin)).piece);
-  *means = noPart<L>();
-  Float from = begin;
-  Mask on = which;
-  for (int left = 3 * (channel.optical.count + factor.count) + 8; left > 0 && any(on); --left) {
-    const Float own = walk.findEnd(from, on), other = ofFactor.findEnd(from, on), to = minimum(own, other);
-    addCubicPiece<kDetail, L>(
-        from, to, on,
-        [&](Float y) SCOLOPAX_LANES_LAMBDA {
-          Optical<L> optical = walk.template opticalAt<kDetail>(positionAt<L>(channel, f.at(y)));
-          optical.opacity =
-              optical.opacity * ofFactor.template opticalAt<Detail::extinction>(g.at(y)).opacity;
-          return optical;
-        },
-        means);
-    const Mask meets = walk.moveTo(to, own <= other, on) | ofFactor.moveTo(to, other <= own, on);
-    from = select(on, to, from);
-    on = without(on, without(from >= 1.0f, meets));
-  }
-}
-
-/// Part of channel n on a segment, as if it were the only channel; nothing for rays that are not in `which`.
-template <Detail kDetail, class L, class View>
-SCOLOPAX_LANES PartOf<L> partAlone(const View& scene, const SegmentCubics<L, View>& scalars, int n,
-                                   typename L::Mask which) {
-  using Mask = typename L::Mask;
-  const ChannelView& channel = scene.channels[n];
-  const OpticalCurveView& curve = channel.optical;
-  const Cubic<L>& f = scalars.stored[n];
-  const CubicBounds<L> bounds = boundsOf(f);
-  const Mask outside = (positionAt<L>(channel, bounds.upper) <= curve.first) |
-                       (positionAt<L>(channel, bounds.lower) >= curve.last);
-  Mask seen = without(which & isFinite(f.c0), outside);
-  PartOf<L> means;
-  if (scene.hasFactor(n)) [[unlikely]] {
-    const Cubic<L>& factorPosition = scalars.factorPosition[n];
-    seen = seen & isFinite(factorPosition.c0);
-    if (!any(seen)) return noPart<L>();
-    findMeansWithFactor<kDetail, L>(channel, f, factorPosition, seen, &means);
-  } else {
-    if (!any(seen)) return noPart<L>();
-    means = meansOfCubic<kDetail, L>(channel, f, seen);
-  }
-  return scaled(means, channel.density);
-}
-
-/// Multiplies an opacity by the gradient factor at a position.
-template <class L>
-SCOLOPAX_LANES_RARE void multiplyByFactorAt(const ChannelView& channel, const typename L::Float& position,
-                                            const typename L::Mask& which, typename L::Float* opacity) {
-  const OpticalCurveView& curve = channel.factor.optical;
-  *opacity = *opacity * opticalAt<Detail::extinction, L>(curve, pointOn<L>(curve, position), which).opacity;
-}
-
-/// Extinction of channel n at a fraction `along` of a segment, where its curve has the given opacity.
-template <class L, class View>
-SCOLOPAX_LANES typename L::Float extinctionOn(const View& scene, const SegmentCubics<L, View>& scalars, int n,
-                                              typename L::Float along, typename L::Mask which,
-                                              typename L::Float opacity) {
-  const ChannelView& channel = scene.channels[n];
-  typename L::Mask known = isFinite(scalars.stored[n].c0);
-  if (scene.hasFactor(n)) [[unlikely]] {
-    const Cubic<L>& g = scalars.factorPosition[n];
-    known = known & isFinite(g.c0);
-    multiplyByFactorAt<L>(channel, g.at(2.0f * along - 1.0f), which, &opacity);
-  }
-  return where(known, opacity * channel.density);
-}
-
-/// Extinction (as `opacity`) and colour of channel n at a fraction `along` of a segment. Undefined for rays
-/// that are not in `which`.
-template <Detail kDetail, class L, class View>
-SCOLOPAX_LANES Optical<L> opticalOn(const View& scene, const SegmentCubics<L, View>& scalars, int n,
-                                    typename L::Float along, typename L::Mask which) {
-  const ChannelView& channel = scene.channels[n];
-  const auto position = positionAt<L>(channel, scalars.stored[n].at(2.0f * along - 1.0f));
-  Optical<L> optical = opticalAt<kDetail, L>(channel.optical, pointOn<L>(channel.optical, position), which);
-  optical.opacity = extinctionOn(scene, scalars, n, along, which, optical.opacity);
-  return optical;
-}
-
-/// Rays for which the extinction of channel n is linear on the segment.
-template <class L, class View>
-SCOLOPAX_LANES typename L::Mask isStraight(const View&, const SegmentCubics<L, View>&, int) {
-  return without(L::everywhere(), L::everywhere());
 }
 
 }  // namespace scolopax::kernel

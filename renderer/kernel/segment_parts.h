@@ -33,59 +33,6 @@ struct Blending {
   bool mixes;  ///< the largest extinction has the weighted colours of all channels
 };
 
-/// Computes partAlone() where the opacity depends on |gradient|, which is taken to be linear on the segment
-/// too.
-template <Detail kDetail, class L, class View>
-SCOLOPAX_LANES_RARE void findPartWithFactor(const ChannelView& channel, const SegmentEnds<L, View>& ends,
-                                            int n, const typename L::Mask& which, PartOf<L>* part) {
-  using Float = typename L::Float;
-  using Mask = typename L::Mask;
-  const OpticalCurveView& factor = channel.factor.optical;
-  const CurvePoint<L>& from = ends.from[n];
-  const CurvePoint<L>& to = ends.to[n];
-  const Float g = ends.factorPositionFrom[n], h = ends.factorPositionTo[n];
-  // An end without a finite value and gradient counts for nothing.
-  const Mask known = (from.position == from.position) & isFinite(g);
-  const Mask other = (to.position == to.position) & isFinite(h), some = which & (known | other);
-  *part = noPart<L>();
-  if (!any(some)) return;
-  const PartOf<L> means = meansOfProduct<kDetail, L>(
-      channel.optical, select(known, from, to), select(other, to, from), factor,
-      pointOn<L>(factor, select(known, g, h)), pointOn<L>(factor, select(other, h, g)), some);
-  *part = scaled(means, select(known & other, Float(channel.density), Float(0.5f * channel.density)));
-}
-
-/// Part of channel n on a segment, as if it were the only channel; nothing for rays that are not in `which`.
-/// If only one end of the segment has a finite value, only half of the segment counts.
-template <Detail kDetail, class L, class View>
-SCOLOPAX_LANES PartOf<L> partAlone(const View& scene, const SegmentEnds<L, View>& ends, int n,
-                                   typename L::Mask which) {
-  using Float = typename L::Float;
-  using Mask = typename L::Mask;
-  const ChannelView& channel = scene.channels[n];
-  const OpticalCurveView& curve = channel.optical;
-  if (scene.hasFactor(n)) [[unlikely]] {
-    PartOf<L> part;
-    findPartWithFactor<kDetail, L>(channel, ends, n, which, &part);
-    return part;
-  }
-  CurvePoint<L> from = ends.from[n], to = ends.to[n];
-  Float density(channel.density);
-  if (!channel.field.finite) {
-    const Mask known = from.position == from.position, other = to.position == to.position;
-    const CurvePoint<L> start = select(known, from, to);
-    to = select(other, to, from);
-    from = start;
-    density = select(known & other, density, 0.5f * density);
-    which = which & (known | other);
-  }
-  const Float p = from.position, q = to.position;
-  const Mask outside = ((p <= curve.first) & (q <= curve.first)) | ((p >= curve.last) & (q >= curve.last));
-  const Mask seen = without(which, outside);
-  if (!any(seen)) return noPart<L>();
-  return scaled(meansBetween<kDetail, L>(curve, from, to, seen), density);
-}
-
 /// Where channels hide each other and the extinction of some channel may not be linear on a segment, they are
 /// compared in this many parts of it.
 inline constexpr int kPartsAtKnots = 8;
@@ -98,74 +45,6 @@ struct Hidden {
 /// Empty where extinctions add up.
 template <class L>
 struct Hidden<L, true> {};
-
-/// Removes rays from the mask where the gradient factor of channel n may change on the segment.
-template <class L, class View>
-SCOLOPAX_LANES_RARE void dropWhereFactorChanges(const ChannelView& channel, const SegmentEnds<L, View>& ends,
-                                                int n, typename L::Mask* straight) {
-  const OpticalCurveView& curve = channel.factor.optical;
-  const CurvePoint<L> g = pointOn<L>(curve, ends.factorPositionFrom[n]),
-                      h = pointOn<L>(curve, ends.factorPositionTo[n]);
-  *straight = *straight & (g.piece == h.piece) &
-              (opticalAt<Detail::extinction, L>(curve, g, L::everywhere()).opacity ==
-               opticalAt<Detail::extinction, L>(curve, h, L::everywhere()).opacity);
-}
-
-/// Rays for which the extinction of channel n is linear on the segment.
-template <class L, class View>
-SCOLOPAX_LANES typename L::Mask isStraight(const View& scene, const SegmentEnds<L, View>& ends, int n) {
-  typename L::Mask straight = ends.from[n].piece == ends.to[n].piece;
-  if (scene.hasFactor(n)) [[unlikely]]
-    dropWhereFactorChanges<L>(scene.channels[n], ends, n, &straight);
-  return straight;
-}
-
-/// Multiplies an opacity of channel n by its gradient factor at a place in [0,1] of a segment.
-template <class L, class View>
-SCOLOPAX_LANES_RARE void multiplyByFactor(const ChannelView& channel, const SegmentEnds<L, View>& ends, int n,
-                                          const typename L::Float& place, const typename L::Mask& which,
-                                          typename L::Float* opacity) {
-  using Float = typename L::Float;
-  using Mask = typename L::Mask;
-  const Float from = ends.factorPositionFrom[n], to = ends.factorPositionTo[n];
-  const Mask known = isFinite(from), other = isFinite(to);
-  const Float g = select(known, from, to), h = select(other, to, from);
-  const OpticalCurveView& curve = channel.factor.optical;
-  const CurvePoint<L> point = pointOn<L>(curve, g + place * (h - g));
-  const Float factor = opticalAt<Detail::extinction, L>(curve, point, which).opacity;
-  *opacity = where(known | other, *opacity * factor);
-}
-
-/// Extinction of channel n at a place in [0,1] of a segment, where its curve has the given opacity.
-template <class L, class View>
-SCOLOPAX_LANES typename L::Float extinctionOn(const View& scene, const SegmentEnds<L, View>& ends, int n,
-                                              typename L::Float place, typename L::Mask which,
-                                              typename L::Float opacity) {
-  const ChannelView& channel = scene.channels[n];
-  const auto p = ends.from[n].position, q = ends.to[n].position;
-  typename L::Float extinction = where(isFinite(p) | isFinite(q), opacity * channel.density);
-  if (scene.hasFactor(n)) [[unlikely]]
-    multiplyByFactor<L>(channel, ends, n, place, which, &extinction);
-  return extinction;
-}
-
-/// Extinction (as `opacity`) and colour of channel n at a place in [0,1] of a segment. Undefined for rays
-/// that are not in `which`.
-template <Detail kDetail, class L, class View>
-SCOLOPAX_LANES Optical<L> opticalOn(const View& scene, const SegmentEnds<L, View>& ends, int n,
-                                    typename L::Float place, typename L::Mask which) {
-  using Mask = typename L::Mask;
-  const ChannelView& channel = scene.channels[n];
-  const CurvePoint<L>& from = ends.from[n];
-  const CurvePoint<L>& to = ends.to[n];
-  const Mask known = from.position == from.position, other = to.position == to.position;
-  const CurvePoint<L> p = select(known, from, to), q = select(other, to, from);
-  CurvePoint<L> point{p.position + place * (q.position - p.position), p.piece};
-  if (any(without(which, p.piece == q.piece))) point = pointOn<L>(channel.optical, point.position);
-  Optical<L> optical = opticalAt<kDetail, L>(channel.optical, point, which);
-  optical.opacity = extinctionOn(scene, ends, n, place, which, optical.opacity);
-  return optical;
-}
 
 /// Adds a part of a segment from `begin` to `end`, for rays in `on`, over which the channels' extinctions and
 /// colours are linear: sets `hidden` to the visible part of each channel, and returns the largest extinction,
@@ -250,7 +129,7 @@ SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Se
       const Mask here = jumps.at(n);
       if (!any(here)) continue;
       Optical<L> optical = jumps.template opticalAt<kDetail>(n, behind);
-      optical.opacity = extinctionOn(scene, scalars, n, place, here, optical.opacity);
+      optical.opacity = extinctionOn<L>(scene, scalars, n, place, here, optical.opacity);
       at[end][n].opacity = select(here, optical.opacity, at[end][n].opacity);
       if constexpr (kDetail >= Detail::emission)
         at[end][n].color = select(here, optical.color, at[end][n].color);

@@ -3,26 +3,9 @@
 // channels at the segments' ends. Quadrature works on these segments.
 #pragma once
 #include "renderer/kernel/cell_walk.h"
-#include "renderer/kernel/gradient.h"
-#include "renderer/kernel/optical_curve.h"
+#include "renderer/kernel/classifiers.h"
 
 namespace scolopax::kernel {
-
-/// Positions of the channels at a segment's two ends: on their curves and, for channels with a gradient
-/// factor, of |gradient| on the factor's curve. NaN where the value is not finite. Objects like this one hold
-/// arrays that are indexed by variables, and nothing else: a device keeps such an object in memory as a
-/// whole.
-template <class L, class View>
-struct SegmentEnds {
-  CurvePoint<L> from[kMaxVisibleChannels], to[kMaxVisibleChannels];
-  typename L::Float factorPositionFrom[View::kFactors], factorPositionTo[View::kFactors];
-
-  /// The next segment of channel n begins where this one ends.
-  SCOLOPAX_LANES void passOn(const View& scene, int n) {
-    from[n] = to[n];
-    if (scene.hasFactor(n)) factorPositionFrom[n] = factorPositionTo[n];
-  }
-};
 
 /// One segment per ray.
 template <class L>
@@ -94,10 +77,10 @@ class CellSegments {
     for (int n = 0; n < scene_.channelCount; ++n) {
       if (!(has_ >> n & 1)) continue;
       if (known_ >> n & 1)
-        ends_.passOn(scene_, n);
+        withClassifier(scene_, n, [&](auto classifier) { classifier.passOn(n, ends_); });
       else
-        sample(n, segment.start, ends_.from, ends_.factorPositionFrom);
-      sample(n, segment.end, ends_.to, ends_.factorPositionTo);
+        sample(n, segment.start, ends_.from);
+      sample(n, segment.end, ends_.to);
     }
     known_ = has_;
     return true;
@@ -111,16 +94,14 @@ class CellSegments {
     return minimum(inside_.enter + (float(segment) + offset_) * step_, inside_.exit);
   }
 
-  SCOLOPAX_HD void sample(int n, float t, CurvePoint<One>* points, float* factorPositions) {
+  SCOLOPAX_HD void sample(int n, float t, SegmentEnd<One, View>& end) {
     const ChannelView& channel = scene_.channels[n];
-    cost_->fetches += channel.field.cost();
     const glm::vec3 point = ray_.origin + t * ray_.direction;
     const float stored = sampleStored<One>(channel.field, scene_.dims, point);
-    points[n] = pointOn<One>(channel.optical, stretchPosition(channel, stored));
-    if (scene_.hasFactor(n)) [[unlikely]] {
-      findFactorPosition<One>(channel, scene_.dims, point, &factorPositions[n]);
-      cost_->fetches += gradientFetches(channel.field, scene_.dims);
-    }
+    withClassifier(scene_, n, [&](auto classifier) {
+      classifier.template sample<One>(channel, scene_.dims, point, stored, n, end);
+      cost_->fetches += channel.field.cost() + classifier.fetches(channel.field, scene_.dims);
+    });
   }
 
   SCOLOPAX_HD void enterCell() {

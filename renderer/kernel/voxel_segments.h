@@ -2,7 +2,6 @@
 // Cuts one ray per lane at the faces of voxel cells, and skips the cells in empty macrocells. On such a
 // segment, every scalar is a cubic. Segments of dense matter are divided further.
 #pragma once
-#include "renderer/kernel/segment_cubics.h"
 #include "renderer/kernel/segments.h"
 #include "renderer/kernel/voxel_walk.h"
 
@@ -83,18 +82,11 @@ class VoxelSegments {
     sampleCubics<L>(scene_, rays_, channels, walk_.start(), walk_.end(),
                     [&](int n, const Vec* points, const Float* values) SCOLOPAX_LANES_LAMBDA {
                       const ChannelView& channel = scene_.channels[n];
-                      Float own[kCubicNodes];
-                      for (int i = 0; i < kCubicNodes; ++i)
-                        own[i] = channel.scale < 0.0f ? -values[i] : values[i];
-                      cell_.stored[n] = select<L>(which, cubicThrough<L>(own), cell_.stored[n]);
-                      fetches += cubicFetches(channel.field);
-                      if (scene_.hasFactor(n)) [[unlikely]] {
-                        for (int i = 0; i < kCubicNodes; ++i)
-                          findFactorPosition<L>(channel, scene_.dims, points[i], &own[i]);
-                        cell_.factorPosition[n] =
-                            select<L>(which, cubicThrough<L>(own), cell_.factorPosition[n]);
-                        fetches += kCubicNodes * gradientFetches(channel.field, scene_.dims);
-                      }
+                      withClassifier(scene_, n, [&](auto classifier) SCOLOPAX_LANES_LAMBDA {
+                        classifier.template sample<L>(channel, scene_.dims, points, values, which, n, cell_);
+                        fetches += cubicFetches(channel.field) +
+                                   kCubicNodes * classifier.fetches(channel.field, scene_.dims);
+                      });
                     });
     cost_->fetches = cost_->fetches + Word(onesOf(which)) * Word(fetches);
   }
@@ -109,9 +101,9 @@ class VoxelSegments {
     const Float middle = 0.5f * (from_ + to_), half = 0.5f * way_;
     for (std::uint32_t left = segment.channels; left != 0; left &= left - 1) {
       const int n = lowestBit(left);
-      scalars_.stored[n] = partOf<L>(cell_.stored[n], middle, half);
-      if (scene_.hasFactor(n)) [[unlikely]]
-        scalars_.factorPosition[n] = partOf<L>(cell_.factorPosition[n], middle, half);
+      withClassifier(scene_, n, [&](auto classifier) SCOLOPAX_LANES_LAMBDA {
+        classifier.template cutPart<L>(cell_, middle, half, n, scalars_);
+      });
     }
   }
 

@@ -126,66 +126,6 @@ SCOLOPAX_HD inline CellValues valuesIn(const FieldView& field, glm::ivec3 dims, 
   });
 }
 
-/// |gradient| in a voxel cell, in stored values per smallest spacing: at a point, and by how much it may
-/// change per voxel of distance, summed over the axes.
-struct CellGradient {
-  float magnitude, change, slack;  ///< slack: what rounding may add
-  bool finite;                     ///< the gradient is finite in the cell
-};
-/// Inside a cell, each component per voxel is an average of slopes between neighbouring voxels along its
-/// axis. So a step of one voxel along any axis changes it by at most the spread of those slopes.
-SCOLOPAX_RARE inline CellGradient gradientIn(const FieldView& field, glm::ivec3 dims,
-                                             const glm::mat3& fromVoxel, glm::ivec3 cell, glm::vec3 point) {
-  const std::size_t strides[] = {std::size_t(field.stride), std::size_t(field.stride) * std::size_t(dims.x),
-                                 std::size_t(field.stride) * std::size_t(dims.x) * std::size_t(dims.y)};
-  glm::vec3 change(0.0f);
-  float most = 0.0f;
-  bool finite = true;
-  const int around = field.has(Filter::cubic) ? 1 : 0, width = 2 + 2 * around;  // voxels across the cell
-  visitScalarType(field.type, [&](auto zero) {
-    const auto* voxels = static_cast<const decltype(zero)*>(field.voxels) + field.lane;
-    for (int axis = 0; axis < 3; ++axis) {
-      const int u = (axis + 1) % 3, v = (axis + 2) % 3, low = cell[axis];
-      float least = kInfinity, largest = -kInfinity;
-      if (around > 0 && (low == 0 || low + 2 >= dims[axis]))
-        least = largest = 0.0f;  // voxels are repeated beyond the border
-      for (int edge = low > 0 ? low - 1 : 0; edge <= low + 1 && edge + 1 < dims[axis]; ++edge)
-        for (int corner = 0; corner < width * width; ++corner) {
-          const int j = cell[u] - around + corner % width, k = cell[v] - around + corner / width;
-          if (j < 0 || k < 0 || j >= dims[u] || k >= dims[v]) continue;
-          const auto* from = voxels + std::size_t(edge) * strides[axis] + std::size_t(j) * strides[u] +
-                             std::size_t(k) * strides[v];
-          const float a = float(from[0]), b = float(from[strides[axis]]);
-          if (!isFinite(a) || !isFinite(b)) {
-            // Beyond the last voxel, differences are one-sided and do not use the edge before the cell.
-            finite = finite && around == 0 && edge < low && low + 2 == dims[axis];
-            continue;
-          }
-          least = minimum(least, b - a);
-          largest = maximum(largest, b - a);
-          most = maximum(most, maximum(magnitude(a), magnitude(b)));
-        }
-      if (least < largest) change[axis] = largest - least;
-    }
-  });
-  glm::vec3 turned(0.0f);
-  float scale = 0.0f, longest = 0.0f;
-  for (int axis = 0; axis < 3; ++axis) {
-    longest = maximum(longest, float(dims[axis]));
-    const glm::vec3& column = fromVoxel[axis];
-    turned += glm::vec3(magnitude(column.x), magnitude(column.y), magnitude(column.z)) * change[axis];
-    scale = maximum(scale, sumOfMagnitudes(column));
-  }
-  const Gradient<One> here = gradientAt<One>(field, dims, fromVoxel, point);
-  CellGradient gradient{lengthOf<One>(here.perSpacing), lengthOf<One>(turned), 0.0f, finite};
-  // Rounding of values, and of coordinates, which may be as large as the longest side.
-  gradient.slack =
-      3.0f * scale * most * (2.0f * roundingOf(field.filter)) + gradient.change * longest * 0x1p-22f;
-  // If the cell is finite, this happens only on a face, where the gradient uses voxels outside the cell.
-  if (!here.finite) gradient.magnitude = 0.0f, gradient.change = kLargestFinite;
-  return gradient;
-}
-
 /// Bound of channel n's extinction over the next `*way` (world units) from `point`. Halves `*way` while the
 /// bound is loose and `*way` is above `least`. The slope of the scalar along the ray is bounded by the range
 /// of the voxels.
@@ -203,26 +143,18 @@ SCOLOPAX_HD float boundAhead(const View& scene, int n, const Ray& ray, const Vox
                                             : 0.0f;
   const float lo = values.lo == 0.0f ? 0.0f : values.lo - slack;
   const float hi = values.hi == 0.0f ? 0.0f : values.hi + slack;
-  float here = extinctionAt(channel, curvePosition(channel, values.value));
-  const GradientFactorView& factor = channel.factor;
-  CellGradient gradient{};
-  if (scene.hasFactor(n)) {
-    gradient = gradientIn(channel.field, scene.dims, factor.fromVoxel, cell.low, point);
-    cost->fetches += gradientFetches(channel.field, scene.dims);
-    if (!gradient.finite) return 0.0f;
-    gradient.change *= sumOfMagnitudes(ray.direction);
-    here *= largestFactor(factor, gradient.magnitude, gradient.magnitude);
-  }
-  for (;; *way *= 0.5f) {
-    const float reach = slope * *way + slack;
-    float bound =
-        largestExtinction(channel, maximum(lo, values.value - reach), minimum(hi, values.value + reach));
-    if (scene.hasFactor(n)) {
-      const float around = gradient.change * *way + gradient.slack;
-      bound *= largestFactor(factor, maximum(gradient.magnitude - around, 0.0f), gradient.magnitude + around);
+  return withClassifier(scene, n, [&](auto classifier) {
+    cost->fetches += classifier.fetches(channel.field, scene.dims);
+    const typename decltype(classifier)::Nearby nearby(channel, scene.dims, cell.low, point, ray.direction);
+    if (!nearby.finite()) return 0.0f;
+    const float here = nearby.at(values.value);
+    for (;; *way *= 0.5f) {
+      const float reach = slope * *way + slack;
+      const float bound =
+          nearby.bound(maximum(lo, values.value - reach), minimum(hi, values.value + reach), *way);
+      if (bound * *way <= kFewCollisions || bound <= 2.0f * here || !(*way > least)) return bound;
     }
-    if (bound * *way <= kFewCollisions || bound <= 2.0f * here || !(*way > least)) return bound;
-  }
+  });
 }
 
 /// Tracks through the walk's macrocell, from distance `past` after its entry to distance `end`, in stretches
