@@ -57,7 +57,8 @@ net::Handler guarded(const ApiContext& context, const net::Handler& handler) {
   return [handler, &context](const net::Request& request) -> net::Response {
     try {
       net::Response response = handler(request);
-      // Whatever changes something is answered: its client would take a refusal to mean that nothing changed.
+      // A request that changes something is always answered: its client would take a refusal to mean that
+      // nothing changed.
       const bool reads = request.method == "GET" || request.method == "HEAD";
       return charged(context.memory, std::move(response), reads);
     } catch (const ProtocolError& error) {

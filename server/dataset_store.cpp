@@ -36,8 +36,8 @@ double voxelValue(const Channel& channel, std::size_t index) {
   return channel.slope * stored + channel.intercept;
 }
 
-/// Interpolates trilinearly at a voxel position between the outer voxel centres. In double, as values of the
-/// data are told; the renderer does so in float.
+/// Interpolates trilinearly at a voxel position between the outer voxel centres. In double, because the
+/// result is reported as a value of the data; the renderer interpolates in float.
 double interpolateTrilinearly(const Channel& channel, const glm::ivec3& dims, const glm::dvec3& voxel) {
   double sum = 0;
   for (int corner = 0; corner < 8; ++corner) {

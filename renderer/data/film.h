@@ -21,7 +21,7 @@ template <class Sum>
 class HalvedSums {
  public:
   static constexpr std::size_t kPixelBytes = 2 * sizeof(Sum);
-  /// Forgets all passes. Fast, as the first pass of a half is what fills its memory. Throws std::bad_alloc.
+  /// Forgets all passes. Fast: only the first pass of each half fills memory. Throws std::bad_alloc.
   void reset(std::size_t pixels);
   std::size_t pixels() const { return halves_[0].size(); }
   std::uint32_t passes() const { return passes_; }

@@ -2,6 +2,7 @@
 #include "renderer/data/visible_hull.h"
 
 #include <algorithm>
+#include <glm/common.hpp>
 
 #include "renderer/data/majorant_grid.h"
 #include "renderer/data/transfer_function.h"
@@ -41,6 +42,18 @@ float faceAt(int i, int cells, int size, int dims) {
   return i == 0 ? -0.5f : i == cells ? float(dims) - 0.5f : float(i * size);
 }
 
+/// The corners of boxes that reach one voxel further than the points, inside the volume's box: the cells
+/// bound what eight voxels give, but the spline between them depends on their neighbours, too.
+std::vector<glm::vec3> oneVoxelFurther(const std::vector<glm::vec3>& points, glm::ivec3 dims) {
+  std::vector<glm::vec3> further;
+  for (const glm::vec3& point : points)
+    for (const float x : {-1.0f, 1.0f})
+      for (const float y : {-1.0f, 1.0f})
+        for (const float z : {-1.0f, 1.0f})
+          further.push_back(glm::clamp(point + glm::vec3(x, y, z), glm::vec3(-0.5f), glm::vec3(dims) - 0.5f));
+  return further;
+}
+
 }  // namespace
 
 MacrocellGrid buildCoarseMacrocells(const Volume& volume) {
@@ -52,8 +65,10 @@ MacrocellGrid buildCoarseMacrocells(const Volume& volume) {
 std::vector<glm::vec3> visibleHull(const Volume& volume, const MacrocellGrid& cells,
                                    std::span<const ChannelAppearance> channels) {
   std::vector<kernel::BoundTable> tables;
+  bool splines = false;
   for (std::size_t i = 0; i < channels.size(); ++i) {
     if (!channels[i].visible) continue;
+    splines = splines || channels[i].interpolation == Interpolation::cubic;
     const TransferFunction transfer(volume.channels()[i], channels[i]);
     if (!transfer.invisible()) tables.push_back(buildBounds(cells.levels[i], transfer, int(i)));
     const Surfaces surfaces(volume.channels()[i], channels[i], transfer.origin(),
@@ -78,7 +93,7 @@ std::vector<glm::vec3> visibleHull(const Volume& volume, const MacrocellGrid& ce
       for (const int x : {line.first, line.end})
         points.emplace_back(faceAt(x, count.x, cells.size, dims.x), py, pz);
     }
-  return points;
+  return splines ? oneVoxelFurther(points, dims) : points;
 }
 
 }  // namespace scolopax

@@ -14,10 +14,10 @@ namespace scolopax {
 /// Macrocells, at most 64 along an axis: few enough to visit all of them within milliseconds.
 MacrocellGrid buildCoarseMacrocells(const Volume& volume);
 
-/// Points, in voxel coordinates, whose convex hull contains every sample with extinction above 0. The hull
-/// reaches beyond these samples by less than a macrocell and a step of its levels. Empty if nothing is
-/// visible. `cells`: macrocells of `volume`; `channels`: one per channel of the volume. Throws
-/// Error(badInput) for a curve that cannot be rendered.
+/// Points, in voxel coordinates, whose convex hull contains every sample that has extinction before clipping,
+/// and every surface. The hull reaches beyond these samples by less than a macrocell, a step of its levels
+/// and, with cubic interpolation, a voxel. Empty if nothing is visible. `cells`: macrocells of `volume`;
+/// `channels`: one per channel of the volume. Throws Error(badInput) for a curve that cannot be rendered.
 std::vector<glm::vec3> visibleHull(const Volume& volume, const MacrocellGrid& cells,
                                    std::span<const ChannelAppearance> channels);
 

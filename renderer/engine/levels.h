@@ -29,7 +29,7 @@ struct Level {
   LevelEstimate estimate;
   std::uint32_t from;  ///< number of samples at which the level begins
   double first;        ///< number of corrections with which it begins, so that they are better than none
-  double perSample;    ///< number of corrections in all, for each sample of the film
+  double perSample;    ///< total number of corrections per sample of the film
 };
 
 /// A schedule on which every pass goes where it reduces the squared error most for its cost. `variance` is
@@ -37,16 +37,16 @@ struct Level {
 /// not be negative.
 std::vector<Level> scheduleLevels(double variance, std::span<const LevelEstimate> estimates);
 
-/// Level, as an index of `levels`, of which a film with this many samples should have another correction: the
-/// first of those that have the smallest part of what they should have. A level follows only when the one
-/// before it has begun.
+/// The level, as an index of `levels`, whose next correction is due in a film with this many samples: the
+/// first of those that have the smallest fraction of their corrections. A level begins after the one before
+/// it.
 std::optional<std::size_t> dueLevel(std::span<const Level> levels, std::uint32_t samples, const Film& film);
 
-/// Whether so many corrections make the picture of a film with so many samples better.
+/// Whether this many corrections improve the picture of a film with this many samples.
 bool isEnough(const Level& level, std::uint32_t corrections, std::uint32_t samples);
 
-/// Estimated RMS bias of the film's picture: that of the levels which are not included yet, and of even
-/// finer resolutions.
+/// Estimated RMS bias of the film's picture: of the levels that are not included yet, and of all finer
+/// resolutions.
 double biasLeft(std::span<const Level> levels, const Film& film);
 
 }  // namespace scolopax

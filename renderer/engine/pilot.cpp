@@ -13,11 +13,11 @@ namespace scolopax {
 namespace {
 
 constexpr std::size_t kPilotSamples = 4;
-/// The finest resolution of thumbnails. What finer ones give is extrapolated. None before it tells enough:
-/// steps that all leap over the same detail give similar pictures.
+/// The finest resolution of which thumbnails are rendered; finer ones are extrapolated. Coarser thumbnails
+/// alone would mislead: steps that all skip the same detail give similar pictures.
 constexpr int kFinestThumbnail = kEqualSteps + 2;
-/// Bias of a film's samples that is acceptable if it can be had, as a picture is seen without corrections
-/// while its scene is edited: half a level of an 8-bit picture.
+/// Bias that a film's samples should not exceed if that is affordable, because a picture is shown without
+/// corrections while its scene is edited: half a level of an 8-bit picture.
 constexpr double kUnseenBias = 2e-3;
 /// Factor by which low-discrepancy sampling reduces the variance of quadrature's samples: 2 to 10 where it
 /// was measured. That of corrections is reduced less.

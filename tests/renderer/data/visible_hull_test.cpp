@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 
@@ -141,6 +142,27 @@ TEST(VisibleHull, FramesAllVisibleChannelsAndNoneThatIsNot) {
   looks[1].density = 1;
   looks[1].opacity = {{0, 0}};
   EXPECT_EQ(cameraFor(volume, looks), alone);
+}
+
+TEST(VisibleHull, HoldsTheSplineOfAVoxel) {
+  // It extends to the second voxel on each side. Cells of two voxels begin at even ones.
+  const auto made = test::volumeOf(test::gridOf(kBallDims),
+                                   test::channelOf<std::uint8_t>(kBallDims, [](int x, int y, int z) {
+                                     return glm::ivec3(x, y, z) == glm::ivec3(61, 45, 35) ? 255.0 : 0.0;
+                                   }));
+  ChannelAppearance look = above(0.1);
+  for (const Interpolation how : {Interpolation::trilinear, Interpolation::cubic}) {
+    look.interpolation = how;
+    const double reach = how == Interpolation::cubic ? 1.9 : 0.9;
+    const auto hull = visibleHull(*made, buildCoarseMacrocells(*made), std::vector{look});
+    glm::vec3 low(1e9f), high(-1e9f);
+    for (const glm::vec3& point : hull) low = glm::min(low, point), high = glm::max(high, point);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double centre = glm::ivec3(61, 45, 35)[axis];
+      EXPECT_LE(low[axis], centre - reach) << int(how);
+      EXPECT_GE(high[axis], centre + reach) << int(how);
+    }
+  }
 }
 
 TEST(VisibleHull, IsEmptyWhereNothingCanBeSeenAndThenTheBoxIsFramed) {

@@ -101,6 +101,98 @@ TEST(Pick, OfAnOpaqueBallIsItsSurface) {
       }
 }
 
+/// Calls f(scene, volume, distance of the hit from the ball's centre) for every method and blend mode, for a
+/// pick in the middle of the ball after change(ball).
+template <class Change, class F>
+void forPicksInTheMiddle(const Change& change, const F& f) {
+  for (const Method method : kMethodsAndAutomatic)
+    for (const BlendMode blend : kBlends) {
+      SCOPED_TRACE(testing::Message() << nameOf(method) << " " << nameOf(blend));
+      Ball ball;
+      ball.scene.method = method;
+      ball.scene.blend = blend;
+      change(ball);
+      f(ball, pickedIn(ball.volume, ball.scene, {20, 12, 1, 1}));
+    }
+}
+
+TEST(Pick, OfWhatIsCutOpenIsTheCut) {
+  const auto isAt = [](double distance, double tolerance) {
+    return [=](const Ball& ball, const std::vector<Picked>& found) {
+      ASSERT_EQ(found.size(), 1u);
+      EXPECT_EQ(found[0].channel, 1);
+      EXPECT_NEAR(found[0].point.z, ball.centre.z - distance, tolerance);
+    };
+  };
+  for (const bool ofSome : {false, true})
+    forPicksInTheMiddle(
+        [&](Ball& ball) {
+          ClipPlane plane{ball.centre - glm::dvec3(0, 0, 2), {0, 0, 1}, {}};
+          if (ofSome) plane.channels = {1};
+          ball.scene.clip = {plane};
+        },
+        isAt(2, 0.03));
+  forPicksInTheMiddle(
+      [](Ball& ball) {
+        ball.scene.crop = Crop{{-1, -1, 4}, {30, 30, 30}, 1u << 13};
+      },
+      isAt(1.5, 0.03));
+  // The region in front of both planes is kept as well: nothing is cut off.
+  forPicksInTheMiddle(
+      [](Ball& ball) {
+        ball.scene.crop = Crop{{-1, -1, 4}, {30, 30, 30}, 1u << 13 | 1u << 4};
+      },
+      isAt(Ball::kRadius, kBallTolerance));
+}
+
+TEST(Pick, OfASurfaceIsOnIt) {
+  for (const Interpolation how : {Interpolation::trilinear, Interpolation::cubic})
+    forPicksInTheMiddle(
+        [&](Ball& ball) {
+          ball.scene.channels[1].opacity = {{0, 0}};
+          ball.scene.channels[1].isovalues = {{0, 1, glm::dvec3(1)}};
+          ball.scene.channels[1].interpolation = how;
+        },
+        [](const Ball& ball, const std::vector<Picked>& found) {
+          ASSERT_EQ(found.size(), 1u);
+          EXPECT_EQ(found[0].channel, 1);
+          EXPECT_NEAR(glm::length(found[0].point - ball.centre), Ball::kRadius, 2 * kBallTolerance);
+        });
+}
+
+TEST(Pick, IsOfTheValuesThatTheInterpolationGives) {
+  // The spline smooths: it is off by a sixth of the sum of spacing^2 times the second derivatives, which are
+  // 1 / radius in two directions. The nearest voxel is at most half a voxel away.
+  const double ofSpline = (0.25 + 0.5625) / (6 * 4.5), ofNearest = 0.5;
+  for (const Interpolation how : {Interpolation::cubic, Interpolation::nearest})
+    forPicksInTheMiddle(
+        [&](Ball& ball) { ball.scene.channels[1].interpolation = how; },
+        [&](const Ball& ball, const std::vector<Picked>& found) {
+          ASSERT_EQ(found.size(), 1u);
+          EXPECT_NEAR(glm::length(found[0].point - ball.centre), Ball::kRadius,
+                      how == Interpolation::cubic ? ofSpline + kBallTolerance : ofNearest + kBallTolerance);
+        });
+}
+
+TEST(Pick, IsOfTheMatterThatTheGradientLeaves) {
+  // The gradient of a distance is 1, except in the middle of the ball.
+  for (const bool shown : {true, false})
+    forPicksInTheMiddle(
+        [&](Ball& ball) {
+          const double low = shown ? 0 : 1;
+          ball.scene.channels[1].gradientOpacity =
+              GradientOpacity{0, 1, {{0.3, low}, {0.3, 1 - low}, {1, 1 - low}}};
+        },
+        [&](const Ball& ball, const std::vector<Picked>& found) {
+          if (shown) {
+            ASSERT_EQ(found.size(), 1u);
+            EXPECT_NEAR(glm::length(found[0].point - ball.centre), Ball::kRadius, kBallTolerance);
+          } else if (!found.empty()) {
+            EXPECT_LT(glm::length(found[0].point - ball.centre), 2);
+          }
+        });
+}
+
 TEST(Pick, OfTheFilterPointIsOnTheRayThroughThePixelsCentre) {
   Ball ball;
   ball.scene.filter = PixelFilter::point;
