@@ -383,7 +383,7 @@ class Checks {
       return errorOf(claim, truth, hidden) <= 2 * claim.estimated + 1e-4;
     };
     if (isHonest(claimOf(scene, 4, 32), nothing)) return;
-    const Claim claim = claimOf(scene, 32, 512);
+    const Claim claim = claimOf(scene, 16, 256);
     if (isHonest(claim, nothing)) return;
     scene.step = 1.0 / 64;
     const std::vector<double> hidden = hiddenFrom(scene);
