@@ -111,7 +111,7 @@ check-cuda: test-deps
 TIDY := clang-tidy --quiet --extra-arg=-Wno-unknown-warning-option \
   --extra-arg=-D__cpp_impl_coroutine=201902L --extra-arg=-DBOOST_ASIO_HAS_CO_AWAIT=1 --extra-arg=-DBOOST_ASIO_HAS_STD_COROUTINE=1
 
-# What is compiled, files together where the build takes them together.
+# Reads what the build compiles, in the same units.
 check-tidy: build test-deps
 	sed -n 's/^ *"file": "\(.*\)".*/\1/p' build/release/compile_commands.json | grep -v /tests/ | sort -u \
 	  | xargs -P $(JOBS) -n 1 $(TIDY) -p build/release

@@ -83,8 +83,9 @@ void Surfaces::addTo(kernel::ChannelView& view) const {
 }
 
 float Surfaces::presence(ValueInterval interval, float range) const {
-  // A sample whose value is within rounding of a surface's may lie on either side of it. Rounded are the
-  // value, and the point, times the steepest slope. The slack is enough up to a thousand voxels from the eye.
+  // A sample whose value is within rounding of a surface's may lie on either side of it. Rounding
+  // affects the value, and the point, whose error the steepest slope multiplies. The slack is enough up to a
+  // thousand voxels from the eye.
   const float slack = 0x1p-19f * std::max(std::abs(interval.lo), std::abs(interval.hi)) + 0x1p-11f * range;
   const bool some = std::any_of(stored_.begin(), stored_.end(), [&](float v) {
     return interval.lo - slack <= v && v <= interval.hi + slack;

@@ -12,7 +12,7 @@ import time
 import unittest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from innocent import HostileTest, Viewer  # noqa: E402
+from innocent import HostileTest, Viewer, reading  # noqa: E402
 
 LARGE = {"dataset": "orbitals", "image": {"width": 64, "height": 64}}
 
@@ -26,17 +26,12 @@ class Builds(HostileTest):
         session = self.session(**LARGE)
 
         async def run():
-            async with Viewer(self.server, session) as viewer:
-                async def read():
-                    while True:
-                        await viewer.receive()
-                reading = asyncio.create_task(read())
+            async with Viewer(self.server, session) as viewer, reading(viewer):
                 number = 0
                 while not over.is_set():
                     await viewer.patch(patches[number % len(patches)])
                     number += 1
                     await asyncio.sleep(0.1)
-                reading.cancel()
         asyncio.run(run())
         self.server.call("DELETE", f"/api/v1/sessions/{session['id']}")
 

@@ -10,7 +10,7 @@ import threading
 import unittest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from innocent import FULL, HostileTest, Viewer  # noqa: E402
+from innocent import FULL, HostileTest, Viewer, reading  # noqa: E402
 
 CONNECTIONS = 200 if FULL else 40
 SIDE = 4096 if FULL else 1024
@@ -55,15 +55,10 @@ class Floods(HostileTest):
         patch = json.dumps({"type": "patch", "id": 1, "patch": {"integrator": {"seed": 1}}})
 
         async def edit(over):
-            async with Viewer(self.server, session) as viewer:
-                async def read():
-                    while True:
-                        await viewer.receive()
-                reading = asyncio.create_task(read())
+            async with Viewer(self.server, session) as viewer, reading(viewer):
                 while not over.is_set():
                     await viewer.socket.send(patch)
                     await asyncio.sleep(0)
-                reading.cancel()
 
         async def run(over):
             await asyncio.gather(*(edit(over) for _ in range(8)))

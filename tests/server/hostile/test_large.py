@@ -9,7 +9,7 @@ import threading
 import unittest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from innocent import FULL, HostileTest, Viewer  # noqa: E402
+from innocent import FULL, HostileTest, Viewer, reading  # noqa: E402
 
 SIDE = 4096 if FULL else 2048
 BUDGET = 3072 if FULL else 1024  # MiB
@@ -52,15 +52,10 @@ class Large(HostileTest):
         session = self.large()
 
         async def edit(over):
-            async with Viewer(self.server, session) as viewer:
-                async def read():
-                    while True:
-                        await viewer.receive()
-                reading = asyncio.create_task(read())
+            async with Viewer(self.server, session) as viewer, reading(viewer):
                 while not over.is_set():
                     await viewer.patch({"integrator": {"seed": viewer.patches}})
                     await asyncio.sleep(0.7)  # pause between edits, so that whole pictures are rendered
-                reading.cancel()
         self.under(lambda over: asyncio.run(edit(over)), BUDGET, 12 if FULL else 5)
 
     def test_memory_stays_within_the_budget_and_refusals_tell_the_numbers(self):
