@@ -17,8 +17,10 @@ class Jumps {
   using Int = typename L::Int;
   using Mask = typename L::Mask;
 
-  SCOLOPAX_LANES Jumps(const View& scene, const Scalars& scalars, const Segment<L>& segment, Mask which)
-      : scene_(scene), scalars_(scalars), segment_(segment) {
+  /// `piece`: memory for a number per channel.
+  SCOLOPAX_LANES Jumps(const View& scene, const Scalars& scalars, const Segment<L>& segment, Mask which,
+                       Int* piece)
+      : scene_(scene), scalars_(scalars), segment_(segment), piece_(piece) {
     cut_ = without(which, which);
     for (int n = 0; n < scene.channelCount; ++n) {
       if (!(segment.channels >> n & 1) || !scene.channels[n].optical.jumps || !any(which & segment.of(n)))
@@ -94,8 +96,8 @@ class Jumps {
   const View& scene_;
   const Scalars& scalars_;
   const Segment<L>& segment_;
+  Int* const piece_;            // of each channel's curves
   std::uint32_t channels_ = 0;  // bit n: channel n may have jumps
-  Int piece_[kMaxVisibleChannels];
   int parts_ = 0;
   Mask cut_;                             // rays whose part ends at a jump
   Int channel_{0}, knot_{0}, rises_{0};  // of the jump: reached at this knot, from below if `rises_` is 1

@@ -37,10 +37,13 @@ struct Blending {
 /// compared in this many parts of it.
 inline constexpr int kPartsAtKnots = 8;
 
-/// The parts of channels that hide each other.
+/// The parts of channels that hide each other, and what compare() keeps of the channels: here, because a
+/// device compiler would reserve memory for it at each place where compare() is inlined.
 template <class L, bool kSums>
 struct Hidden {
   PartOf<L> of[kMaxVisibleChannels];
+  Optical<L> at[2][kMaxVisibleChannels];       ///< at the ends of a part
+  typename L::Int piece[kMaxVisibleChannels];  ///< for Jumps
 };
 /// Empty where extinctions add up.
 template <class L>
@@ -113,7 +116,7 @@ SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Se
     if constexpr (kDetail >= Detail::emission) hidden.of[n] = noPart<L>();
   }
   const Float share = select(bent & which, Float(1.0f / kPartsAtKnots), Float(1.0f));
-  Optical<L> at[2][kMaxVisibleChannels];  // the channels at the ends of a part
+  auto& at = hidden.at;
   const auto look = [&](int end, Float place) SCOLOPAX_LANES_LAMBDA {
     for (int n = 0; n < scene.channelCount; ++n) {
       if (!(segment.channels >> n & 1)) continue;
@@ -122,7 +125,7 @@ SCOLOPAX_LANES typename L::Float compare(const View& scene, bool mixes, const Se
       at[end][n].opacity = where(here, at[end][n].opacity);
     }
   };
-  Jumps<L, View, Scalars> jumps(scene, scalars, segment, which);
+  Jumps<L, View, Scalars> jumps(scene, scalars, segment, which, hidden.piece);
   // Sets the channels that jump at the end of a part to the value before their jump or behind it.
   const auto setJumping = [&](int end, Float place, bool behind) SCOLOPAX_LANES_LAMBDA {
     for (int n = 0; n < scene.channelCount; ++n) {

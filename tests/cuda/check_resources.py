@@ -38,10 +38,10 @@ def marching_arrays(name):
     """Bytes that quadrature keeps per channel, at most 32, and indexes: SegmentEnds, Hidden, Strata::Memory."""
     if "RayMarch" not in name:
         return 0
-    point, part, color, number = 8, 20, 12, 4  # CurvePoint, PartOf, Vec, Float
+    point, part, optical, color, number = 8, 20, 16, 12, 4  # CurvePoint, PartOf, Optical, Vec, Float
     factor = 0 if "PlainSceneView" in name else number
     sums = "BlendDensity" in name or "BlendComposite" in name
-    segment = 32 * (2 * (point + factor) + (0 if sums else part))
+    segment = 32 * (2 * (point + factor) + (0 if sums else part + 2 * optical + number))
     strata = 32 * (part + number + color)
     return segment if is_unlit(name) else 2 * segment + strata  # shadow rays have a segment too
 
