@@ -49,7 +49,7 @@ check: export SCOLOPAX_STATISTICS := 2
 check: export SCOLOPAX_RANDOM_SCENES := 2000
 check-asan-ubsan: export SCOLOPAX_STATISTICS := 1
 check-asan-ubsan: export SCOLOPAX_RANDOM_SCENES := 20
-check: check-format test check-bench check-hostile check-tidy check-tsan check-fuzz check-cuda check-asan-ubsan
+check: check-format test check-bench check-hostile check-asan-ubsan check-cuda check-fuzz check-tsan check-tidy
 
 # Benchmarks are built for a report only: this shows that they still can be.
 check-bench: test-deps

@@ -127,60 +127,63 @@ void patchStruct(nlohmann::json& target, const nlohmann::json& patch, const Path
 }
 
 template <Described T>
-nlohmann::json between(const nlohmann::json& from, const nlohmann::json& to);
+nlohmann::json between(const T& from, const T& to);
 
+/// The patch of a member that differs.
 template <class T>
 struct Between {
-  static nlohmann::json of(const nlohmann::json&, const nlohmann::json& to) { return to; }
+  static nlohmann::json of(const T&, const T& to) { return writeValue(to); }
 };
 
 template <Described T>
 struct Between<T> {
-  static nlohmann::json of(const nlohmann::json& from, const nlohmann::json& to) {
-    return between<T>(from, to);
+  static nlohmann::json of(const T& from, const T& to) { return between(from, to); }
+};
+
+template <Described T>
+struct Between<std::optional<T>> {
+  static nlohmann::json of(const std::optional<T>& from, const std::optional<T>& to) {
+    return from && to ? between(*from, *to) : writeValue(to);
   }
 };
 
 template <Described T>
-struct Between<std::optional<T>> : Between<T> {};
-
-template <Described T>
 struct Between<std::vector<T>> {
-  static nlohmann::json of(const nlohmann::json& from, const nlohmann::json& to) {
-    if (to.size() < from.size()) return to;  // only a whole list can shorten a list
+  static nlohmann::json of(const std::vector<T>& from, const std::vector<T>& to) {
+    if (to.size() < from.size()) return writeValue(to);  // only a whole list can shorten a list
     nlohmann::json patch = nlohmann::json::object();
     for (std::size_t i = 0; i < to.size(); ++i) {
-      const nlohmann::json none = nlohmann::json::object();
-      const nlohmann::json& before = i < from.size() ? from[i] : none;
-      if (i >= from.size() || before != to[i]) patch[std::to_string(i)] = between<T>(before, to[i]);
+      if (i >= from.size())
+        patch[std::to_string(i)] = writeValue(to[i]);
+      else if (from[i] != to[i])
+        patch[std::to_string(i)] = between(from[i], to[i]);
     }
     return patch;
   }
 };
 
 template <Described T>
-nlohmann::json between(const nlohmann::json& from, const nlohmann::json& to) {
+nlohmann::json between(const T& from, const T& to) {
   nlohmann::json patch = nlohmann::json::object();
   forEachField<T>([&]<class Value>(const Field<T, Value>& field) {
-    const std::string name(field.name);
-    const auto before = from.find(name), after = to.find(name);
-    if (after == to.end()) {
-      if (before != from.end()) patch[name] = nullptr;
-    } else if (before == from.end()) {
-      patch[name] = *after;
-    } else if (*before != *after) {
-      patch[name] = Between<Value>::of(*before, *after);
-    }
+    const Value &before = from.*field.member, &after = to.*field.member;
+    if (before != after) patch[std::string(field.name)] = Between<Value>::of(before, after);
   });
   // A partner that stays must be named in the patch, or applying it would remove the partner.
+  const auto keep = [&](std::string_view partner) {
+    forEachField<T>([&](const auto& field) {
+      if (field.name != partner) return;
+      nlohmann::json value = writeValue(to.*field.member);
+      if (!value.is_null()) patch[std::string(partner)] = std::move(value);
+    });
+  };
+  const auto named = [&](std::string_view name) { return patch.contains(name); };
+  const auto set = [&](std::string_view name) { return named(name) && !patch[name].is_null(); };
   forEachExclusive<T>([&](const Exclusive& pair) {
-    const std::string names[] = {std::string(pair.first), std::string(pair.second)};
-    for (const int i : {0, 1}) {
-      const std::string &set = names[i], &partner = names[1 - i];
-      if (patch.contains(set) && !patch[set].is_null() && !patch.contains(partner) && to.contains(partner)) {
-        patch[partner] = to.at(partner);
-      }
-    }
+    if (set(pair.first) && !named(pair.second))
+      keep(pair.second);
+    else if (set(pair.second) && !named(pair.first))
+      keep(pair.first);
   });
   return patch;
 }
@@ -192,16 +195,6 @@ nlohmann::json applyPatch(nlohmann::json sparse, const nlohmann::json& patch, st
   return sparse;
 }
 
-nlohmann::json mergePatchBetween(const nlohmann::json& from, const nlohmann::json& to) {
-  return between<Scene>(from, to);
-}
-
-nlohmann::json patchBetween(const Scene& from, const Scene& to) {
-  // Channels that stay, whose curves may be long, need not be written.
-  Scene before = from, after = to;
-  for (std::size_t i = 0; i < std::min(from.channels.size(), to.channels.size()); ++i)
-    if (from.channels[i] == to.channels[i]) before.channels[i] = after.channels[i] = Channel();
-  return between<Scene>(toJson(before), toJson(after));
-}
+nlohmann::json patchBetween(const Scene& from, const Scene& to) { return between(from, to); }
 
 }  // namespace scolopax::protocol

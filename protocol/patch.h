@@ -4,7 +4,7 @@
 // no null.
 #pragma once
 #include <cstddef>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "protocol/scene.h"
 
@@ -17,10 +17,8 @@ namespace scolopax::protocol {
 /// scene, n) makes a whole scene sparse.
 nlohmann::json applyPatch(nlohmann::json sparse, const nlohmann::json& patch, std::size_t channelCount);
 
-/// Returns the patch for which applyPatch(from, patch) == to. Both scenes must be sparse, or both resolved
-/// (toJson), and have at most as many channels as the data set.
-nlohmann::json mergePatchBetween(const nlohmann::json& from, const nlohmann::json& to);
-/// The same for two resolved scenes.
+/// Returns the patch for which applyPatch(toJson(from), patch, n) == toJson(to). Neither scene may have more
+/// than n channels.
 nlohmann::json patchBetween(const Scene& from, const Scene& to);
 
 }  // namespace scolopax::protocol

@@ -38,15 +38,16 @@ void tryPatch(std::string_view sceneText, std::string_view patchText) try {
                                       .peaks = {{"off", ""}},
                                       .interpolations = {{"trilinear", ""}}};
   const nlohmann::json scene = protocol::parseJson(sceneText);
-  protocol::parseScene(scene, kLists);
+  const protocol::Scene before = protocol::parseScene(scene, kLists);
   const nlohmann::json sparse = protocol::applyPatch(nlohmann::json::object(), scene, kChannels);
   const nlohmann::json patch = protocol::parseJson(patchText);
   const nlohmann::json once = protocol::applyPatch(sparse, patch, kChannels);
   require(protocol::applyPatch(once, patch, kChannels) == once);
   const protocol::Scene parsed = protocol::parseScene(once, kLists);
   require(parsed.channels.size() <= kChannels);
-  require(protocol::applyPatch(sparse, protocol::mergePatchBetween(sparse, once), kChannels) == once);
   const nlohmann::json written = protocol::toJson(parsed);
+  require(protocol::applyPatch(protocol::toJson(before), protocol::patchBetween(before, parsed), kChannels) ==
+          written);
   require(protocol::toJson(protocol::parseScene(written, kLists)) == written);
 } catch (const protocol::ProtocolError& error) {
   protocol::problemJson(error);
