@@ -67,7 +67,7 @@ std::vector<Route> operationRoutes(ApiContext& context);
 nlohmann::json openApi(const std::vector<Route>& routes);
 
 /// net::Options::flowOf: a session's id for all requests and streams at its address, else "". A name that no
-/// session has makes no flow, so that clients cannot make more flows than there are sessions.
+/// session has makes no flow, so that a client cannot make more flows than there are sessions.
 std::string flowOf(const SessionStore& sessions, const net::Request& request);
 
 /// Registers all routes and the stream's upgrade.

@@ -12,16 +12,25 @@ namespace scolopax::server {
 SessionStore::SessionStore(std::shared_ptr<const SceneResolver> resolver, Options options, SessionHooks hooks)
     : resolver_(std::move(resolver)), options_(options), hooks_(std::move(hooks)) {}
 
-std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene) {
-  auto session = std::make_shared<Session>(createToken(), createToken(), resolver_,
-                                           resolver_->replaceNow(scene), hooks_);
-  expire();
-  const std::lock_guard lock(mutex_);
+/// Throws if there cannot be another session now. Requires the mutex.
+void SessionStore::checkRoom() const {
   if (closed_) throw protocol::ProtocolError(503, "", *closed_);
   if (sessions_.size() >= options_.maxSessions)
     throw protocol::ProtocolError(
         503, "",
         "there are " + std::to_string(sessions_.size()) + " sessions, as many as this server allows");
+}
+
+std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene) {
+  expire();
+  {
+    const std::lock_guard lock(mutex_);
+    checkRoom();  // resolving a scene that is refused anyway would take time
+  }
+  auto session = std::make_shared<Session>(createToken(), createToken(), resolver_,
+                                           resolver_->replaceNow(scene), hooks_);
+  const std::lock_guard lock(mutex_);
+  checkRoom();  // again: others may have begun sessions
   sessions_.push_back(session);
   hooks_.wakeRender();  // which ends the session if nobody uses it
   return session;

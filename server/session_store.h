@@ -38,6 +38,8 @@ class SessionStore {
   void closeAll(const std::string& reason);
 
  private:
+  void checkRoom() const;
+
   const std::shared_ptr<const SceneResolver> resolver_;
   const Options options_;
   const SessionHooks hooks_;

@@ -46,8 +46,10 @@ class Core {
   /// Runs a handler and turns an exception into a log line and a 500.
   Response guarded(const Handler& handler, const Request& request) const;
 
+  /// See Request::flow.
   std::string flowOf(const Request& request) const {
-    return options.flowOf ? options.flowOf(request) : std::string();
+    std::string flow = options.flowOf ? options.flowOf(request) : std::string();
+    return flow.empty() ? request.remoteAddress : flow;
   }
 
   /// From here until leave() the server waits for this connection when it stops. `address`: the client's, for

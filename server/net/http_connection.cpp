@@ -256,20 +256,20 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
       if (refused) co_return co_await write(std::move(*refused), keepAlive_);
     }
     if (!core_.options.knows || core_.options.knows(request)) core_.trust(this);
+    request.flow = core_.flowOf(request);
     if (boost::beast::websocket::is_upgrade(parser.get())) co_return co_await upgrade(parser, request);
 
-    const std::string flow = core_.flowOf(request);
     RouteMatch match = core_.router.find(request.method, request.path);
     if (!match.route && (request.method == "GET" || request.method == "HEAD") && !hasBody) {
       Response file =
-          co_await runOn<Response>(core_.workers, flow, [&] { return serveFile(request, match); });
+          co_await runOn<Response>(core_.workers, request.flow, [&] { return serveFile(request, match); });
       co_return co_await write(std::move(file), keepAlive_);
     }
     if (!match.route) co_return co_await write(noRoute(match), keepAlive_);
     if (hasBody && !co_await readBody(parser, request)) co_return false;
     keepAlive_ = keepAlive;
     request.matches = std::move(match.matches);
-    Response response = co_await handle(*match.route, flow, request);
+    Response response = co_await handle(*match.route, request);
     co_return co_await write(std::move(response), keepAlive_);
   }
 
@@ -335,9 +335,9 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     return response;
   }
 
-  awaitable<Response> handle(const Route& route, const std::string& flow, Request& request) {
+  awaitable<Response> handle(const Route& route, Request& request) {
     if (route.kind == RouteKind::waiting) {
-      const WaitingPlace place(core_, flow);
+      const WaitingPlace place(core_, request.flow);
       if (!place.taken()) co_return tooMany();
       const ClientWatch watch(transport_.socket(), mayBeAsked(), request);
       co_return co_await runAlone<Response>(core_.slowWorkers,
@@ -353,7 +353,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
           return {};
         }
       };
-      Response response = co_await runOn<Response>(core_.workersFor(request.body.size()), flow,
+      Response response = co_await runOn<Response>(core_.workersFor(request.body.size()), request.flow,
                                                    [&] { return core_.guarded(quick, request); });
       if (!takesLong) co_return response;
     }
@@ -380,10 +380,9 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     }
     if (!core_.upgradeHandler)
       co_return co_await write(core_.problem(404, "There is no WebSocket here."), keepAlive_);
-    const std::string flow = core_.flowOf(request);
-    const std::shared_ptr<PreparedWebSocket> socket = prepareWebSocket(core_, flow);
+    const std::shared_ptr<PreparedWebSocket> socket = prepareWebSocket(core_, request.flow);
     using Answer = std::variant<WebSocketEvents, Response>;
-    Answer answer = co_await runOn<Answer>(core_.workers, flow, [&]() -> Answer {
+    Answer answer = co_await runOn<Answer>(core_.workers, request.flow, [&]() -> Answer {
       Answer decided;
       const auto decide = [&](const Request& asked) {
         decided = core_.upgradeHandler(asked, socket);

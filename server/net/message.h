@@ -28,6 +28,7 @@ struct Request {
   std::string body;                  ///< whole and within the limit; empty in authorize and upgrades
   std::vector<std::string> matches;  ///< regex groups of the route; [0] is the whole path
   std::string remoteAddress;         ///< numeric, without the port
+  std::string flow;                  ///< what Options::flowOf says; if that is nothing, remoteAddress
   /// Whether the handler may wait: unless in a RouteKind::quick route, or when called again after TakesLong.
   bool mayWait = false;
   /// If the handler may wait: requested when the client closes the connection before it has the answer, or

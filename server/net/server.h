@@ -55,8 +55,8 @@ struct Options {
   /// Whether a request that passed `authorize` comes from a known client; if not set, every one does.
   std::function<bool(const Request&)> knows;
   /// The flow that a request, or the messages of the WebSocket that it opens, belong to: handlers of one flow
-  /// run one at a time, and flows take turns (FairPool). Called as `authorize` is. Requests without a flow of
-  /// their own belong to the flow "", as all do if this is not set.
+  /// run one at a time, and flows take turns (FairPool). Called as `authorize` is. Requests for which it
+  /// returns "" are one flow for each client's address, as all are if this is not set.
   std::function<std::string(const Request&)> flowOf;
   /// Formats the server's own refusals (404, 405, 413, ...).
   std::function<Response(int status, const std::string& detail)> problem;

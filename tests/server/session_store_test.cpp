@@ -75,6 +75,28 @@ TEST(SessionStore, RefusesOneSessionTooManyWith503) {
   EXPECT_NE(workshop.store.create(json::object()), nullptr);
 }
 
+/// Counts the scenes that it resolves.
+struct CountingResolver : SceneResolver {
+  CountingResolver() : SceneResolver(testing::smallStore(), {}) {}
+  Resolved replaceNow(const json& scene) const override {
+    ++resolved;
+    return SceneResolver::replaceNow(scene);
+  }
+  mutable int resolved = 0;
+};
+
+TEST(SessionStore, ResolvesNoSceneForWhichThereIsNoSession) {
+  Workshop workshop;
+  const auto resolver = std::make_shared<const CountingResolver>();
+  SessionStore store(resolver, {1, 5min}, workshop.hooks);
+  store.create(json::object());
+  EXPECT_EQ(resolver->resolved, 1);
+  EXPECT_THROW(store.create(json::object()), protocol::ProtocolError);
+  store.closeAll("the server is stopping");
+  EXPECT_THROW(store.create(json::object()), protocol::ProtocolError);
+  EXPECT_EQ(resolver->resolved, 1);
+}
+
 TEST(SessionStore, BeginsNoSessionOnceAllHaveBeenClosed) {
   Workshop workshop;
   const auto session = workshop.store.create(json::object());

@@ -567,6 +567,27 @@ TEST_F(HttpTest, RequestsOfOneFlowThatTakeLongDelayNoOther) {
   for (const auto& client : many) EXPECT_EQ(client->answer().status, 200);
 }
 
+TEST_F(HttpTest, RequestsWithoutAFlowAreOneOfEachAddress) {
+  Options options = quickOptions();
+  std::atomic<int> heads{0};
+  options.authorize = [&](const Request&) -> std::optional<Response> { return ++heads, std::nullopt; };
+  Gate gate;
+  Server server(options);
+  server.route("GET", "/slow", [&](const Request&) { return passed(gate); });
+  server.route("GET", "/other", [](const Request& request) { return Response{200, "", request.flow, {}}; });
+  server.start();
+  std::vector<std::unique_ptr<TestClient>> many;
+  for (int i = 0; i < 40; ++i) {
+    many.push_back(std::make_unique<TestClient>(server.port(), 0, "127.0.0.2"));
+    many.back()->send("GET /slow HTTP/1.1\r\nHost: a\r\n\r\n");
+  }
+  EXPECT_TRUE(eventually([&] { return heads == 40; }));
+  EXPECT_EQ(TestClient(server.port()).request("GET /other HTTP/1.1").body, "127.0.0.1");
+  EXPECT_EQ(gate.arrived(), 1);
+  gate.open();
+  for (const auto& client : many) EXPECT_EQ(client->answer().status, 200);
+}
+
 TEST_F(HttpTest, TellsALongRequestThatItsClientHasGone) {
   Server server(quickOptions());
   std::atomic<int> running{0}, gone{0};
