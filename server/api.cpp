@@ -57,10 +57,9 @@ net::Handler guarded(const ApiContext& context, const net::Handler& handler) {
   return [handler, &context](const net::Request& request) -> net::Response {
     try {
       net::Response response = handler(request);
-      // A request that changes something is always answered: its client would take a refusal to mean that
-      // nothing changed.
-      const bool reads = request.method == "GET" || request.method == "HEAD";
-      return charged(context.memory, std::move(response), reads);
+      if (!response.heldUntilSent)
+        response.heldUntilSent = context.answers.take(request.flow, response.body.size());
+      return response;
     } catch (const ProtocolError& error) {
       return errorResponse(error);
     } catch (const Error& error) {
@@ -111,16 +110,6 @@ int statusOf(ErrorCode code) {
 
 net::Response jsonResponse(int status, const json& body) {
   return {status, "application/json", protocol::jsonText(body), {}};
-}
-
-net::Response charged(const std::shared_ptr<MemoryBudget>& memory, net::Response response, bool refusable) {
-  constexpr std::size_t kFreeBytes = 64 << 10;
-  const std::size_t bytes = response.body.size();
-  if (!response.keep && bytes > kFreeBytes)
-    response.keep = std::make_shared<MemoryBudget::Share>(
-        refusable ? MemoryBudget::take(memory, MemoryUse::answers, bytes)
-                  : MemoryBudget::charge(memory, MemoryUse::answers, bytes));
-  return response;
 }
 
 net::Response errorResponse(const ProtocolError& error) {
@@ -202,15 +191,15 @@ std::string imageBytes(const Image& image, glm::vec3 background, std::string_vie
   return {bytes.begin(), bytes.end()};
 }
 
-void setEncodedBody(const ApiContext& context, const net::Request& request, const std::string& flow,
-                    std::uint64_t bytes, const std::function<std::string(const std::stop_token&)>& encode,
+void setEncodedBody(const ApiContext& context, const net::Request& request, std::uint64_t bytes,
+                    const std::function<std::string(const std::stop_token&)>& encode,
                     net::Response& response) {
   inLongRequest(context, request, [&](const std::stop_token& stop) {
-    context.encoders.run(flow, stop, [&] {
-      const auto memory = MemoryBudget::takeShared(context.memory, MemoryUse::encodings, bytes);
+    context.encoders.run(request.flow, stop, [&] {
+      auto memory = MemoryBudget::take(context.memory, MemoryUse::encodings, bytes);
       response.body = encode(stop);
-      memory->resize(response.body.size());
-      response.keep = memory;
+      memory.resize(0);
+      response.heldUntilSent = context.answers.take(request.flow, response.body.size());
     });
   });
 }

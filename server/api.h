@@ -18,6 +18,7 @@
 #include "server/session_store.h"
 #include "server/stream.h"
 #include "server/unmeasured.h"
+#include "server/unsent_answers.h"
 
 namespace scolopax::server {
 
@@ -32,6 +33,7 @@ struct ApiContext {
   AnswerEncoders& encoders;
   MakeRenderer makeRenderer;
   std::shared_ptr<MemoryBudget> memory;  ///< also charged by the renderers that makeRenderer returns
+  const UnsentAnswers& answers;
   Log log;
   std::atomic<bool>& stopping;  ///< ends requests that wait
   std::stop_token cutting;      ///< ends requests that render, after two thirds of Config::stopGrace
@@ -78,9 +80,6 @@ void addApi(net::Server& server, ApiContext& context);
 /// The HTTP status that reports an error of this code.
 int statusOf(ErrorCode code);
 net::Response jsonResponse(int status, const nlohmann::json& body);
-/// The answer, which is charged to the budget until it has been sent if it is long and not charged yet.
-/// Throws Error(busy) or Error(tooLarge) if there is no memory for it and it is `refusable`.
-net::Response charged(const std::shared_ptr<MemoryBudget>& memory, net::Response response, bool refusable);
 net::Response errorResponse(const protocol::ProtocolError& error);
 /// The body as JSON. Throws ProtocolError: 415 unless Content-Type is application/json or `alsoType`, and
 /// what parseJson throws.
@@ -137,11 +136,11 @@ std::uint64_t imageMemory(std::uint64_t pixels, std::string_view format);
 /// RGBA. Throws Error(cancelled) once `stop` is requested, but a jpeg that has been begun is completed.
 std::string imageBytes(const Image& image, glm::vec3 background, std::string_view format,
                        const std::stop_token& stop);
-/// Sets the body to encode(stop) on one of the encoders' threads, when it is the flow's turn, and charges
-/// `bytes` of memory for that. Throws what encode() and MemoryBudget::take throw, and ProtocolError(503) if
-/// the client disconnects or the server stops.
-void setEncodedBody(const ApiContext& context, const net::Request& request, const std::string& flow,
-                    std::uint64_t bytes, const std::function<std::string(const std::stop_token&)>& encode,
+/// Sets the body to encode(stop) on one of the encoders' threads, when it is the turn of the request's flow,
+/// and charges `bytes` of memory for that. Throws what encode(), MemoryBudget::take and UnsentAnswers::take
+/// throw, and ProtocolError(503) if the client disconnects or the server stops.
+void setEncodedBody(const ApiContext& context, const net::Request& request, std::uint64_t bytes,
+                    const std::function<std::string(const std::stop_token&)>& encode,
                     net::Response& response);
 
 }  // namespace scolopax::server

@@ -188,7 +188,7 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
   const auto pixels = std::uint64_t(scene->render.width) * std::uint64_t(scene->render.height);
   net::Response response{200, std::string(type->mediaType), "", {}};
   setEncodedBody(
-      context, request, "", pixels * sizeof(glm::vec4) + imageMemory(pixels, type->format),
+      context, request, pixels * sizeof(glm::vec4) + imageMemory(pixels, type->format),
       [&](const std::stop_token& stop) {
         return imageBytes(renderer->image(), scene->render.background, type->format, stop);
       },

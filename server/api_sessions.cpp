@@ -40,11 +40,25 @@ EditOrigin originOf(const net::Request& request) {
   return origin;
 }
 
-net::Response sceneResponse(const Session::SceneState& state) {
-  json body = {{"revision", state.revision}};
-  body["scene"] = protocol::toJson(state.scene->resolved);
-  auto response = jsonResponse(200, body);
+net::Response withTag(net::Response response, const Session::SceneState& state) {
   response.headers.emplace_back("ETag", '"' + std::to_string(state.revision) + '"');
+  return response;
+}
+
+json sceneJson(const Session::SceneState& state) {
+  return {{"revision", state.revision}, {"scene", protocol::toJson(state.scene->resolved)}};
+}
+
+/// The answer to a request that has changed something: without the scene if there is no memory for so long an
+/// answer, since a refusal would say that nothing has changed.
+net::Response changedResponse(const ApiContext& context, const net::Request& request, int status, json body) {
+  auto response = jsonResponse(status, body);
+  try {
+    response.heldUntilSent = context.answers.take(request.flow, response.body.size());
+  } catch (const Error&) {
+    body.erase("scene");
+    response = jsonResponse(status, body);
+  }
   return response;
 }
 
@@ -53,7 +67,8 @@ template <class Edit>
 net::Response edited(const ApiContext& context, const net::Request& request, Edit&& edit) {
   const auto session = sessionOf(context, request);
   const EditOrigin origin = originOf(request);
-  return sceneResponse(measuredIn(context, request, [&] { return edit(*session, origin); }));
+  const auto state = measuredIn(context, request, [&] { return edit(*session, origin); });
+  return withTag(changedResponse(context, request, 200, sceneJson(state)), state);
 }
 
 net::Response create(ApiContext& context, const net::Request& request) {
@@ -66,13 +81,11 @@ net::Response create(ApiContext& context, const net::Request& request) {
     if (body.contains("scene")) scene = std::move(body["scene"]);
   }
   const auto session = measuredIn(context, request, [&] { return context.sessions.create(scene); });
-  const auto state = session->scene();
-  json body = {{"id", session->id()},
-               {"token", session->token()},
-               {"revision", state.revision},
-               {"stream", "api/v1/sessions/" + session->id() + "/stream"}};
-  body["scene"] = protocol::toJson(state.scene->resolved);
-  auto response = jsonResponse(201, body);
+  json body = sceneJson(session->scene());
+  body["id"] = session->id();
+  body["token"] = session->token();
+  body["stream"] = "api/v1/sessions/" + session->id() + "/stream";
+  auto response = changedResponse(context, request, 201, std::move(body));
   response.headers.emplace_back("Location", "/api/v1/sessions/" + session->id());
   return response;
 }
@@ -132,11 +145,11 @@ net::Response frame(ApiContext& context, const net::Request& request) {
   net::Response response{200, std::string(type->mediaType), "", {}};
   const std::uint64_t pixels = found->image->pixels.size();
   if (!aov && format == "jpeg") {
-    response.keep = MemoryBudget::takeShared(context.memory, MemoryUse::encodings, found->jpeg->size());
+    response.heldUntilSent = context.answers.take(request.flow, found->jpeg->size());
     response.body.assign(found->jpeg->begin(), found->jpeg->end());
   } else {
     setEncodedBody(
-        context, request, session->id(), (aov ? pixels * sizeof(glm::vec4) : 0) + imageMemory(pixels, format),
+        context, request, (aov ? pixels * sizeof(glm::vec4) : 0) + imageMemory(pixels, format),
         [&](const std::stop_token& stop) {
           if (!aov) return imageBytes(*found->image, found->background, format, stop);
           const AovValues& values = (*found->aovs)[std::size_t(*aov)];
@@ -217,7 +230,8 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
        kJson,
        {},
        [&context](const net::Request& request) {
-         return sceneResponse(sessionOf(context, request)->scene());
+         const auto state = sessionOf(context, request)->scene();
+         return withTag(jsonResponse(200, sceneJson(state)), state);
        }},
       {"PATCH",
        scenePath,

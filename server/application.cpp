@@ -114,6 +114,7 @@ struct Application::Impl {
   json capabilities;
   StreamHub streams;
   AnswerEncoders encoders;
+  UnsentAnswers answers;
   ApiContext context;
   Authorizer authorizer;
   std::optional<net::Server> server;
@@ -143,6 +144,7 @@ struct Application::Impl {
         capabilities(capabilitiesJson(config, sessionResolver->lists())),
         streams(sessions, builds, metrics,
                 {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities, log}),
+        answers(memory),
         context{config,
                 *datasets,
                 renderResolver,
@@ -152,6 +154,7 @@ struct Application::Impl {
                 encoders,
                 makeRenderer,
                 memory,
+                answers,
                 log,
                 stopping,
                 cutting.get_token(),

@@ -6,13 +6,9 @@
 #include <utility>
 
 #include "renderer/core/error.h"
+#include "renderer/core/short_text.h"
 
 namespace scolopax {
-namespace {
-
-std::string mebibytes(std::uint64_t bytes) { return std::to_string((bytes + (1 << 20) - 1) >> 20) + " MiB"; }
-
-}  // namespace
 
 MemoryBudget::Share& MemoryBudget::Share::operator=(Share&& other) noexcept {
   std::swap(budget_, other.budget_);
@@ -34,17 +30,6 @@ MemoryBudget::Share MemoryBudget::take(const std::shared_ptr<MemoryBudget>& budg
                                        std::uint64_t bytes) {
   Share share(budget, use);
   share.resize(bytes);
-  return share;
-}
-
-MemoryBudget::Share MemoryBudget::charge(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use,
-                                         std::uint64_t bytes) {
-  Share share(budget, use);
-  if (budget) {
-    const std::lock_guard lock(budget->mutex_);
-    budget->used_[std::size_t(use)] += bytes;
-  }
-  share.bytes_ = bytes;
   return share;
 }
 

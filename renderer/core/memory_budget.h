@@ -48,8 +48,6 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
   };
   /// Throws like Share::resize. A null `budget` grants every request.
   static Share take(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use, std::uint64_t bytes = 0);
-  /// Charges what is held in any case, even beyond the limit.
-  static Share charge(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use, std::uint64_t bytes);
   /// Like take(), for memory with several owners.
   static std::shared_ptr<Share> takeShared(const std::shared_ptr<MemoryBudget>& budget, MemoryUse use,
                                            std::uint64_t bytes);

@@ -4,6 +4,7 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/redirect_error.hpp>
@@ -428,14 +429,23 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     http::response_serializer<http::string_body> serializer(message);
     serializer.split(head_);
     error_code error;
+    const auto begin = std::chrono::steady_clock::now();
+    std::size_t sent = 0;
     while (!error && !(head_ ? serializer.is_header_done() : serializer.is_done())) {
-      // The deadline is for each piece: a slow reader may take long over a large answer, a stalled one may
-      // not.
-      const Deadline deadline(transport_.socket(), core_.options.bodyTimeout);
-      co_await http::async_write_some(transport_, serializer, into(error));
+      const Deadline deadline(transport_.socket(), patienceFor(sent, begin));
+      sent += co_await http::async_write_some(transport_, serializer, into(error));
     }
     linger_ = !error && !keepAlive;
     co_return !error && keepAlive;
+  }
+
+  /// Time for the next piece of an answer of which so many bytes have been sent: a client may take long over
+  /// a large answer, but it may neither stall nor read so slowly that the answer's memory is held for hours.
+  Milliseconds patienceFor(std::size_t sent, std::chrono::steady_clock::time_point begin) const {
+    const Milliseconds earned(std::int64_t(sent) * 1000 / std::int64_t(core_.options.leastAnswerRate));
+    const auto used = std::chrono::duration_cast<Milliseconds>(std::chrono::steady_clock::now() - begin);
+    const Milliseconds most = core_.options.bodyTimeout;
+    return std::clamp(most + earned - used, Milliseconds(0), most);
   }
 
   /// Reads on after the last answer, so that the client receives it.

@@ -45,7 +45,7 @@ struct Response {
   std::string contentType;  ///< empty: no Content-Type
   std::string body;
   std::vector<std::pair<std::string, std::string>> headers;  ///< further headers; the server sets the lengths
-  std::shared_ptr<const void> keep = {};                     ///< kept alive until the answer has been sent
+  std::shared_ptr<const void> heldUntilSent = {};            ///< released once the answer has been sent
 };
 
 /// Thrown by the handler of a quick route, before it has changed anything, for a request that takes long: the

@@ -27,25 +27,6 @@ std::string headerOf(const net::Response& response, std::string_view name) {
   return "absent";
 }
 
-TEST(Api, ChargesLongAnswersUntilTheyHaveBeenSent) {
-  const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(1) << 20);
-  const auto answer = [](std::size_t bytes) { return net::Response{200, "", std::string(bytes, 'x'), {}}; };
-  EXPECT_EQ(charged(memory, answer(1000), true).keep, nullptr);
-  {
-    const net::Response first = charged(memory, answer(600 << 10), true);
-    EXPECT_EQ(memory->used(MemoryUse::answers), 600u << 10);
-    EXPECT_THROW(charged(memory, answer(600 << 10), true), Error);
-    // What has been charged already is not charged again.
-    net::Response encoded = answer(600 << 10);
-    encoded.keep = first.keep;
-    EXPECT_EQ(charged(memory, std::move(encoded), true).keep, first.keep);
-    // Answers to edits are given in any case.
-    const net::Response edited = charged(memory, answer(600 << 10), false);
-    EXPECT_EQ(memory->used(MemoryUse::answers), 1200u << 10);
-  }
-  EXPECT_EQ(memory->used(MemoryUse::answers), 0u);
-}
-
 TEST(Api, ListsAndDescribesDatasets) {
   Api api;
   const json list = json::parse(api.call("GET", "/api/v1/datasets").body);
@@ -258,6 +239,35 @@ TEST(Api, EditsASessionsScene) {
   EXPECT_EQ(api.call("DELETE", path).status, 204);
   EXPECT_EQ(api.errorOf("GET", path).first, 404);
   EXPECT_EQ(api.errorOf("DELETE", path).first, 404);
+}
+
+TEST(Api, AnswersEditsWithoutTheSceneOnceTheAnswersThatNobodyReadsTakeTheirShareOfTheMemory) {
+  Api api(std::make_shared<MemoryBudget>(std::uint64_t(64) << 20));
+  json points = json::array();
+  for (int i = 0; i < 4096; ++i) points.push_back({i / 4096.0, 0.123456789});
+  const json scene{{"channels", {{{"opacity", points}}, {{"opacity", points}}}}};
+  std::vector<net::Response> unread;
+  unread.push_back(api.call("POST", "/api/v1/sessions", json{{"scene", scene}}.dump()));
+  const std::string path = "/api/v1/sessions/" + json::parse(unread.back().body)["id"].get<std::string>();
+  EXPECT_GT(unread.back().body.size(), 100'000u);
+  int whole = 0;
+  for (std::uint32_t revision = 2; revision < 200; ++revision) {
+    unread.push_back(api.call("PATCH", path + "/scene", "{}"));
+    ASSERT_EQ(unread.back().status, 200);
+    EXPECT_EQ(headerOf(unread.back(), "ETag"), '"' + std::to_string(revision) + '"');
+    const json answer = json::parse(unread.back().body);
+    EXPECT_EQ(answer["revision"], revision);
+    whole += answer.contains("scene");
+  }
+  EXPECT_GT(whole, 30);
+  EXPECT_LT(whole, 198);
+  EXPECT_LE(api.memory->used(MemoryUse::answers), api.memory->limit() / 8);
+  // A session has begun, too, although there is no memory for its scene.
+  const json begun = json::parse(api.call("POST", "/api/v1/sessions", json{{"scene", scene}}.dump()).body);
+  EXPECT_EQ(begun.contains("scene"), false);
+  EXPECT_NE(api.workshop.store.find(begun["id"].get<std::string>()), nullptr);
+  unread.clear();
+  EXPECT_EQ(api.memory->used(MemoryUse::answers), 0u);
 }
 
 TEST(Api, BeginsASessionWithoutABody) {

@@ -12,6 +12,8 @@
 namespace scolopax::server::testing {
 
 struct Api {
+  std::shared_ptr<MemoryBudget> memory;
+  UnsentAnswers answers{memory};
   Config config;
   Workshop workshop;
   Metrics metrics;
@@ -32,7 +34,8 @@ struct Api {
                      [this](const std::shared_ptr<const Volume>&) {
                        return std::make_unique<FakeRenderer>(workshop.control);
                      },
-                     nullptr,
+                     memory,
+                     answers,
                      [](const std::string&) {},
                      stopping,
                      cutting.get_token(),
@@ -42,7 +45,8 @@ struct Api {
                      [] { return std::size_t(123); }};
   std::vector<Route> routes;
 
-  Api() {
+  /// `budget`: for what is encoded and for answers.
+  explicit Api(std::shared_ptr<MemoryBudget> budget = nullptr) : memory(std::move(budget)) {
     config.pollTimeout = std::chrono::milliseconds(0);
     config.maxRenders = 1;
     for (auto family : {datasetRoutes, renderRoutes, sessionRoutes, operationRoutes})

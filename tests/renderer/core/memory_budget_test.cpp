@@ -56,17 +56,6 @@ TEST(MemoryBudget, RefusesWithTheNumbersWhatIsTooLargeAndWhatOthersHold) {
   EXPECT_EQ(refusal(budget, 40).first, ErrorCode::io);
 }
 
-TEST(MemoryBudget, ChargesWhatIsHeldInAnyCaseBeyondTheLimit) {
-  const auto budget = budgetOf(100);
-  {
-    const auto held = MemoryBudget::charge(budget, MemoryUse::answers, 120 * kMiB);
-    EXPECT_EQ(budget->used(MemoryUse::answers), 120 * kMiB);
-    EXPECT_EQ(refusal(budget, 1).first, ErrorCode::busy);
-  }
-  EXPECT_EQ(refusal(budget, 1).first, ErrorCode::io);
-  EXPECT_EQ(MemoryBudget::charge(nullptr, MemoryUse::answers, 5).bytes(), 5u);
-}
-
 TEST(MemoryBudget, HasMemoryReleasedBeforeItRefuses) {
   const auto budget = budgetOf(100);
   std::vector<MemoryBudget::Share> spare;

@@ -326,6 +326,27 @@ TEST_F(HttpTest, CutsAClientThatDoesNotReadItsAnswer) {
   EXPECT_TRUE(eventually([&] { return !client.send("X"); }));
 }
 
+TEST_F(HttpTest, CutsAClientThatReadsItsAnswerTooSlowly) {
+  Options options = quickOptions();
+  options.bodyTimeout = milliseconds(500);
+  options.leastAnswerRate = std::size_t(1) << 30;
+  Server server(options);
+  constexpr std::size_t kBytes = 64 << 20;
+  server.route("GET", "/huge", [](const Request&) {
+    return Response{200, "", std::string(kBytes, 'x'), {}};
+  });
+  server.start();
+  TestClient client(server.port());
+  client.send("GET /huge HTTP/1.1\r\nHost: a\r\n\r\n");
+  // It never stalls, but takes five seconds.
+  std::size_t received = 0;
+  while (const std::size_t count = client.receiveSome(64 << 10)) {
+    received += count;
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+  EXPECT_LT(received, kBytes);
+}
+
 TEST_F(HttpTest, RefusesConnectionsOverTheLimitAndRecovers) {
   Options options = quickOptions();
   options.maxConnections = 3;

@@ -10,6 +10,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <cstring>
@@ -123,6 +124,12 @@ class TestClient {
     send(head + "\r\nHost: localhost\r\n" +
          (body.empty() ? "" : "Content-Length: " + std::to_string(body.size()) + "\r\n") + "\r\n" + body);
     return answer(head.rfind("HEAD", 0) == 0);
+  }
+
+  /// Reads at most so many bytes, and discards them; the number that came, 0 if the connection ended.
+  std::size_t receiveSome(std::size_t most) {
+    std::string bytes(most, 0);
+    return static_cast<std::size_t>(std::max<ssize_t>(0, ::recv(socket_, bytes.data(), most, 0)));
   }
 
   /// Whether the server ends the connection, now or soon, without sending anything more.
