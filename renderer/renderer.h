@@ -22,6 +22,10 @@ namespace scolopax {
 
 class Launcher;
 
+/// Memory, in bytes, that a renderer's film takes for each pixel, with a volume of so many channels and with
+/// AOVs if they are recorded. The corrections of Method::automatic take more if there is more.
+std::size_t filmPixelBytes(std::size_t channels, bool aovs);
+
 /// Counts over all samples since the film was reset. Trackers give the same counts on every machine. For
 /// quadrature, `fetches` and `cellSteps` depend on how many rays the processor marches at once.
 struct RenderStats {

@@ -11,6 +11,7 @@
 #include "protocol/problem.h"
 #include "protocol/scene_json.h"
 #include "renderer/core/error.h"
+#include "renderer/core/short_text.h"
 #include "renderer/data/clip_view.h"
 #include "renderer/data/colormap.h"
 #include "renderer/data/defaults.h"
@@ -19,6 +20,8 @@
 #include "renderer/data/render_plan.h"
 #include "renderer/data/surfaces.h"
 #include "renderer/data/visible_hull.h"
+#include "renderer/renderer.h"
+#include "server/encoder.h"
 
 namespace scolopax::server {
 namespace {
@@ -356,6 +359,25 @@ SceneResolver::Resolved SceneResolver::patch(const ResolvedScene& base, const js
   return whenMeasured(stop, [&] { return patchNow(base, patch); });
 }
 
+std::optional<std::string> SceneResolver::tooLarge(const Scene& scene, bool aovs) const {
+  if (!options_.memory) return std::nullopt;
+  const std::uint64_t pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height);
+  // What a session holds at the same time when it shows its first picture.
+  const std::uint64_t parts[] = {pixels * filmPixelBytes(scene.channels.size(), aovs),
+                                 pixels * sizeof(glm::vec4),
+                                 aovs ? pixels * std::size(kAovs) * sizeof(float) : 0, jpegMemory(pixels)};
+  std::uint64_t held = 0;
+  for (const std::uint64_t part : parts) {
+    held += part;
+    const std::uint64_t most = options_.memory->most(part);
+    if (held <= most) continue;
+    return "expected a picture for which " + mebibytes(most) + " of memory are enough, found " +
+           std::to_string(scene.width) + " x " + std::to_string(scene.height) + " pixels, which need " +
+           mebibytes(held) + (aovs ? " with this quantity" : "");
+  }
+  return std::nullopt;
+}
+
 SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const Chosen& chosen) const {
   protocol::Scene scene = sparse.parsed(lists_);
   auto result = std::make_shared<ResolvedScene>();
@@ -371,8 +393,11 @@ SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const Chosen&
                         "expected at most " + std::to_string(options_.maxPixels) + " pixels, found " +
                             std::to_string(scene.image.width) + " x " + std::to_string(scene.image.height));
   Scene& render = result->render;
+  render.width = int(scene.image.width);
+  render.height = int(scene.image.height);
   scene.dataset = result->dataset->id;
   resolveChannels(scene, render, volume);
+  if (const auto reason = tooLarge(render, false)) throw ProtocolError(422, "/image", *reason);
   frame(scene, *result);
   const auto& framed = result->chosen.framed;
   resolveCamera(scene, render, volume.grid(), framed ? *framed : std::span<const glm::vec3>());
@@ -386,8 +411,6 @@ SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const Chosen&
   refuseAt("/integrator/step", [&] { checkStep(render.step); });
   render.sampling = valueOf<Sampling>(kSamplings, scene.integrator.sampling);
   render.seed = scene.integrator.seed;
-  render.width = int(scene.image.width);
-  render.height = int(scene.image.height);
   render.background = glm::vec3(linearOf(scene.image.background));
   render.filter = valueOf<PixelFilter>(kPixelFilters, scene.image.filter);
   resolveGradientOpacity(scene, *result);  // late: refused scenes need no measuring

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "protocol/lists.h"
@@ -60,7 +61,7 @@ class SceneResolver {
     std::uint32_t defaultSamples = 64;     ///< if the scene has no stop rule
     std::uint64_t maxPixels = 16'777'216;  ///< width x height
     std::size_t maxIntervals = 1 << 25;    ///< macrocells x channels, for macrocells below the default size
-    std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for scenes with long curves; null: no limit
+    std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for pictures and long curves; null: no limit
   };
   SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options);
   virtual ~SceneResolver() = default;
@@ -79,6 +80,9 @@ class SceneResolver {
   /// The same for callers that must not wait: throw Unmeasured instead.
   virtual Resolved replaceNow(const nlohmann::json& scene) const;
   virtual Resolved patchNow(const ResolvedScene& base, const nlohmann::json& patch) const;
+  /// Why there is never memory for a picture of the scene, with AOVs if they are recorded; nullopt if there
+  /// may be.
+  std::optional<std::string> tooLarge(const Scene& scene, bool aovs) const;
   const protocol::Lists& lists() const { return lists_; }
 
  private:

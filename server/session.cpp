@@ -79,6 +79,8 @@ Session::SceneState Session::edit(const EditOrigin& origin, const Resolve& resol
   scene_ = std::move(next);
   ++revision_;
   lastUsed_ = hooks_.now();
+  if (aovs_ && (lastUsed_ - lastAovs_ >= kKeepAovs || resolver_->tooLarge(scene_->render, true)))
+    aovs_ = false;
   if (pictureChanges) {
     lastEdit_ = lastUsed_;
     editRevision_ = revision_;
@@ -144,6 +146,11 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
     throw protocol::ProtocolError(429, "",
                                   "the limit of " + std::to_string(kMaxPolls) +
                                       " requests waiting for a session's frames is reached; retry later");
+  if (query.aovs) {
+    if (const auto reason = resolver_->tooLarge(scene_->render, true))
+      throw protocol::ProtocolError(422, "/aov", *reason);
+    lastAovs_ = hooks_.now();
+  }
   if (query.aovs && !aovs_) {
     // The picture starts over, so it must not be confused with the one before.
     aovs_ = true;
@@ -164,6 +171,7 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
                       [&] { return closed_ || fits() || failedRevision_ == revision_; });
   pollSamples_.erase(poll);
   lastUsed_ = hooks_.now();
+  if (query.aovs) lastAovs_ = lastUsed_;
   hooks_.wakeRender();
   if (closed_) return nullptr;
   if (fits()) return frame_;

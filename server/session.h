@@ -104,6 +104,9 @@ class Session {
   /// Time after which rendering is tried again when it failed because others held the memory.
   static constexpr std::chrono::milliseconds kRetryTime{1000};
 
+  /// AOVs are recorded until the first edit that comes so long after the last query for them.
+  static constexpr std::chrono::seconds kKeepAovs{60};
+
   /// Maximum number of scripts that wait at once.
   static constexpr std::size_t kMaxPolls = 8;
   /// Maximum number of picks that wait at once.
@@ -135,8 +138,8 @@ class Session {
   std::size_t viewerCount() const;
 
   /// Waits for a full-resolution frame of the current scene or a newer one; nullptr if none came in time or
-  /// the session was closed. Throws ProtocolError(429) if too many scripts wait already, and the renderer's
-  /// Error if the scene cannot be rendered.
+  /// the session was closed. Throws ProtocolError: 429 if too many scripts wait already, 422 if there is
+  /// never memory for the AOVs; and the renderer's Error if the scene cannot be rendered.
   std::shared_ptr<const EncodedFrame> waitForFrame(const FrameQuery& query,
                                                    std::chrono::milliseconds timeout);
   std::shared_ptr<const EncodedFrame> latestFrame() const;
@@ -219,7 +222,8 @@ class Session {
   std::multiset<std::uint32_t> pollSamples_;  ///< one per waiting script
   std::vector<WaitingPick> picks_;            ///< the oldest first
   PickId lastPick_ = 0;
-  bool aovs_ = false;
+  bool aovs_ = false;                      ///< AOVs are recorded
+  TimePoint lastAovs_;                     ///< the last query for them
   std::optional<RenderedFrame> rendered_;  ///< waits for the encoder
   std::shared_ptr<const EncodedFrame> frame_;
   std::uint32_t frameNumber_ = 0;

@@ -58,17 +58,16 @@ void MemoryBudget::change(MemoryUse use, std::uint64_t from, std::uint64_t to) {
     std::string refusal;
     {
       const std::lock_guard lock(mutex_);
-      const std::uint64_t most = to <= kOrdinaryBytes ? limit_ : limit_ / 4 * 3;
-      const std::uint64_t others = total() - from;
-      if (to <= from || (to <= most && others <= most - to)) {
+      const std::uint64_t allowed = most(to), others = total() - from;
+      if (to <= from || (to <= allowed && others <= allowed - to)) {
         used_[std::size_t(use)] += to;
         used_[std::size_t(use)] -= from;
         return;
       }
       refusal = "memory for " + std::string(kMemoryUses[std::size_t(use)]) + ": expected at most " +
-                mebibytes(most) + (others > 0 ? ", of which " + mebibytes(others) + " are in use" : "") +
+                mebibytes(allowed) + (others > 0 ? ", of which " + mebibytes(others) + " are in use" : "") +
                 ", found " + mebibytes(to);
-      if (to > most) throw Error(ErrorCode::tooLarge, refusal);
+      if (to > allowed) throw Error(ErrorCode::tooLarge, refusal);
       release = release_;
     }
     if (!release || !release()) throw Error(ErrorCode::busy, refusal);

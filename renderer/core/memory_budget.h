@@ -57,6 +57,8 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
   void setRelease(std::function<bool()> release);
 
   std::uint64_t limit() const { return limit_; }
+  /// The most that may be in use, once a share of so many bytes has been taken.
+  std::uint64_t most(std::uint64_t bytes) const { return bytes <= kOrdinaryBytes ? limit_ : limit_ / 4 * 3; }
   std::uint64_t used(MemoryUse use) const;
 
  private:

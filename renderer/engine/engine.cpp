@@ -200,10 +200,8 @@ class Engine final : public Renderer {
 
   /// Bytes of a film of this size, with all records of its pixels.
   std::size_t filmBytes(std::size_t pixels, const Scene& scene) const {
-    const std::size_t counted = counting_ ? sizeof(kernel::SampleCost) : 0;
-    const std::size_t recorded =
-        recording_ ? sizeof(std::uint64_t) + FirstCollisions::pixelBytes(scene.channels.size()) : 0;
-    return pixels * (Film::kPixelBytes + sizeof(std::uint8_t) + counted + recorded);
+    const std::size_t counted = counting_ && !recording_ ? sizeof(kernel::SampleCost) : 0;
+    return pixels * (filmPixelBytes(scene.channels.size(), recording_) + counted);
   }
 
   /// Adds a level of corrections to the film, if there is memory for it.
@@ -273,6 +271,12 @@ class Engine final : public Renderer {
 };
 
 }  // namespace
+
+std::size_t filmPixelBytes(std::size_t channels, bool aovs) {
+  const std::size_t records =
+      aovs ? sizeof(kernel::SampleCost) + sizeof(std::uint64_t) + FirstCollisions::pixelBytes(channels) : 0;
+  return Film::kPixelBytes + sizeof(std::uint8_t) + records;
+}
 
 std::unique_ptr<Renderer> makeRenderer(std::unique_ptr<Launcher> launcher,
                                        std::shared_ptr<const Volume> volume,

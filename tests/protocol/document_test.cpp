@@ -2,6 +2,7 @@
 // PROTOCOL.md: its section on fields matches the table of fields, and its examples are valid.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <sstream>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "protocol/patch.h"
 #include "protocol/scene_json.h"
 #include "protocol/schema.h"
+#include "renderer/renderer.h"
 #include "server/scene_resolver.h"
 #include "tests/protocol/fixtures.h"
 
@@ -44,6 +46,18 @@ TEST(ProtocolDocument, HoldsTheSectionOfTheTable) {
   ASSERT_NE(to, std::string::npos);
   expectFile(protocolFile("PROTOCOL.md"),
              text.substr(0, from) + begin + '\n' + fieldsMarkdown(server::rendererLists()) + text.substr(to));
+}
+
+TEST(ProtocolDocument, StatesTheMemoryThatFilmsTake) {
+  std::string text = readText(protocolFile("PROTOCOL.md"));
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  const auto bytes = [](std::size_t channels, bool aovs) {
+    return std::to_string(filmPixelBytes(channels, aovs));
+  };
+  EXPECT_EQ(filmPixelBytes(3, true), filmPixelBytes(2, true) + 4);
+  EXPECT_NE(text.find("films (" + bytes(0, false) + " bytes a pixel of a picture; while AOVs are recorded, " +
+                      bytes(0, true) + " and 4 more for each channel;"),
+            std::string::npos);
 }
 
 TEST(ProtocolDocument, ShowsScenesThatAreTaken) {

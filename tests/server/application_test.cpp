@@ -127,8 +127,11 @@ TEST_F(ApplicationTest, ChargesTheAnswersToHeadAsThoseToGet) {
   start();
   json points = json::array();
   for (int i = 0; i < 4096; ++i) points.push_back({i / 4096.0, 0.123456789});
-  const std::string session = newSession(
-      json{{"scene", {{"channels", {{"0", {{"opacity", points}}}, {"1", {{"opacity", points}}}}}}}}.dump());
+  const std::string session =
+      newSession(json{{"scene",
+                       {{"image", {{"width", 64}, {"height", 64}}},
+                        {"channels", {{"0", {{"opacity", points}}}, {"1", {{"opacity", points}}}}}}}}
+                     .dump());
   std::uint64_t used = 64 << 10;
   for (std::size_t use = 0; use < std::size(kMemoryUses); ++use) used += memory_->used(MemoryUse(use));
   const auto full = MemoryBudget::takeShared(memory_, MemoryUse::answers, memory_->limit() - used);

@@ -435,7 +435,40 @@ json longCurves(int count) {
     opacity.push_back({double(i) / count, 0.5});
     colors.push_back(json::array({double(i) / count, "#102030"}));
   }
-  return {{"channels", {{{"opacity", opacity}, {"colormap", colors}}}}};
+  return {{"channels", {{{"opacity", opacity}, {"colormap", colors}}}},
+          {"image", {{"width", 64}, {"height", 64}}}};
+}
+
+TEST(SceneResolver, RefusesPicturesForWhichThereIsNeverMemory) {
+  const SceneResolver resolve(testing::smallStore(), {.memory = std::make_shared<MemoryBudget>(64 << 20)});
+  const auto scene = [](int width) { return json{{"image", {{"width", width}, {"height", 700}}}}; };
+  // 81 bytes a pixel for the film, 16 for the picture, 11 for its JPEG.
+  const auto fits = resolve.replace(scene(880));
+  try {
+    resolve.patch(*fits, scene(890));
+    FAIL() << "no error";
+  } catch (const ProtocolError& error) {
+    EXPECT_EQ(error.status, 422);
+    EXPECT_EQ(error.pointer, "/image");
+    EXPECT_STREQ(
+        error.what(),
+        "expected a picture for which 64 MiB of memory are enough, found 890 x 700 pixels, which need 65 "
+        "MiB");
+  }
+  EXPECT_EQ(resolve.tooLarge(fits->render, false), std::nullopt);
+  EXPECT_NE(resolve.tooLarge(fits->render, true), std::nullopt);
+  EXPECT_EQ(resolve.tooLarge(resolve.replace(scene(500))->render, true), std::nullopt);
+}
+
+TEST(SceneResolver, LeavesPicturesToTheLastQuarterOfTheMemoryButNoLargeFilms) {
+  const SceneResolver resolve(testing::smallStore(), {.memory = std::make_shared<MemoryBudget>(1000 << 20)});
+  Scene scene;
+  scene.channels.resize(2);
+  scene.height = 2000;
+  scene.width = 4800;  // a film of 742 MiB, with picture and JPEG 989
+  EXPECT_EQ(resolve.tooLarge(scene, false), std::nullopt);
+  scene.width = 4900;  // a film of 757 MiB, of which 750 are allowed
+  EXPECT_NE(resolve.tooLarge(scene, false), std::nullopt);
 }
 
 TEST(SceneResolver, ChargesScenesWithLongCurvesToTheMemoryOfRequests) {

@@ -277,6 +277,44 @@ TEST(Session, MakesARevisionWhenAovsAreAskedForFirst) {
   EXPECT_EQ(session->scene().revision, 2u);
 }
 
+TEST(Session, RecordsAovsUntilAnEditLongAfterTheLastQueryForThem) {
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
+  session->waitForFrame({0, 1, true}, 0ms);
+  workshop.clock.advance(59s);
+  session->patch(seedPatch(1), {});
+  EXPECT_TRUE(session->request().aovs);
+  workshop.clock.advance(1s);
+  EXPECT_TRUE(session->request().aovs);
+  session->patch(seedPatch(2), {});
+  EXPECT_FALSE(session->request().aovs);
+  session->waitForFrame({0, 1, true}, 0ms);
+  EXPECT_TRUE(session->request().aovs);
+}
+
+TEST(Session, RecordsNoAovsForWhichThereIsNeverMemory) {
+  Workshop workshop;
+  const auto resolver = std::make_shared<const SceneResolver>(
+      testing::smallStore(), SceneResolver::Options{.memory = std::make_shared<MemoryBudget>(64 << 20)});
+  const auto sized = [](int side) { return json{{"image", {{"width", side}, {"height", side}}}}; };
+  Session session("id", "token", resolver, resolver->replaceNow(sized(700)), workshop.hooks);
+  try {
+    session.waitForFrame({0, 1, true}, 0ms);
+    FAIL() << "no error";
+  } catch (const ProtocolError& error) {
+    EXPECT_EQ(error.status, 422);
+    EXPECT_EQ(error.pointer, "/aov");
+  }
+  EXPECT_FALSE(session.request().aovs);
+  EXPECT_EQ(session.scene().revision, 1u);
+  // Nor does an edit make the scene one that cannot be rendered.
+  session.patch(sized(100), {});
+  session.waitForFrame({0, 1, true}, 0ms);
+  EXPECT_TRUE(session.request().aovs);
+  session.patch(sized(700), {});
+  EXPECT_FALSE(session.request().aovs);
+}
+
 TEST(Session, GivesAScriptTheFinalFrameWhenThereCannotBeMoreSamples) {
   Workshop workshop;
   const auto session = workshop.store.create({{"stop", {{"samples", 3}}}});
