@@ -69,10 +69,14 @@ Session::SceneState Session::edit(const EditOrigin& origin, const Resolve& resol
   auto next = resolve(*before);
   const bool pictureChanges = !samePicture(next->resolved, before->resolved);
   lock.lock();
-  std::optional<std::string> change;  // for other viewers; most sessions have only one
-  while (!change && viewers_.size() > viewers_.count(origin.viewer)) {
+  // For other viewers; most sessions have only one. A query for AOVs may begin a revision meanwhile.
+  std::string change;
+  std::shared_ptr<const std::string> message;
+  for (std::uint32_t told = 0; told != revision_ + 1 && viewers_.size() > viewers_.count(origin.viewer);) {
+    told = revision_ + 1;
     lock.unlock();
-    change = protocol::jsonText(protocol::patchBetween(before->resolved, next->resolved));
+    if (change.empty()) change = protocol::jsonText(protocol::patchBetween(before->resolved, next->resolved));
+    message = std::make_shared<const std::string>(protocol::sceneText(told, change));
     lock.lock();
   }
   checkRevision(origin);  // a query for AOVs may have begun one, or the session have ended
@@ -86,7 +90,6 @@ Session::SceneState Session::edit(const EditOrigin& origin, const Resolve& resol
     editRevision_ = revision_;
     hooks_.interruptRender();
   }
-  const std::string message = change ? protocol::sceneText(revision_, *change) : std::string();
   for (auto& [id, viewer] : viewers_) {
     if (id != origin.viewer) {
       tell(&ViewerSink::sceneChanged, *viewer.sink, message);
@@ -155,7 +158,7 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
     // The picture starts over, so it must not be confused with the one before.
     aovs_ = true;
     ++revision_;
-    const std::string message = protocol::sceneText(revision_, "{}");
+    const auto message = std::make_shared<const std::string>(protocol::sceneText(revision_, "{}"));
     for (auto& [id, viewer] : viewers_) tell(&ViewerSink::sceneChanged, *viewer.sink, message);
   }
   retryIfBusy();
@@ -259,10 +262,11 @@ RenderRequest Session::request() const {
 }
 
 void Session::submit(RenderedFrame frame) {
+  std::optional<RenderedFrame> last;  // released without the mutex, as that may take time
   const std::lock_guard lock(mutex_);
   if (closed_) return;
   if (retryAt_ && frame.info.revision == failedRevision_) failedRevision_ = 0;  // the retry succeeded
-  rendered_ = std::move(frame);
+  last = std::exchange(rendered_, std::move(frame));
   hooks_.wakeEncoder();
 }
 
@@ -304,10 +308,11 @@ std::optional<RenderedFrame> Session::takeRendered(std::uint64_t mostPixels) {
 }
 
 void Session::publish(EncodedFrame frame) {
+  std::shared_ptr<const EncodedFrame> last;  // released without the mutex, as that may take time
   const std::lock_guard lock(mutex_);
   if (frame_ && frame.info.revision < frame_->info.revision) return;
   frame.info.number = ++frameNumber_;
-  frame_ = std::make_shared<const EncodedFrame>(std::move(frame));
+  last = std::exchange(frame_, std::make_shared<const EncodedFrame>(std::move(frame)));
   frameCame_.notify_all();
 }
 

@@ -48,8 +48,8 @@ class ViewerSink {
   /// `patch`: id of this viewer's last patch that the frame contains, 0 for none.
   virtual void offerFrame(const EncodedFrame& frame, std::uint32_t patch) = 0;
   /// Another client edited the scene, or a query for AOVs began a revision. `message` is protocol::sceneText
-  /// of the change, written once for all viewers.
-  virtual void sceneChanged(const std::string& message) = 0;
+  /// of the change, one text for all viewers.
+  virtual void sceneChanged(const std::shared_ptr<const std::string>& message) = 0;
   /// The scene cannot be rendered, or not at present.
   virtual void renderFailed(const Error& error) = 0;
   /// The session has ended.

@@ -63,8 +63,10 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   void offerFrame(const EncodedFrame& frame, std::uint32_t patch) override {
     orEnd([&] { sendFrame(frame, patch); });
   }
-  void sceneChanged(const std::string& message) override {
-    orEnd([&] { sendText(message); });
+  void sceneChanged(const std::shared_ptr<const std::string>& message) override {
+    orEnd([&] {
+      if (const auto socket = socket_.lock()) socket->sendText(message);
+    });
   }
   void renderFailed(const Error& error) override {
     orEnd([&] { sendText(protocol::errorText(ProtocolError(statusOf(error.code()), "", error.what()))); });

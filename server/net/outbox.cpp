@@ -6,14 +6,15 @@
 
 namespace scolopax::net {
 
-bool Outbox::pushText(std::string text) {
+bool Outbox::pushText(SharedText text) {
   if (closing()) return true;
   if (texts_.size() >= limits_.count) return false;
-  unsent_ += text.size();
-  const std::size_t all = unsentByAll_->fetch_add(text.size()) + text.size();
+  const std::size_t bytes = text->size();
+  unsent_ += bytes;
+  const std::size_t all = unsentByAll_->fetch_add(bytes) + bytes;
   const bool mineFit = texts_.empty() || unsent_ <= limits_.bytes;
   if (unsent_ > limits_.fairBytes && !(mineFit && all <= limits_.bytesOfAll)) {
-    release(text.size());
+    release(bytes);
     return false;
   }
   texts_.push_back(std::move(text));
@@ -70,7 +71,7 @@ void Outbox::clear() {
 std::optional<Outbox::Item> Outbox::next() {
   release(std::exchange(sending_, 0));
   if (!texts_.empty()) {
-    sending_ = texts_.front().size();
+    sending_ = texts_.front()->size();
     Item item = std::move(texts_.front());
     texts_.pop_front();
     ++stats_.textsSent;

@@ -22,7 +22,7 @@ struct CloseMessage {
 /// Not thread-safe. One consumer calls next() whenever the socket is free for another write.
 class Outbox {
  public:
-  /// Bytes of texts not sent yet, over all clients of a server.
+  /// Bytes of texts not sent yet, over all clients of a server; a text that many share counts for each.
   using UnsentBytes = std::shared_ptr<std::atomic<std::size_t>>;
   explicit Outbox(const TextLimits& limits,
                   UnsentBytes unsentByAll = std::make_shared<std::atomic<std::size_t>>(0))
@@ -32,14 +32,14 @@ class Outbox {
   Outbox& operator=(const Outbox&) = delete;
 
   /// False if the text would exceed a limit: it is dropped, and the caller closes the connection.
-  bool pushText(std::string text);
+  bool pushText(SharedText text);
   void offer(Frame frame);
   void withdraw();
   void acknowledge(std::uint32_t number);
   /// Only the first message counts. Frames are no longer sent; queued texts still are, unless `withoutTexts`.
   void close(CloseMessage message, bool withoutTexts);
 
-  using Item = std::variant<std::string, Frame, CloseMessage>;
+  using Item = std::variant<SharedText, Frame, CloseMessage>;
   /// The next item to send; the one before it now counts as sent. Texts come first, then a frame if the
   /// window is open, and the close message last of all; nullopt if there is nothing to send now.
   std::optional<Item> next();
@@ -56,7 +56,7 @@ class Outbox {
 
   const TextLimits limits_;
   const UnsentBytes unsentByAll_;
-  std::deque<std::string> texts_;
+  std::deque<SharedText> texts_;
   std::size_t unsent_ = 0;                    ///< bytes of texts_, and of the text that is being sent
   std::size_t sending_ = 0;                   ///< bytes of the text that is being sent
   std::optional<Frame> pending_;              ///< the frame in the one waiting place

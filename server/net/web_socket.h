@@ -39,6 +39,9 @@ struct WebSocketStats {
   bool open = true;
 };
 
+/// A text that many clients may share.
+using SharedText = std::shared_ptr<const std::string>;
+
 /// Frames that may be on their way to a client: enough to keep the connection busy, few enough to stay fresh.
 inline constexpr int kFrameWindow = 2;
 
@@ -47,7 +50,8 @@ class WebSocket {
  public:
   virtual ~WebSocket() = default;
   /// Queued in order; beyond Options::unsentTexts the connection is closed with 1008.
-  virtual void sendText(std::string text) = 0;
+  virtual void sendText(SharedText text) = 0;
+  void sendText(std::string text) { sendText(std::make_shared<const std::string>(std::move(text))); }
   /// Takes the one waiting place, replacing a frame that is still there.
   virtual void offerFrame(Frame frame) = 0;
   /// Takes back a frame that still waits: the client looks at something else now.

@@ -49,7 +49,7 @@ class WebSocketConnection : public PreparedWebSocket,
 
   // The handle, from any thread.
 
-  void sendText(std::string text) override {
+  void sendText(SharedText text) override {
     const std::lock_guard lock(mutex_);
     if (ended_) return;
     if (!outbox_.pushText(std::move(text))) outbox_.close({1008, "too many messages wait to be read"}, true);
@@ -183,9 +183,9 @@ class WebSocketConnection : public PreparedWebSocket,
     const auto done = [self = shared_from_this()](const error_code& error, std::size_t = 0) {
       self->onWritten(error);
     };
-    if (const auto* text = std::get_if<std::string>(&current_)) {
+    if (const auto* text = std::get_if<SharedText>(&current_)) {
       stream_->text(true);
-      stream_->async_write(asio::buffer(*text), done);
+      stream_->async_write(asio::buffer(**text), done);
     } else if (const auto* frame = std::get_if<Frame>(&current_)) {
       stream_->binary(true);
       const auto payload = frame->payload ? asio::buffer(*frame->payload) : asio::const_buffer();
@@ -203,7 +203,7 @@ class WebSocketConnection : public PreparedWebSocket,
 
   void onWritten(const error_code& error) {
     writing_ = false;
-    current_ = std::string();  // releases the picture
+    current_ = Outbox::Item();  // releases the text or picture
     if (readEnded_) return end();
     if (error) return closeSocket();  // then the read fails as well
     pump();

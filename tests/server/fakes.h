@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "renderer/core/error.h"
+#include "server/net/web_socket.h"
 #include "server/progressive_render.h"
 #include "server/render_loop.h"
 
@@ -199,17 +200,17 @@ struct FakeViewer : ViewerSink {
   };
   std::vector<Offer> frames;
   std::vector<std::pair<std::uint32_t, nlohmann::json>> scenes;
-  std::vector<const std::string*> messages;  ///< addresses of the texts that tell of these scenes
+  std::vector<net::SharedText> messages;  ///< that tell of these scenes
   std::vector<std::string> failures;
   std::string closed;
 
   void offerFrame(const EncodedFrame& frame, std::uint32_t patch) override {
     frames.push_back({frame.info, frame.width, frame.height, frame.image->pixels.front().r, patch});
   }
-  void sceneChanged(const std::string& message) override {
-    const auto parsed = nlohmann::json::parse(message);
+  void sceneChanged(const net::SharedText& message) override {
+    const auto parsed = nlohmann::json::parse(*message);
     scenes.emplace_back(parsed["revision"], parsed["patch"]);
-    messages.push_back(&message);
+    messages.push_back(message);
   }
   void renderFailed(const Error& error) override { failures.emplace_back(error.what()); }
   void sessionClosed(const std::string& reason) override { closed = reason; }

@@ -352,6 +352,33 @@ TEST(Session, TellsViewersAndScriptsThatASceneCannotBeRendered) {
   EXPECT_EQ(viewer->frames.size(), 1u);
 }
 
+TEST(Session, ServesOthersWhileAnOldPictureIsReleased) {
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
+  std::vector<std::future<std::size_t>> answers;
+  bool asks = true;
+  int served = 0;
+  // A picture whose release another thread's request interrupts.
+  const auto image = [&] {
+    return std::shared_ptr<const Image>(new Image(), [&](const Image* released) {
+      delete released;
+      if (!asks) return;
+      answers.push_back(std::async(std::launch::async, [&] { return session->viewerCount(); }));
+      served += answers.back().wait_for(10s) == std::future_status::ready;
+    });
+  };
+  for (int i = 0; i < 3; ++i) {
+    EncodedFrame encoded;
+    encoded.image = image();
+    session->publish(std::move(encoded));
+    RenderedFrame rendered;
+    rendered.image = image();
+    session->submit(std::move(rendered));
+  }
+  EXPECT_EQ(served, 4);
+  asks = false;
+}
+
 TEST(Session, WakesWhoWaitsWhenItIsClosed) {
   Workshop workshop;
   const auto session = workshop.store.create(json::object());

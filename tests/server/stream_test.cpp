@@ -17,12 +17,12 @@ using testing::Workshop;
 /// Keeps what it is given to send, but fails for texts that contain `refused`.
 struct FakeSocket : net::WebSocket {
   std::string refused = "nothing";
-  std::vector<std::string> texts;
+  std::vector<net::SharedText> texts;
   int frames = 0;
   std::uint16_t closed = 0;
 
-  void sendText(std::string text) override {
-    if (text.find(refused) != std::string::npos) throw std::runtime_error("no memory for this text");
+  void sendText(net::SharedText text) override {
+    if (text->find(refused) != std::string::npos) throw std::runtime_error("no memory for this text");
     texts.push_back(std::move(text));
   }
   void offerFrame(net::Frame) override { ++frames; }
@@ -69,6 +69,16 @@ TEST(Stream, EndsWhenTheFailureOfAPickCannotBeSent) {
   client.events.onText(kPick);
   client.session->fail(1, Error(ErrorCode::busy, "no memory"));
   EXPECT_EQ(client.socket->closed, 1011);
+}
+
+TEST(Stream, SharesTheTextAboutAnEditWithTheOthers) {
+  Client client;
+  const auto other = std::make_shared<FakeSocket>();
+  const net::WebSocketEvents events = client.hub.join(client.session, other);
+  client.session->patch(testing::seedPatch(4), {});
+  EXPECT_NE(client.socket->texts.back()->find("revision"), std::string::npos);
+  EXPECT_EQ(client.socket->texts.back(), other->texts.back());
+  events.onClose();
 }
 
 TEST(Stream, EndsWhenTheOthersEditsCannotBeSent) {

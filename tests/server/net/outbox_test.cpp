@@ -14,6 +14,8 @@ std::uint32_t nextFrame(Outbox& outbox) {
   return item ? std::get<Frame>(*item).number : 0;
 }
 
+SharedText text(std::string given) { return std::make_shared<const std::string>(std::move(given)); }
+
 TextLimits texts(std::size_t count) { return {count, 100, 1000, 10}; }
 
 TEST(Outbox, SendsAtMostTwoUnacknowledgedFrames) {
@@ -73,43 +75,43 @@ TEST(Outbox, KeepsCountWhenFrameNumbersWrapAround) {
 TEST(Outbox, SendsTextsInOrderAndBeforeFrames) {
   Outbox outbox(texts(4));
   outbox.offer(frame(1));
-  EXPECT_TRUE(outbox.pushText("a"));
-  EXPECT_TRUE(outbox.pushText("b"));
-  EXPECT_EQ(std::get<std::string>(*outbox.next()), "a");
-  EXPECT_EQ(std::get<std::string>(*outbox.next()), "b");
+  EXPECT_TRUE(outbox.pushText(text("a")));
+  EXPECT_TRUE(outbox.pushText(text("b")));
+  EXPECT_EQ(*std::get<SharedText>(*outbox.next()), "a");
+  EXPECT_EQ(*std::get<SharedText>(*outbox.next()), "b");
   EXPECT_EQ(nextFrame(outbox), 1U);
 }
 
 TEST(Outbox, RefusesMoreTextsThanItsLimit) {
   Outbox outbox(texts(2));
-  EXPECT_TRUE(outbox.pushText("a"));
-  EXPECT_TRUE(outbox.pushText("b"));
-  EXPECT_FALSE(outbox.pushText("c"));
+  EXPECT_TRUE(outbox.pushText(text("a")));
+  EXPECT_TRUE(outbox.pushText(text("b")));
+  EXPECT_FALSE(outbox.pushText(text("c")));
   outbox.next();
-  EXPECT_TRUE(outbox.pushText("d"));
+  EXPECT_TRUE(outbox.pushText(text("d")));
 }
 
 TEST(Outbox, RefusesMoreBytesOfTextThanItsLimitButForASingleText) {
   Outbox outbox(texts(9));
-  EXPECT_TRUE(outbox.pushText(std::string(900, 'x')));
-  EXPECT_FALSE(outbox.pushText("y"));
+  EXPECT_TRUE(outbox.pushText(text(std::string(900, 'x'))));
+  EXPECT_FALSE(outbox.pushText(text("y")));
   outbox.next();
-  EXPECT_TRUE(outbox.pushText("y"));  // one more may wait while the large one is being sent
-  EXPECT_FALSE(outbox.pushText("z"));
+  EXPECT_TRUE(outbox.pushText(text("y")));  // one more may wait while the large one is being sent
+  EXPECT_FALSE(outbox.pushText(text("z")));
   outbox.next();
-  EXPECT_TRUE(outbox.pushText(std::string(50, 'x')));
-  EXPECT_TRUE(outbox.pushText(std::string(49, 'x')));
-  EXPECT_FALSE(outbox.pushText("y"));
+  EXPECT_TRUE(outbox.pushText(text(std::string(50, 'x'))));
+  EXPECT_TRUE(outbox.pushText(text(std::string(49, 'x'))));
+  EXPECT_FALSE(outbox.pushText(text("y")));
 }
 
 TEST(Outbox, HoldsToTheLimitOfAllTogetherAlsoWithTextsThatAreAlone) {
   const auto all = std::make_shared<std::atomic<std::size_t>>(0);
   Outbox first(texts(9), all), second(texts(9), all);
-  EXPECT_TRUE(first.pushText(std::string(900, 'x')));
-  EXPECT_FALSE(second.pushText(std::string(101, 'x')));
-  EXPECT_TRUE(second.pushText(std::string(100, 'x')));
+  EXPECT_TRUE(first.pushText(text(std::string(900, 'x'))));
+  EXPECT_FALSE(second.pushText(text(std::string(101, 'x'))));
+  EXPECT_TRUE(second.pushText(text(std::string(100, 'x'))));
   first.next();
-  EXPECT_FALSE(first.pushText(std::string(101, 'x')));  // the first is still being sent
+  EXPECT_FALSE(first.pushText(text(std::string(101, 'x'))));  // the first is still being sent
   EXPECT_EQ(*all, 1000U);
   first.next();
   EXPECT_EQ(*all, 100U);
@@ -119,14 +121,14 @@ TEST(Outbox, LeavesAFairShareToEachWhenAllTogetherHaveMoreThanTheyMay) {
   const auto all = std::make_shared<std::atomic<std::size_t>>(0);
   {
     Outbox greedy(texts(9), all), modest(texts(9), all);
-    EXPECT_TRUE(greedy.pushText(std::string(1000, 'x')));
-    EXPECT_TRUE(modest.pushText("1234"));
-    EXPECT_TRUE(modest.pushText("123456"));
-    EXPECT_FALSE(modest.pushText("1"));
+    EXPECT_TRUE(greedy.pushText(text(std::string(1000, 'x'))));
+    EXPECT_TRUE(modest.pushText(text("1234")));
+    EXPECT_TRUE(modest.pushText(text("123456")));
+    EXPECT_FALSE(modest.pushText(text("1")));
     EXPECT_EQ(*all, 1010U);
     greedy.close({1008, ""}, true);
     EXPECT_EQ(*all, 10U);
-    EXPECT_TRUE(modest.pushText("1"));
+    EXPECT_TRUE(modest.pushText(text("1")));
     modest.next();
     EXPECT_EQ(*all, 11U);
   }
@@ -136,12 +138,12 @@ TEST(Outbox, LeavesAFairShareToEachWhenAllTogetherHaveMoreThanTheyMay) {
 TEST(Outbox, ClosesAfterTheTextsAndSendsNothingMore) {
   Outbox outbox(texts(4));
   outbox.offer(frame(1));
-  outbox.pushText("last");
+  outbox.pushText(text("last"));
   outbox.close({1000, "done"}, false);
   outbox.close({1001, "second"}, false);
-  outbox.pushText("too late");
+  outbox.pushText(text("too late"));
   outbox.offer(frame(2));
-  EXPECT_EQ(std::get<std::string>(*outbox.next()), "last");
+  EXPECT_EQ(*std::get<SharedText>(*outbox.next()), "last");
   EXPECT_EQ(std::get<CloseMessage>(*outbox.next()).code, 1000);
   EXPECT_FALSE(outbox.next());
 }
