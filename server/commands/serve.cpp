@@ -141,8 +141,7 @@ CLI::App* addServeCommand(CLI::App& root) {
   add("port", config.port, "Port to listen on; 0: any free one")->type_name("PORT");
   add("token-file", options->tokenFile,
       "File with the token that opens the server, one line of 16 to 512 letters, digits and -._~+/=; by "
-      "default, "
-      "it, a new one each start")
+      "default, a new random token at each start")
       ->type_name("FILE");
   add("tls-cert", config.certificateFile, "Certificate (PEM, with its chain): https instead of http")
       ->type_name("FILE");

@@ -75,6 +75,7 @@ class CommandLine(unittest.TestCase):
         for option in ("--host", "--port", "--token-file", "--data-root", "--threads", "--log-level", "--max-sessions",
                        "--max-clients", "--max-image", "--max-render-seconds", "--max-body", "--config"):
             self.assertIn(option, result.stdout)
+        self.assertIn("by default, a new random token at each start", " ".join(result.stdout.split()))
 
     def test_a_path_outside_the_data_root_is_refused(self):
         with tempfile.TemporaryDirectory() as root:
