@@ -36,9 +36,9 @@ struct Metrics::Impl {
   Counter& cancelled = counter("scolopax_passes_cancelled_total", "Sample passes ended early by an edit");
   Counter& renderSeconds = counter("scolopax_render_seconds_total", "Time spent in sample passes");
   Counter& rebuildSeconds = counter("scolopax_rebuild_seconds_total", "Time spent taking over edited scenes");
-  Counter& built = counter("scolopax_builds_total", "Scenes built off the render thread");
+  Counter& built = counter("scolopax_builds_total", "Background scene builds that were completed");
   Counter& abandoned =
-      counter("scolopax_builds_abandoned_total", "Scenes built off the render thread, but abandoned");
+      counter("scolopax_builds_abandoned_total", "Background scene builds that were cancelled");
   Gauge& sessions = gauge("scolopax_sessions", "Sessions");
   Gauge& clients = gauge("scolopax_clients", "Open streams");
   Gauge& unreadTexts = gauge("scolopax_unread_text_bytes", "Text messages that clients have not read");
@@ -63,7 +63,7 @@ void Metrics::passEnded(const PassResult& pass) {
     impl_->renderSeconds.Increment(pass.renderSeconds);
   }
   if (pass.cancelled) impl_->cancelled.Increment();
-  if (pass.built || pass.abandoned) impl_->built.Increment();
+  if (pass.built) impl_->built.Increment();
   if (pass.abandoned) impl_->abandoned.Increment();
   impl_->rebuildSeconds.Increment(pass.rebuildSeconds);
 }

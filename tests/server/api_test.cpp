@@ -378,10 +378,17 @@ TEST(Api, CountsInTheMetrics) {
   pass.pixels = 100;
   pass.renderSeconds = 0.5;
   api.metrics.passEnded(pass);
+  for (const bool built : {true, false, false}) {
+    PassResult taken;
+    taken.built = built;
+    taken.abandoned = !built;
+    api.metrics.passEnded(taken);
+  }
   const std::string text = api.call("GET", "/metrics").body;
   for (const char* line :
        {"scolopax_http_requests_total{status=\"404\"} 2", "scolopax_sessions 1", "scolopax_samples_total 100",
-        "scolopax_render_seconds_total 0.5", "scolopax_clients 0", "scolopax_unread_text_bytes 123"})
+        "scolopax_render_seconds_total 0.5", "scolopax_clients 0", "scolopax_unread_text_bytes 123",
+        "scolopax_builds_total 1", "scolopax_builds_abandoned_total 2"})
     EXPECT_NE(text.find(line), std::string::npos) << line << " in\n" << text;
 }
 
