@@ -219,7 +219,7 @@ std::vector<Route> renderRoutes(ApiContext& context) {
            {{"Accept", "header", "string", "image/jpeg, image/png or image/x-exr"}},
            "application/json",
            types,
-           net::RouteKind::slow,
+           net::RouteKind::takesLong,
            [&context, running](const net::Request& request) { return render(context, *running, request); }}};
 }
 

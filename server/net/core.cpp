@@ -15,7 +15,8 @@ Core::Core(Options given)
       tls(loadTls(options.certificateFile, options.keyFile)),
       workers(std::max(1, options.workers)),
       bulkWorkers(kBulkThreads),
-      slowWorkers(static_cast<std::size_t>(std::max(1, options.longRequests))) {}
+      longWorkers(static_cast<std::size_t>(std::max(1, options.longRequests))),
+      places(options.longRequests, options.waitingRequests) {}
 
 Response Core::problem(int status, const std::string& detail) const {
   if (options.problem) return options.problem(status, detail);
@@ -90,20 +91,6 @@ bool Core::makeRoom() {
   }
   if (unlucky) unlucky->cut();
   return taken < options.maxConnections;
-}
-
-bool Core::beginWaiting(const std::string& flow) {
-  const std::lock_guard lock(mutex_);
-  int& count = waiting_[flow];
-  if (count >= options.waitingRequests) return false;
-  ++count;
-  return true;
-}
-
-void Core::endWaiting(const std::string& flow) {
-  const std::lock_guard lock(mutex_);
-  const auto count = waiting_.find(flow);
-  if (--count->second == 0) waiting_.erase(count);
 }
 
 std::size_t Core::connectionCount() const {

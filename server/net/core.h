@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "server/net/fair_pool.h"
+#include "server/net/request_places.h"
 #include "server/net/router.h"
 #include "server/net/server.h"
 #include "server/net/static_files.h"
@@ -85,12 +86,8 @@ class Core {
   FairPool bulkWorkers;
   /// The pool for quick work on so many bytes: large requests queue only behind each other.
   FairPool& workersFor(std::size_t bytes) { return bytes > kBulkBytes ? bulkWorkers : workers; }
-  asio::thread_pool slowWorkers;
-  std::atomic<int> slowRunning{0};
-  std::atomic<int> quickRunningSlowly{0};  ///< of these, requests of quick routes
-  /// False if as many requests of this flow wait as may. Otherwise endWaiting() must follow.
-  bool beginWaiting(const std::string& flow);
-  void endWaiting(const std::string& flow);
+  asio::thread_pool longWorkers;
+  RequestPlaces places;
 
  private:
   struct Entry {
@@ -105,7 +102,6 @@ class Core {
   mutable std::mutex mutex_;
   std::condition_variable left_;
   std::map<Connection*, Entry> connections_;
-  std::map<std::string, int> waiting_;  ///< requests that wait, by flow
   std::mt19937 random_{std::random_device()()};
   std::atomic<bool> stopping_{false};
   bool cutting_ = false;

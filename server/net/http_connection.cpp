@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/net/http_connection.h"
 
-#include <poll.h>
-#include <sys/socket.h>
-
 #include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/redirect_error.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http.hpp>
@@ -17,6 +13,7 @@
 #include <optional>
 #include <variant>
 
+#include "server/net/client_watch.h"
 #include "server/net/head_rules.h"
 #include "server/net/transport.h"
 #include "server/net/url.h"
@@ -34,139 +31,8 @@ using Parser = http::request_parser<http::string_body>;
 
 constexpr std::size_t kBufferSlack = 64 << 10;
 constexpr Milliseconds kLingerTime{2'000};
-constexpr Milliseconds kWatchInterval{100};
-constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
 
 auto into(error_code& error) { return asio::redirect_error(asio::use_awaitable, error); }
-
-/// While this object lives and its time is up, cancels whatever the socket waits for. It does so repeatedly:
-/// a composed operation may be just between two steps when the time is up.
-class Deadline {
- public:
-  Deadline(tcp::socket& socket, Milliseconds time) : state_(std::make_shared<State>(socket)) {
-    State::wait(state_, time);
-  }
-  ~Deadline() {
-    state_->alive = false;
-    state_->timer.cancel();
-  }
-  Deadline(const Deadline&) = delete;
-  Deadline& operator=(const Deadline&) = delete;
-  bool expired() const { return state_->expired; }
-
- private:
-  struct State {
-    explicit State(tcp::socket& s) : socket(s), timer(s.get_executor()) {}
-    static void wait(const std::shared_ptr<State>& state, Milliseconds time) {
-      state->timer.expires_after(time);
-      state->timer.async_wait([state](const error_code&) {
-        if (!state->alive) return;
-        state->expired = true;
-        error_code ignored;
-        state->socket.cancel(ignored);
-        wait(state, Milliseconds(20));
-      });
-    }
-    tcp::socket& socket;
-    asio::steady_timer timer;
-    bool alive = true;
-    bool expired = false;
-  };
-  std::shared_ptr<State> state_;
-};
-
-/// Takes one of the slots for slow requests, if one is free. Requests of quick routes get at most a quarter
-/// of them: what such a request waits for is computed once for all clients, and a client that sends many of
-/// them must not keep others out.
-class SlowSlot {
- public:
-  SlowSlot(Core& core, RouteKind kind) : core_(core), quick_(kind == RouteKind::quick) {
-    const int most = core.options.longRequests;
-    taken_ = ++core.slowRunning <= most;
-    if (quick_) taken_ = ++core.quickRunningSlowly <= std::max(1, most / 4) && taken_;
-  }
-  ~SlowSlot() {
-    --core_.slowRunning;
-    if (quick_) --core_.quickRunningSlowly;
-  }
-  SlowSlot(const SlowSlot&) = delete;
-  SlowSlot& operator=(const SlowSlot&) = delete;
-  bool taken() const { return taken_; }
-
- private:
-  Core& core_;
-  bool quick_, taken_;
-};
-
-/// Takes one of the flow's places for requests that wait, if one is free.
-class WaitingPlace {
- public:
-  WaitingPlace(Core& core, const std::string& flow)
-      : core_(core), flow_(flow), taken_(core.beginWaiting(flow)) {}
-  ~WaitingPlace() {
-    if (taken_) core_.endWaiting(flow_);
-  }
-  WaitingPlace(const WaitingPlace&) = delete;
-  WaitingPlace& operator=(const WaitingPlace&) = delete;
-  bool taken() const { return taken_; }
-
- private:
-  Core& core_;
-  const std::string flow_;
-  bool taken_;
-};
-
-/// Lets a request wait, and notices within a few kWatchInterval that its client has closed the connection, or
-/// the server has. It polls the system, since reading would consume bytes of the next request. A client may
-/// also close only its sending side and wait for the answer. `mayAsk`: plain HTTP/1.1, where the two can be
-/// told apart.
-class ClientWatch {
- public:
-  ClientWatch(tcp::socket& socket, bool mayAsk, Request& request)
-      : state_(std::make_shared<State>(socket, mayAsk)) {
-    request.mayWait = true;
-    request.gone = state_->gone.get_token();
-    State::wait(state_);
-  }
-  ~ClientWatch() {
-    state_->alive = false;
-    state_->timer.cancel();
-  }
-  ClientWatch(const ClientWatch&) = delete;
-  ClientWatch& operator=(const ClientWatch&) = delete;
-
- private:
-  struct State {
-    State(tcp::socket& s, bool ask) : socket(s), timer(s.get_executor()), mayAsk(ask) {}
-    static void wait(const std::shared_ptr<State>& state) {
-      state->timer.expires_after(kWatchInterval);
-      state->timer.async_wait([state](const error_code&) {
-        if (!state->alive) return;
-        if (state->closed())
-          state->gone.request_stop();
-        else
-          wait(state);
-      });
-    }
-    bool closed() {
-      if (!socket.is_open()) return true;
-      pollfd polled{socket.native_handle(), POLLRDHUP, 0};
-      if (poll(&polled, 1, 0) <= 0) return false;
-      if (polled.revents != POLLRDHUP || !mayAsk) return true;
-      // Whoever has closed the connection resets it when an interim response arrives; others ignore that.
-      if (std::exchange(asked, true)) return false;
-      return send(socket.native_handle(), kContinue.data(), kContinue.size(), MSG_NOSIGNAL | MSG_DONTWAIT) !=
-             ssize_t(kContinue.size());
-    }
-    tcp::socket& socket;
-    asio::steady_timer timer;
-    const bool mayAsk;
-    bool asked = false;
-    bool alive = true;
-    std::stop_source gone;
-  };
-  std::shared_ptr<State> state_;
-};
 
 bool isSafeHeader(const std::string& name, const std::string& value) {
   return !name.empty() && (name + value).find_first_of(std::string("\r\n\0", 3)) == std::string::npos;
@@ -338,10 +204,10 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
   awaitable<Response> handle(const Route& route, Request& request) {
     if (route.kind == RouteKind::waiting) {
-      const WaitingPlace place(core_, request.flow);
-      if (!place.taken()) co_return tooMany();
+      const RequestPlaces::Place place = core_.places.takeWaiting(request.flow);
+      if (!place) co_return tooMany();
       const ClientWatch watch(transport_.socket(), mayBeAsked(), request);
-      co_return co_await runAlone<Response>(core_.slowWorkers,
+      co_return co_await runAlone<Response>(core_.longWorkers,
                                             [&] { return core_.guarded(route.handler, request); });
     }
     if (route.kind == RouteKind::quick) {
@@ -358,10 +224,10 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
                                                    [&] { return core_.guarded(quick, request); });
       if (!takesLong) co_return response;
     }
-    const SlowSlot slot(core_, route.kind);
-    if (!slot.taken()) co_return tooMany();
+    const RequestPlaces::Place place = core_.places.takeLong(route.kind == RouteKind::quick);
+    if (!place) co_return tooMany();
     const ClientWatch watch(transport_.socket(), mayBeAsked(), request);
-    co_return co_await runOn<Response>(core_.slowWorkers,
+    co_return co_await runOn<Response>(core_.longWorkers,
                                        [&] { return core_.guarded(route.handler, request); });
   }
 

@@ -124,7 +124,7 @@ void Server::stop(std::chrono::milliseconds grace) {
   for (std::thread& thread : impl_->threads) thread.join();
   impl_->core.workers.join();
   impl_->core.bulkWorkers.join();
-  impl_->core.slowWorkers.join();
+  impl_->core.longWorkers.join();
 }
 
 }  // namespace scolopax::net

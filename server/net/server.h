@@ -73,10 +73,10 @@ struct Options {
 /// before long work, such as loading data.
 void checkTlsFiles(const std::string& certificateFile, const std::string& keyFile);
 
-/// quick: handlers may neither wait nor compute for long, except for single requests (TakesLong). slow:
+/// quick: handlers may neither wait nor compute for long, except for single requests (TakesLong). takesLong:
 /// handlers may compute for long; they have places of their own (Options::longRequests). waiting: handlers
 /// wait most of the time (long poll); each request has a thread of its own and takes nobody's place.
-enum class RouteKind { quick, slow, waiting };
+enum class RouteKind { quick, takesLong, waiting };
 
 class Server {
  public:
