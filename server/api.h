@@ -35,8 +35,8 @@ struct ApiContext {
   std::shared_ptr<MemoryBudget> memory;  ///< also charged by the renderers that makeRenderer returns
   const UnsentAnswers& answers;
   Log log;
-  std::atomic<bool>& stopping;  ///< ends requests that wait
-  std::stop_token cutting;      ///< ends requests that render, after two thirds of Config::stopGrace
+  std::atomic<bool>& stopping;    ///< ends requests that wait
+  std::stop_token abortRequests;  ///< ends requests that render, after two thirds of Config::stopGrace
   std::function<nlohmann::json()> capabilities;
   std::function<std::size_t()> unreadTextBytes;  ///< net::Server::unreadTextBytes()
 };
@@ -92,15 +92,15 @@ double queryNumber(const net::Request& request, std::string_view name);
 bool queryFlag(const net::Request& request, std::string_view name);
 
 /// Returns work(stop), which may take long; throws net::TakesLong where the handler may not wait. `stop` is
-/// requested when the client has disconnected or the server cuts its requests; Error(cancelled) then becomes
-/// ProtocolError(503).
+/// requested when the client has disconnected or the server aborts its requests; Error(cancelled) then
+/// becomes ProtocolError(503).
 template <class Work>
 auto inLongRequest(const ApiContext& context, const net::Request& request, Work&& work) {
   if (!request.mayWait) throw net::TakesLong();
   std::stop_source ended;
   const auto end = [&ended] { ended.request_stop(); };
   const std::stop_callback gone(request.gone, end);
-  const std::stop_callback ending(context.cutting, end);
+  const std::stop_callback ending(context.abortRequests, end);
   try {
     return work(ended.get_token());
   } catch (const Error& error) {

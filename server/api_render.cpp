@@ -63,9 +63,9 @@ using Clock = std::chrono::steady_clock;
 /// Ends a render early: when its client disconnects, the server stops, or its time is over.
 class Ending {
  public:
-  Ending(const std::stop_token& gone, const std::stop_token& cutting, double seconds)
+  Ending(const std::stop_token& gone, const std::stop_token& abort, double seconds)
       : gone_(gone, Request{this}),
-        cutting_(cutting, Request{this}),
+        abort_(abort, Request{this}),
         timer_([this, seconds](const std::stop_token& over) { endAfter(seconds, over); }) {}
   std::stop_token token() const { return source_.get_token(); }
   const std::atomic<bool>& flag() const { return flag_; }
@@ -89,7 +89,7 @@ class Ending {
 
   std::stop_source source_;
   std::atomic<bool> flag_{false};
-  std::stop_callback<Request> gone_, cutting_;
+  std::stop_callback<Request> gone_, abort_;
   std::jthread timer_;
 };
 
@@ -112,7 +112,7 @@ double errorOf(const Renderer& renderer, const std::stop_token& stop) {
 
 void checkWanted(const ApiContext& context, const net::Request& request) {
   if (request.gone.stop_requested()) throw ProtocolError(503, "", "the client has disconnected");
-  if (context.cutting.stop_requested()) throw ProtocolError(503, "", "the server is stopping");
+  if (context.abortRequests.stop_requested()) throw ProtocolError(503, "", "the server is stopping");
 }
 
 /// The render is too slow. A picture that depends on the machine's speed is returned only if the scene asks
@@ -127,7 +127,7 @@ ProtocolError tooLate(double limit, std::uint32_t samples) {
 /// The scene of the body, after measuring the data that it needs, which may take no longer than a render.
 std::shared_ptr<const ResolvedScene> sceneOf(const ApiContext& context, const net::Request& request) {
   const auto body = jsonBody(request, context.config);
-  const Ending ending(request.gone, context.cutting, context.config.maxRenderSeconds);
+  const Ending ending(request.gone, context.abortRequests, context.config.maxRenderSeconds);
   const auto scene = unlessStopped([&] { return context.renderResolver.replace(body, ending.token()); });
   if (scene) return *scene;
   checkWanted(context, request);
@@ -159,7 +159,7 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
   const auto begin = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   const auto renderer = context.makeRenderer(scene->dataset->volume);
-  const Ending ending(request.gone, context.cutting, limit);
+  const Ending ending(request.gone, context.abortRequests, limit);
   const auto rebuild = unlessStopped([&] { return renderer->setScene(scene->render, ending.token()); });
   if (!rebuild) {
     checkWanted(context, request);

@@ -99,7 +99,7 @@ struct Application::Impl {
   MakeRenderer makeRenderer;
   std::shared_ptr<MemoryBudget> memory;
   std::atomic<bool> stopping{false};
-  std::stop_source cutting;
+  std::stop_source abortRequests;
   const Now now = [] { return std::chrono::steady_clock::now(); };
   LoopThread renderThread, encodeThread;
   // Apart, so that what is soon done does not wait for what takes long.
@@ -157,7 +157,7 @@ struct Application::Impl {
                 answers,
                 log,
                 stopping,
-                cutting.get_token(),
+                abortRequests.get_token(),
                 [this] { return capabilities; },
                 [this] { return server->unreadTextBytes(); }},
         authorizer(config.token, isLoopback(config.host), config.allowedOrigins,
@@ -224,7 +224,7 @@ void Application::stop() {
     std::unique_lock lock(mutex);
     std::condition_variable_any().wait_for(lock, stopped, impl_->config.stopGrace * 2 / 3,
                                            [] { return false; });
-    impl_->cutting.request_stop();
+    impl_->abortRequests.request_stop();
   });
   impl_->sessions.closeAll("the server is stopping");
   impl_->server->stop(impl_->config.stopGrace);

@@ -46,7 +46,7 @@ constexpr const char* kSteepRender = R"({"channels": {"0": {"gradientOpacity": {
 TEST(Api, EndsTheMeasuringOfGradientsWhenItsClientHasGoneOrTheServerStops) {
   for (const bool gone : {false, true}) {
     Api api;
-    (gone ? api.gone : api.cutting).request_stop();
+    (gone ? api.gone : api.abortRequests).request_stop();
     EXPECT_EQ(api.errorOf("GET", "/api/v1/datasets/small/gradient-histogram"), Expected(503, ""));
     EXPECT_EQ(api.errorOf("POST", "/api/v1/sessions", json{{"scene", testing::gradientPatch()}}.dump()),
               Expected(503, ""));

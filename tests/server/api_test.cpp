@@ -105,7 +105,7 @@ TEST(Api, EndsTheMeasuringOfAnErrorWhenItsClientHasGoneOrTheServerStops) {
     api.workshop.control->longErrorFrom = 3;
     bool stopped = false;
     api.workshop.control->measuring = [&](const std::stop_token& stop) {
-      (gone ? api.gone : api.cutting).request_stop();
+      (gone ? api.gone : api.abortRequests).request_stop();
       stopped = stop.stop_requested();
     };
     EXPECT_EQ(api.errorOf("POST", "/api/v1/render", kSmallRender), Expected(503, ""));
@@ -189,7 +189,7 @@ TEST(Api, RefusesOneRenderTooManyWith503) {
 
 TEST(Api, EndsARenderWhenTheServerStops) {
   Api api;
-  api.workshop.control->duringPass = [&] { api.stopping = true, api.cutting.request_stop(); };
+  api.workshop.control->duringPass = [&] { api.stopping = true, api.abortRequests.request_stop(); };
   EXPECT_EQ(api.errorOf("POST", "/api/v1/render", kSmallRender).first, 503);
   EXPECT_EQ(api.errorOf("GET", "/readyz").first, 503);
   EXPECT_EQ(api.call("GET", "/healthz").status, 200);

@@ -22,7 +22,7 @@ struct Api {
   AnswerEncoders encoders;
   StreamHub streams{workshop.store, workshop.background, metrics, {}};
   std::atomic<bool> stopping{false};
-  std::stop_source gone, cutting;
+  std::stop_source gone, abortRequests;
   int tookLong = 0;  ///< calls of quick routes that had to be repeated where they may wait
   ApiContext context{config,
                      *datasets,
@@ -38,7 +38,7 @@ struct Api {
                      answers,
                      [](const std::string&) {},
                      stopping,
-                     cutting.get_token(),
+                     abortRequests.get_token(),
                      [] {
                        return nlohmann::json{{"backend", "fake"}};
                      },
