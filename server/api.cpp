@@ -9,8 +9,6 @@
 
 #include "protocol/problem.h"
 #include "renderer/core/error.h"
-#include "renderer/io/image_file.h"
-#include "server/encoder.h"
 #include "server/net/url.h"
 
 namespace scolopax::server {
@@ -23,33 +21,24 @@ using protocol::shortened;
 
 constexpr std::string_view kSessionsPrefix = "/api/v1/sessions/";
 
-/// Calls f with each part between separators.
-template <class F>
-void forEachPart(std::string_view text, char separator, F&& f) {
-  for (;;) {
-    const auto end = text.find(separator);
-    f(trimmed(text.substr(0, end)));
-    if (end == std::string_view::npos) return;
-    text.remove_prefix(end + 1);
+/// The HTTP status that reports an error of this code.
+int statusOf(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::badInput:
+    case ErrorCode::unsupported:
+      return 422;
+    case ErrorCode::notFound:
+      return 404;
+    case ErrorCode::tooLarge:
+      return 422;
+    case ErrorCode::busy:
+    case ErrorCode::cancelled:
+      return 503;
+    case ErrorCode::io:
+    case ErrorCode::device:
+      return 500;
   }
-}
-
-/// The quality that Accept gives to a media type, by the most specific range that matches it (RFC 9110,
-/// 12.5.1).
-double qualityOf(std::string_view accept, std::string_view mediaType) {
-  double quality = 0;
-  int bestSpecificity = -1;
-  forEachPart(accept, ',', [&](std::string_view range) {
-    const std::string_view name = trimmed(range.substr(0, range.find(';')));
-    const int specificity = name == mediaType ? 2 : name == "image/*" ? 1 : name == "*/*" ? 0 : -1;
-    if (specificity < 0 || specificity < bestSpecificity) return;
-    bestSpecificity = specificity;
-    quality = 1;
-    forEachPart(range, ';', [&](std::string_view part) {
-      if (part.substr(0, 2) == "q=") std::from_chars(part.data() + 2, part.data() + part.size(), quality);
-    });
-  });
-  return quality;
+  return 500;
 }
 
 /// Wraps every handler: what it throws becomes a problem, and the cause of a 500 only goes into the log.
@@ -63,8 +52,8 @@ net::Handler guarded(const ApiContext& context, const net::Handler& handler) {
     } catch (const ProtocolError& error) {
       return errorResponse(error);
     } catch (const Error& error) {
-      const int status = statusOf(error.code());
-      if (status < 500 || status == 503) return errorResponse(ProtocolError(status, "", error.what()));
+      const ProtocolError problem = problemOf(error);
+      if (problem.status < 500 || problem.status == 503) return errorResponse(problem);
       context.log(request.method + " " + request.path + ": " + error.what());
     } catch (const std::exception& error) {
       context.log(request.method + " " + request.path + ": " + error.what());
@@ -89,23 +78,23 @@ std::string regexOf(const std::string& path) {
 
 }  // namespace
 
-int statusOf(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::badInput:
-    case ErrorCode::unsupported:
-      return 422;
-    case ErrorCode::notFound:
-      return 404;
-    case ErrorCode::tooLarge:
-      return 422;
-    case ErrorCode::busy:
-    case ErrorCode::cancelled:
-      return 503;
-    case ErrorCode::io:
-    case ErrorCode::device:
-      return 500;
+ProtocolError problemOf(const Error& error) { return {statusOf(error.code()), "", error.what()}; }
+
+ProtocolError problemOf(const std::exception_ptr& failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const ProtocolError& error) {
+    return error;
+  } catch (const Error& error) {
+    return problemOf(error);
   }
-  return 500;
+}
+
+ProtocolError stoppingProblem() { return {503, "", net::kStopping}; }
+
+ProtocolError unwantedProblem(const net::Request& request) {
+  return request.gone.stop_requested() ? ProtocolError(503, "", "the client has disconnected")
+                                       : stoppingProblem();
 }
 
 net::Response jsonResponse(int status, const json& body) {
@@ -161,34 +150,6 @@ bool queryFlag(const net::Request& request, std::string_view name) {
   throw ProtocolError(
       422, "",
       "query parameter " + std::string(name) + ": expected true or false, found \"" + shortened(*text) + '"');
-}
-
-const ImageType* acceptedImageType(const std::string* accept) {
-  if (!accept) return &kImageTypes[0];
-  const ImageType* best = nullptr;
-  double bestQuality = 0;
-  for (const ImageType& type : kImageTypes) {
-    const double quality = qualityOf(*accept, type.mediaType);
-    if (quality > bestQuality) {
-      best = &type;
-      bestQuality = quality;
-    }
-  }
-  return best;
-}
-
-std::uint64_t imageMemory(std::uint64_t pixels, std::string_view format) {
-  if (format == "jpeg") return jpegMemory(pixels);
-  // png: 8 bits per component, before and after encoding. exr: the floats, and two copies of the encoded
-  // picture.
-  return pixels * (format == "png" ? 4 * 3 : 3 * sizeof(glm::vec4)) + (1 << 20);
-}
-
-std::string imageBytes(const Image& image, glm::vec3 background, std::string_view format,
-                       const std::stop_token& stop) {
-  const auto bytes = format == "jpeg" ? encodeJpeg(toSrgb8(image, background), 95, ChromaSampling::full444)
-                                      : io::encodeImage(image, background, format, stop);
-  return {bytes.begin(), bytes.end()};
 }
 
 void setEncodedBody(const ApiContext& context, const net::Request& request, std::uint64_t bytes,

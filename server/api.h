@@ -3,6 +3,7 @@
 // connects net::Server with the data sets, the sessions and the renderer.
 #pragma once
 #include <atomic>
+#include <exception>
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <stop_token>
@@ -13,6 +14,7 @@
 #include "renderer/core/error.h"
 #include "server/answer_encoders.h"
 #include "server/config.h"
+#include "server/image_types.h"
 #include "server/metrics.h"
 #include "server/net/server.h"
 #include "server/session_store.h"
@@ -77,8 +79,13 @@ void addApi(net::Server& server, ApiContext& context);
 
 // --- for the handlers ---
 
-/// The HTTP status that reports an error of this code.
-int statusOf(ErrorCode code);
+/// What tells a client of an error.
+protocol::ProtocolError problemOf(const Error& error);
+/// Rethrows what is neither a ProtocolError nor an Error.
+protocol::ProtocolError problemOf(const std::exception_ptr& failure);
+protocol::ProtocolError stoppingProblem();  ///< 503, the server is stopping
+/// Why a request ends that takes long: its client has gone, or else the server is stopping.
+protocol::ProtocolError unwantedProblem(const net::Request& request);
 net::Response jsonResponse(int status, const nlohmann::json& body);
 net::Response errorResponse(const protocol::ProtocolError& error);
 /// The body as JSON. Throws ProtocolError: 415 unless Content-Type is application/json or `alsoType`, and
@@ -105,8 +112,7 @@ auto inLongRequest(const ApiContext& context, const net::Request& request, Work&
     return work(ended.get_token());
   } catch (const Error& error) {
     if (error.code() != ErrorCode::cancelled) throw;
-    throw protocol::ProtocolError(
-        503, "", request.gone.stop_requested() ? "the client has disconnected" : "the server is stopping");
+    throw unwantedProblem(request);
   }
 }
 /// Returns work(). If it throws Unmeasured, measures what is missing in a long request and calls work()
@@ -121,21 +127,6 @@ auto measuredIn(const ApiContext& context, const net::Request& request, Work&& w
   }
 }
 
-struct ImageType {
-  std::string_view format;     ///< "jpeg"
-  std::string_view mediaType;  ///< "image/jpeg"
-};
-inline constexpr ImageType kImageTypes[] = {
-    {"jpeg", "image/jpeg"}, {"png", "image/png"}, {"exr", "image/x-exr"}};
-/// The image type that an Accept header prefers, the first of those it prefers equally; nullptr if it accepts
-/// none. Without a header, the first of kImageTypes.
-const ImageType* acceptedImageType(const std::string* accept);
-/// Memory, in bytes, that imageBytes needs for `pixels` pixels.
-std::uint64_t imageMemory(std::uint64_t pixels, std::string_view format);
-/// The picture as a file: jpeg with quality 95 and 4:4:4 sampling; png; exr with float32 linear premultiplied
-/// RGBA. Throws Error(cancelled) once `stop` is requested, but a jpeg that has been begun is completed.
-std::string imageBytes(const Image& image, glm::vec3 background, std::string_view format,
-                       const std::stop_token& stop);
 /// Sets the body to encode(stop) on one of the encoders' threads, when it is the turn of the request's flow,
 /// and charges `bytes` of memory for that. Throws what encode(), MemoryBudget::take and UnsentAnswers::take
 /// throw, and ProtocolError(503) if the client disconnects or the server stops.

@@ -2,7 +2,6 @@
 // Routes for operating the server and for discovering what it can do.
 #include <nlohmann/json.hpp>
 
-#include "protocol/problem.h"
 #include "protocol/schema.h"
 #include "server/api.h"
 
@@ -30,7 +29,7 @@ std::vector<Route> operationRoutes(ApiContext& context) {
        kText,
        {},
        [text, &context](const net::Request&) {
-         if (context.stopping) throw protocol::ProtocolError(503, "", "the server is stopping");
+         if (context.stopping) throw stoppingProblem();
          return text("ready\n");
        }},
       {"GET",

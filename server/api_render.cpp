@@ -110,9 +110,8 @@ double errorOf(const Renderer& renderer, const std::stop_token& stop) {
       .value_or(std::numeric_limits<double>::quiet_NaN());
 }
 
-void checkWanted(const ApiContext& context, const net::Request& request) {
-  if (request.gone.stop_requested()) throw ProtocolError(503, "", "the client has disconnected");
-  if (context.abortRequests.stop_requested()) throw ProtocolError(503, "", "the server is stopping");
+void throwIfUnwanted(const ApiContext& context, const net::Request& request) {
+  if (request.gone.stop_requested() || context.abortRequests.stop_requested()) throw unwantedProblem(request);
 }
 
 /// The render is too slow. A picture that depends on the machine's speed is returned only if the scene asks
@@ -130,7 +129,7 @@ std::shared_ptr<const ResolvedScene> sceneOf(const ApiContext& context, const ne
   const Ending ending(request.gone, context.abortRequests, context.config.maxRenderSeconds);
   const auto scene = unlessStopped([&] { return context.renderResolver.replace(body, ending.token()); });
   if (scene) return *scene;
-  checkWanted(context, request);
+  throwIfUnwanted(context, request);
   throw tooLate(context.config.maxRenderSeconds, 0);
 }
 
@@ -147,7 +146,7 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
   const ImageType* type = acceptedImageType(request.header("accept"));
   if (!type)
     throw ProtocolError(406, "",
-                        "expected Accept to include image/jpeg, image/png or image/x-exr, found " +
+                        "expected Accept to include " + imageTypesText(&ImageType::mediaType) + ", found " +
                             protocol::shortened(*request.header("accept")));
   const double limit = context.config.maxRenderSeconds;
   const auto scene = sceneOf(context, request);
@@ -162,7 +161,7 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
   const Ending ending(request.gone, context.abortRequests, limit);
   const auto rebuild = unlessStopped([&] { return renderer->setScene(scene->render, ending.token()); });
   if (!rebuild) {
-    checkWanted(context, request);
+    throwIfUnwanted(context, request);
     throw tooLate(limit, 0);
   }
   while (!stopMet(scene->stop, *renderer, seconds())) {
@@ -177,20 +176,20 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
       unlessStopped([&] { return measureFor(scene->stop, *renderer, ending.token()), true; });
       continue;
     }
-    checkWanted(context, request);
+    throwIfUnwanted(context, request);
     if (seconds() < until) continue;
     if (timed && until < limit) break;
     throw tooLate(limit, renderer->samples());
   }
   const auto milliseconds = std::int64_t(seconds() * 1000);
   const std::string error = nlohmann::json(errorOf(*renderer, ending.token())).dump();
-  checkWanted(context, request);
+  throwIfUnwanted(context, request);
   const auto pixels = std::uint64_t(scene->render.width) * std::uint64_t(scene->render.height);
   net::Response response{200, std::string(type->mediaType), "", {}};
   setEncodedBody(
-      context, request, pixels * sizeof(glm::vec4) + imageMemory(pixels, type->format),
+      context, request, pixels * sizeof(glm::vec4) + type->memory(pixels),
       [&](const std::stop_token& stop) {
-        return imageBytes(renderer->image(), scene->render.background, type->format, stop);
+        return imageBytes(*type, renderer->image(), scene->render.background, stop);
       },
       response);
   const Choice choice = renderer->choice();
@@ -210,15 +209,13 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
 }  // namespace
 
 std::vector<Route> renderRoutes(ApiContext& context) {
-  std::vector<std::string> types;
-  for (const ImageType& type : kImageTypes) types.emplace_back(type.mediaType);
   auto running = std::make_shared<std::atomic<int>>(0);
   return {{"POST",
            "/api/v1/render",
            "A picture of a scene; the same scene gives the same bytes",
-           {{"Accept", "header", "string", "image/jpeg, image/png or image/x-exr"}},
+           {{"Accept", "header", "string", imageTypesText(&ImageType::mediaType)}},
            "application/json",
-           types,
+           imageMediaTypes(),
            net::RouteKind::takesLong,
            [&context, running](const net::Request& request) { return render(context, *running, request); }}};
 }

@@ -130,31 +130,30 @@ std::optional<Aov> queryAov(const net::Request& request) {
 net::Response frame(ApiContext& context, const net::Request& request) {
   const auto session = sessionOf(context, request);
   const std::string* asked = request.queryValue("format");
-  const std::string_view format = asked ? std::string_view(*asked) : kImageTypes[0].format;
-  const auto type = std::find_if(std::begin(kImageTypes), std::end(kImageTypes),
-                                 [&](const ImageType& one) { return one.format == format; });
-  if (type == std::end(kImageTypes))
-    throw ProtocolError(
-        422, "", "query parameter format: expected jpeg, png or exr, found \"" + shortened(format) + '"');
+  const ImageType* type = asked ? imageTypeOf(*asked) : &imageTypes().front();
+  if (!type)
+    throw ProtocolError(422, "",
+                        "query parameter format: expected " + imageTypesText(&ImageType::format) +
+                            ", found \"" + shortened(*asked) + '"');
   const std::optional<Aov> aov = queryAov(request);
   const FrameQuery query{queryUnsigned(request, "after", 0), queryUnsigned(request, "minSamples", 1),
                          aov.has_value(), request.gone};
   const auto found = session->waitForFrame(query, pollTimeout(context.config, request));
-  if (!found && context.stopping) throw ProtocolError(503, "", "the server is stopping");
+  if (!found && context.stopping) throw stoppingProblem();
   if (!found) return {204, "", "", {}};
   net::Response response{200, std::string(type->mediaType), "", {}};
   const std::uint64_t pixels = found->image->pixels.size();
-  if (!aov && format == "jpeg") {
+  if (!aov && type->format == "jpeg") {
     response.heldUntilSent = context.answers.take(request.flow, found->jpeg->size());
     response.body.assign(found->jpeg->begin(), found->jpeg->end());
   } else {
     setEncodedBody(
-        context, request, (aov ? pixels * sizeof(glm::vec4) : 0) + imageMemory(pixels, format),
+        context, request, (aov ? pixels * sizeof(glm::vec4) : 0) + type->memory(pixels),
         [&](const std::stop_token& stop) {
-          if (!aov) return imageBytes(*found->image, found->background, format, stop);
+          if (!aov) return imageBytes(*type, *found->image, found->background, stop);
           const AovValues& values = (*found->aovs)[std::size_t(*aov)];
-          const Image image = format == "exr" ? aovImage(values) : aovPicture(values);
-          return imageBytes(image, glm::vec3(0), format, stop);
+          const Image image = type->isFloat ? aovImage(values) : aovPicture(values);
+          return imageBytes(*type, image, glm::vec3(0), stop);
         },
         response);
   }
@@ -177,7 +176,7 @@ PickQuery pickQuery(const net::Request& request) {
 net::Response pick(ApiContext& context, const net::Request& request) {
   const auto session = sessionOf(context, request);
   const auto found = session->waitForPick(pickQuery(request), context.config.pollTimeout, request.gone);
-  if (!found && context.stopping) throw ProtocolError(503, "", "the server is stopping");
+  if (!found && context.stopping) throw stoppingProblem();
   if (!found) throw ProtocolError(503, "", "the scene was not ready for picking in time");
   return jsonResponse(200, *found);
 }
@@ -190,8 +189,6 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
                           "Revision that the edit is meant for; 409 if the scene is at another"};
   const std::vector<std::string> kJson{"application/json"};
   const std::string scenePath = "/api/v1/sessions/{id}/scene";
-  std::vector<std::string> imageTypes;
-  for (const ImageType& type : kImageTypes) imageTypes.emplace_back(type.mediaType);
 
   return {
       {"POST",
@@ -265,12 +262,12 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
        {id,
         {"after", "query", "integer", "Number of the last frame seen; waits for a newer one"},
         {"minSamples", "query", "integer", "Least number of samples per pixel, unless the frame is final"},
-        {"format", "query", "string", "jpeg (default), png or exr"},
+        {"format", "query", "string", imageTypesText(&ImageType::format, " (default)")},
         {"aov", "query", "string",
          "What to return instead of colours: depth, transmittance, channel or cost"},
         {"timeout", "query", "number", "Seconds to wait, at most 25, which is the default"}},
        "",
-       imageTypes,
+       imageMediaTypes(),
        net::RouteKind::waiting,
        [&context](const net::Request& request) { return frame(context, request); },
        {200, 204}},

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/application.h"
 
-#include <cmath>
 #include <condition_variable>
-#include <cstdio>
 #include <filesystem>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -18,6 +16,7 @@
 #include "server/api.h"
 #include "server/auth.h"
 #include "server/edit_queue.h"
+#include "server/hex_color.h"
 #include "server/loop_thread.h"
 #include "server/net/server.h"
 #include "server/render_loop.h"
@@ -38,14 +37,6 @@ json named(const std::vector<protocol::EnumEntry>& entries) {
   return list;
 }
 
-std::string hexOf(const glm::dvec3& linear) {
-  const auto byte = [](double v) { return int(std::lround(double(srgbFromLinear(float(v))) * 255)); };
-  char text[8];
-  std::snprintf(text, sizeof text, "#%02x%02x%02x", byte(linear.r) & 255, byte(linear.g) & 255,
-                byte(linear.b) & 255);
-  return text;
-}
-
 json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
   json maps = json::array();
   for (const auto& entry : lists.colormaps) {
@@ -56,8 +47,6 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
   }
   json aovs = json::array();
   for (const NamedValue& aov : kAovs) aovs.push_back({{"name", aov.name}, {"doc", aov.doc}});
-  json formats = json::array();
-  for (const ImageType& type : kImageTypes) formats.push_back(type.mediaType);
   return {{"version", SCOLOPAX_VERSION},
           {"protocolVersion", protocol::kProtocolVersion},
           {"backend", "cpu"},
@@ -70,7 +59,7 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
           {"peaks", named(lists.peaks)},
           {"interpolations", named(lists.interpolations)},
           {"colormaps", std::move(maps)},
-          {"imageFormats", std::move(formats)},
+          {"imageFormats", imageMediaTypes()},
           {"limits",
            {{"bodyBytes", config.maxBodyBytes},
             {"messageBytes", config.maxMessageBytes},
@@ -226,7 +215,7 @@ void Application::stop() {
                                            [] { return false; });
     impl_->abortRequests.request_stop();
   });
-  impl_->sessions.closeAll("the server is stopping");
+  impl_->sessions.closeAll(net::kStopping);
   impl_->server->stop(impl_->config.stopGrace);
   impl_->renderLoop.stop();
   impl_->renderThread.stop();

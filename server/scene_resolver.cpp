@@ -2,7 +2,6 @@
 #include "server/scene_resolver.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <span>
 #include <string>
 #include <utility>
@@ -22,6 +21,7 @@
 #include "renderer/data/visible_hull.h"
 #include "renderer/renderer.h"
 #include "server/encoder.h"
+#include "server/hex_color.h"
 
 namespace scolopax::server {
 namespace {
@@ -48,20 +48,6 @@ Enum valueOf(const NamedValue (&list)[N], std::string_view name) {
 
 glm::dvec3 vectorOf(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 std::array<double, 3> arrayOf(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
-
-/// Converts "#rrggbb", which has been checked, to linear RGB.
-glm::dvec3 linearOf(const std::string& hex) {
-  const auto part = [&](std::size_t at) {
-    return double(linearFromSrgb(float(std::stoi(hex.substr(at, 2), nullptr, 16)) / 255.0f));
-  };
-  return {part(1), part(3), part(5)};
-}
-
-std::string hexOf(const std::array<std::uint8_t, 3>& color) {
-  std::array<char, 8> text{};
-  std::snprintf(text.data(), text.size(), "#%02x%02x%02x", color[0], color[1], color[2]);
-  return text.data();
-}
 
 std::vector<ColorKnot> knotsOf(const protocol::Colormap& colormap) {
   if (const auto* name = std::get_if<std::string>(&colormap)) return colormapKnots(*name);
@@ -122,10 +108,6 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
                      wire.material.shininess};
   }
 }
-
-/// Scenes whose curves take no more are not charged, so that ordinary edits need no memory that others may
-/// hold.
-constexpr std::uint64_t kFreeBytes = 64 << 10;
 
 /// Share of the voxels with opacity whose gradients the automatic range includes.
 constexpr double kWithinRange = 0.995;
@@ -381,7 +363,7 @@ std::optional<std::string> SceneResolver::tooLarge(const Scene& scene, bool aovs
 SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const Chosen& chosen) const {
   protocol::Scene scene = sparse.parsed(lists_);
   auto result = std::make_shared<ResolvedScene>();
-  if (const std::uint64_t bytes = curveBytes(scene); bytes > kFreeBytes)
+  if (const std::uint64_t bytes = curveBytes(scene); bytes > MemoryBudget::kFreeBytes)
     result->memory = MemoryBudget::take(options_.memory, MemoryUse::scenes, bytes);
   result->dataset = datasetOf(sparse.rest());
   if (chosen.dataset == result->dataset) result->chosen = chosen;

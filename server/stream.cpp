@@ -69,7 +69,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
     });
   }
   void renderFailed(const Error& error) override {
-    orEnd([&] { sendText(protocol::errorText(ProtocolError(statusOf(error.code()), "", error.what()))); });
+    orEnd([&] { sendText(protocol::errorText(problemOf(error))); });
   }
   void sessionClosed(const std::string& reason) override { end(1001, reason); }
 
@@ -155,27 +155,13 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
 
   /// Reports why an edit was refused.
   void refuse(std::uint32_t id, const std::exception_ptr& failure) {
-    orEnd([&] {
-      try {
-        std::rethrow_exception(failure);
-      } catch (const ProtocolError& error) {
-        sendText(protocol::errorText(error, id));
-      } catch (const Error& error) {
-        sendText(protocol::errorText(ProtocolError(statusOf(error.code()), "", error.what()), id));
-      }
-    });
+    orEnd([&] { sendText(protocol::errorText(problemOf(failure), id)); });
   }
 
   void sendPicked(std::uint32_t id, const PickAnswer& answer) {
     orEnd([&] {
-      try {
-        if (answer.failure) std::rethrow_exception(answer.failure);
-        sendText(protocol::pickedText(id, answer.found));
-      } catch (const ProtocolError& error) {
-        sendText(protocol::pickedText(id, error));
-      } catch (const Error& error) {
-        sendText(protocol::pickedText(id, ProtocolError(statusOf(error.code()), "", error.what())));
-      }
+      sendText(answer.failure ? protocol::pickedText(id, problemOf(answer.failure))
+                              : protocol::pickedText(id, answer.found));
     });
   }
 

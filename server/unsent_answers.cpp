@@ -54,7 +54,7 @@ UnsentAnswers::UnsentAnswers(std::shared_ptr<MemoryBudget> memory)
     : state_(std::make_shared<State>(std::move(memory))) {}
 
 std::shared_ptr<const void> UnsentAnswers::take(const std::string& flow, std::uint64_t bytes) const {
-  if (!state_->memory || bytes <= kFreeBytes) return nullptr;
+  if (!state_->memory || bytes <= MemoryBudget::kFreeBytes) return nullptr;
   struct Answer {
     Answer(std::shared_ptr<State> given, std::string name, std::uint64_t size)
         : state(std::move(given)), flow(std::move(name)), bytes(size) {

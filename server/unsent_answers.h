@@ -13,8 +13,6 @@ namespace scolopax::server {
 /// May be used from any thread. What take() returns may outlive this object.
 class UnsentAnswers {
  public:
-  /// Shorter answers do not count: all connections together hold few bytes of them.
-  static constexpr std::uint64_t kFreeBytes = 64 << 10;
   /// What a flow may have unsent even if all together have more than they may.
   static constexpr std::uint64_t kFairBytes = 1 << 20;
 
@@ -22,9 +20,9 @@ class UnsentAnswers {
   /// (net::Request::flow). A null `memory` grants every request.
   explicit UnsentAnswers(std::shared_ptr<MemoryBudget> memory);
 
-  /// To be kept until an answer of so many bytes has been sent; null if it is too short to count. A flow may
-  /// exceed its limit with a single answer. Throws Error(tooLarge) if there is never memory for the answer,
-  /// and Error(busy) if there is none now.
+  /// To be kept until an answer of so many bytes has been sent; null if it has no more than
+  /// MemoryBudget::kFreeBytes. A flow may exceed its limit with a single answer. Throws Error(tooLarge) if
+  /// there is never memory for the answer, and Error(busy) if there is none now.
   std::shared_ptr<const void> take(const std::string& flow, std::uint64_t bytes) const;
 
  private:

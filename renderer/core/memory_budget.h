@@ -24,6 +24,10 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
   /// small ones. A film of 1920x1080 pixels takes 192 MiB.
   static constexpr std::uint64_t kOrdinaryBytes = 256 << 20;
 
+  /// For callers: scenes and answers that take no more are not charged, so that ordinary requests need no
+  /// memory that others may hold.
+  static constexpr std::uint64_t kFreeBytes = 64 << 10;
+
   explicit MemoryBudget(std::uint64_t limitBytes) : limit_(limitBytes) {}
 
   /// Bytes charged to a budget for the lifetime of the share. A default-constructed share belongs to no

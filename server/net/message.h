@@ -48,6 +48,9 @@ struct Response {
   std::shared_ptr<const void> heldUntilSent = {};            ///< released once the answer has been sent
 };
 
+/// Why requests are refused and streams closed while the server stops.
+inline constexpr const char* kStopping = "the server is stopping";
+
 /// Thrown by the handler of a quick route, before it has changed anything, for a request that takes long: the
 /// handler is called again where it may wait.
 struct TakesLong {};

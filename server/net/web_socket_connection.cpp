@@ -84,7 +84,7 @@ class WebSocketConnection : public PreparedWebSocket,
 
   // The server's side.
 
-  void beginStop() override { close(1001, "the server is stopping"); }
+  void beginStop() override { close(1001, kStopping); }
 
   void cut() override {
     const std::lock_guard lock(mutex_);

@@ -338,22 +338,6 @@ TEST(Api, RefusesAPickThatIsNone) {
   EXPECT_EQ(api.errorOf("GET", path + "?x=1&y=1").first, 503);  // nothing renders it, and the timeout is 0
 }
 
-TEST(Api, WeighsTheAcceptHeader) {
-  const auto best = [](const std::string& accept) {
-    const ImageType* type = acceptedImageType(&accept);
-    return type ? type->format : "none";
-  };
-  EXPECT_EQ(acceptedImageType(nullptr)->format, "jpeg");
-  EXPECT_EQ(best("*/*"), "jpeg");
-  EXPECT_EQ(best("image/png"), "png");
-  EXPECT_EQ(best("image/x-exr, image/png;q=0.5"), "exr");
-  EXPECT_EQ(best("image/jpeg;q=0, image/*"), "png");
-  EXPECT_EQ(best("image/*;q=0.5, image/png;q=0.2"), "jpeg");
-  EXPECT_EQ(best("text/html"), "none");
-  EXPECT_EQ(best(""), "none");
-  EXPECT_EQ(best("image/png;q=0"), "none");
-}
-
 TEST(Api, DescribesEveryRouteInOpenApi) {
   Api api;
   const json description = openApi(api.routes);

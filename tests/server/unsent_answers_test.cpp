@@ -34,7 +34,7 @@ struct Unread {
 
 TEST(UnsentAnswers, AreChargedUntilTheyHaveBeenSentIfTheyAreLong) {
   Unread unread;
-  EXPECT_EQ(unread.answers.take("a", UnsentAnswers::kFreeBytes), nullptr);
+  EXPECT_EQ(unread.answers.take("a", MemoryBudget::kFreeBytes), nullptr);
   auto answer = unread.answers.take("a", 100'000);
   EXPECT_EQ(unread.used(), 100'000u);
   answer.reset();
