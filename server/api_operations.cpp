@@ -44,6 +44,7 @@ std::vector<Route> operationRoutes(ApiContext& context) {
          context.metrics.setSessions(context.sessions.all().size());
          context.metrics.setClients(context.streams.count());
          context.metrics.setUnreadTextBytes(context.unreadTextBytes());
+         context.metrics.setRequestBodyBytes(context.requestBodyBytes());
          if (context.memory) context.metrics.setMemory(*context.memory);
          return net::Response{200, "text/plain; version=0.0.4; charset=utf-8", context.metrics.text(), {}};
        }},

@@ -148,7 +148,8 @@ struct Application::Impl {
                 stopping,
                 abortRequests.get_token(),
                 [this] { return capabilities; },
-                [this] { return server->unreadTextBytes(); }},
+                [this] { return server->unreadTextBytes(); },
+                [this] { return server->requestBodyBytes(); }},
         authorizer(config.token, isLoopback(config.host), config.allowedOrigins,
                    !config.certificateFile.empty()) {
     net::Options options;

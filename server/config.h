@@ -21,7 +21,7 @@ struct Config {
   std::size_t maxSessions = 32;
   std::size_t maxClients = 64;                            ///< streams at once
   std::uint64_t maxPixels = 16'777'216;                   ///< of one picture
-  std::uint64_t maxMemoryBytes = std::uint64_t{4} << 30;  ///< for everything that requests allocate
+  std::uint64_t maxMemoryBytes = std::uint64_t{4} << 30;  ///< for what requests make the server hold
   double maxRenderSeconds = 60;                           ///< of one POST /render
   int maxRenders = 2;                                     ///< POST /render at once
   std::size_t maxBodyBytes = std::size_t{1} << 20;

@@ -42,6 +42,8 @@ struct Metrics::Impl {
   Gauge& sessions = gauge("scolopax_sessions", "Sessions");
   Gauge& clients = gauge("scolopax_clients", "Open streams");
   Gauge& unreadTexts = gauge("scolopax_unread_text_bytes", "Text messages that clients have not read");
+  Gauge& requestBodies =
+      gauge("scolopax_request_body_bytes", "Request bodies that are being received or handled");
   Gauge& memoryLimit = gauge("scolopax_memory_limit_bytes", "Limit on the memory that requests use");
   prometheus::Family<Gauge>& memory = prometheus::BuildGauge()
                                           .Name("scolopax_memory_bytes")
@@ -77,6 +79,7 @@ void Metrics::setSessions(std::size_t count) { impl_->sessions.Set(double(count)
 void Metrics::setClients(std::size_t count) { impl_->clients.Set(double(count)); }
 
 void Metrics::setUnreadTextBytes(std::size_t bytes) { impl_->unreadTexts.Set(double(bytes)); }
+void Metrics::setRequestBodyBytes(std::size_t bytes) { impl_->requestBodies.Set(double(bytes)); }
 
 void Metrics::setMemory(const MemoryBudget& memory) {
   impl_->memoryLimit.Set(double(memory.limit()));

@@ -20,6 +20,7 @@ class Metrics {
   void setSessions(std::size_t count);
   void setClients(std::size_t count);
   void setUnreadTextBytes(std::size_t bytes);
+  void setRequestBodyBytes(std::size_t bytes);
   void setMemory(const MemoryBudget& memory);
   std::string text() const;
 

@@ -82,6 +82,9 @@ class Core {
   std::shared_ptr<asio::io_context> io = std::make_shared<asio::io_context>();
   /// Bytes of texts that wait to be sent; shared as well.
   std::shared_ptr<std::atomic<std::size_t>> unsentTexts = std::make_shared<std::atomic<std::size_t>>(0);
+  /// Bytes of request bodies that are being received or handled. One of unknown length counts as bodyLimit
+  /// until it has been received.
+  std::atomic<std::size_t> bodyBytes{0};
   FairPool workers;
   FairPool bulkWorkers;
   /// The pool for quick work on so many bytes: large requests queue only behind each other.

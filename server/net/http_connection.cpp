@@ -38,6 +38,20 @@ bool isSafeHeader(const std::string& name, const std::string& value) {
   return !name.empty() && (name + value).find_first_of(std::string("\r\n\0", 3)) == std::string::npos;
 }
 
+/// Counts a request's body among those that the server holds.
+class HeldBody {
+ public:
+  explicit HeldBody(std::atomic<std::size_t>& all) : all_(all) {}
+  ~HeldBody() { set(0); }
+  HeldBody(const HeldBody&) = delete;
+  HeldBody& operator=(const HeldBody&) = delete;
+  void set(std::size_t bytes) { all_ += bytes - std::exchange(bytes_, bytes); }
+
+ private:
+  std::atomic<std::size_t>& all_;
+  std::size_t bytes_ = 0;
+};
+
 class HttpConnection : public Connection, public std::enable_shared_from_this<HttpConnection> {
  public:
   HttpConnection(Core& core, tcp::socket socket, std::string remoteAddress, bool full)
@@ -133,10 +147,17 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
       co_return co_await write(std::move(file), keepAlive_);
     }
     if (!match.route) co_return co_await write(noRoute(match), keepAlive_);
-    if (hasBody && !co_await readBody(parser, request)) co_return false;
+    HeldBody held(core_.bodyBytes);
+    if (hasBody) {
+      held.set(std::size_t(parser.content_length().value_or(core_.options.bodyLimit)));
+      if (!co_await readBody(parser, request)) co_return false;
+      held.set(request.body.size());
+    }
     keepAlive_ = keepAlive;
     request.matches = std::move(match.matches);
     Response response = co_await handle(*match.route, request);
+    std::string().swap(request.body);  // not kept by a client that reads its answer slowly
+    held.set(0);
     co_return co_await write(std::move(response), keepAlive_);
   }
 

@@ -106,6 +106,8 @@ std::uint16_t Server::port() const { return impl_->boundPort; }
 
 std::size_t Server::unreadTextBytes() const { return *impl_->core.unsentTexts; }
 
+std::size_t Server::requestBodyBytes() const { return impl_->core.bodyBytes; }
+
 void Server::stop(std::chrono::milliseconds grace) {
   const std::lock_guard lock(impl_->stopMutex);
   if (impl_->stopped) return;

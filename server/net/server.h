@@ -98,6 +98,8 @@ class Server {
 
   /// Bytes of texts that WebSocket clients have not read.
   std::size_t unreadTextBytes() const;
+  /// Bytes of request bodies that are being received or handled.
+  std::size_t requestBodyBytes() const;
 
   /// Accepts no more connections, closes WebSockets with 1001, and lets requests finish; after `grace`, cuts
   /// the connections that are left. Handlers must return by themselves: this waits for the last one. Safe to

@@ -2,7 +2,6 @@
 // PROTOCOL.md: its section on fields matches the table of fields, and its examples are valid.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <sstream>
 #include <vector>
 
@@ -48,16 +47,18 @@ TEST(ProtocolDocument, HoldsTheSectionOfTheTable) {
              text.substr(0, from) + begin + '\n' + fieldsMarkdown(server::rendererLists()) + text.substr(to));
 }
 
-TEST(ProtocolDocument, StatesTheMemoryThatFilmsTake) {
-  std::string text = readText(protocolFile("PROTOCOL.md"));
-  std::replace(text.begin(), text.end(), '\n', ' ');
+TEST(ProtocolDocument, StatesWhatTakesMemory) {
+  const std::string text = readText(protocolFile("PROTOCOL.md"));
   const auto bytes = [](std::size_t channels, bool aovs) {
     return std::to_string(filmPixelBytes(channels, aovs));
   };
   EXPECT_EQ(filmPixelBytes(3, true), filmPixelBytes(2, true) + 4);
-  EXPECT_NE(text.find("films (" + bytes(0, false) + " bytes a pixel of a picture; while AOVs are recorded, " +
-                      bytes(0, true) + " and 4 more for each channel;"),
-            std::string::npos);
+  for (const std::string_view use : kMemoryUses)
+    EXPECT_NE(text.find("\n| `" + std::string(use) + "` | "), std::string::npos) << use;
+  EXPECT_NE(
+      text.find("| `films` | " + bytes(0, false) + " bytes a pixel of a picture; while AOVs are recorded, " +
+                bytes(0, true) + " and 4 more for each channel;"),
+      std::string::npos);
 }
 
 TEST(ProtocolDocument, ShowsScenesThatAreTaken) {

@@ -372,7 +372,7 @@ TEST(Api, CountsInTheMetrics) {
   for (const char* line :
        {"scolopax_http_requests_total{status=\"404\"} 2", "scolopax_sessions 1", "scolopax_samples_total 100",
         "scolopax_render_seconds_total 0.5", "scolopax_clients 0", "scolopax_unread_text_bytes 123",
-        "scolopax_builds_total 1", "scolopax_builds_abandoned_total 2"})
+        "scolopax_request_body_bytes 456", "scolopax_builds_total 1", "scolopax_builds_abandoned_total 2"})
     EXPECT_NE(text.find(line), std::string::npos) << line << " in\n" << text;
 }
 

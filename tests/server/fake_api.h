@@ -42,7 +42,8 @@ struct Api {
                      [] {
                        return nlohmann::json{{"backend", "fake"}};
                      },
-                     [] { return std::size_t(123); }};
+                     [] { return std::size_t(123); },
+                     [] { return std::size_t(456); }};
   std::vector<Route> routes;
 
   /// `budget`: for what is encoded and for answers.

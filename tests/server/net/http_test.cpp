@@ -221,6 +221,31 @@ TEST_F(HttpTest, ReadsChunkedBodiesUpToTheLimit) {
   EXPECT_EQ(echoes_, 2);
 }
 
+TEST_F(HttpTest, CountsTheBodiesThatItHoldsWhileTheyAreReceivedAndHandled) {
+  Options options = quickOptions();
+  Server server(options);
+  std::atomic<std::size_t> whileHandled{0};
+  server.route("POST", "/huge", [&](const Request&) {
+    whileHandled = server.requestBodyBytes();
+    return Response{200, "", std::string(64 << 20, 'x'), {}};
+  });
+  server.start();
+  TestClient reader(server.port(), 4096);
+  reader.send("POST /huge HTTP/1.1\r\nHost: a\r\nContent-Length: 900\r\n\r\n" + std::string(900, 'x'));
+  EXPECT_EQ(reader.receiveSome(1), 1U);
+  // Not while the answer waits to be read.
+  EXPECT_EQ(server.requestBodyBytes(), 0U);
+  EXPECT_EQ(whileHandled, 900U);
+  {
+    TestClient known(server.port()), unknown(server.port());
+    known.send("POST /huge HTTP/1.1\r\nHost: a\r\nContent-Length: 900\r\n\r\nx");
+    EXPECT_TRUE(eventually([&] { return server.requestBodyBytes() == 900; }));
+    unknown.send("POST /huge HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n1\r\nx\r\n");
+    EXPECT_TRUE(eventually([&] { return server.requestBodyBytes() == 1900; }));
+  }
+  EXPECT_TRUE(eventually([&] { return server.requestBodyBytes() == 0; }));
+}
+
 TEST_F(HttpTest, RefusesABodyOverTheLimitAndIsHeard) {
   start();
   TestClient client(port());
