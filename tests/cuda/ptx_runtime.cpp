@@ -27,9 +27,9 @@ std::map<const void*, std::string>& hostFunctions() {
 
 bool before(const ptx::Range& a, const ptx::Range& b) { return a.begin < b.begin; }
 
-std::vector<ptx::Range> globalMemory() {
+std::vector<ptx::Range> globalMemory(std::span<const substitute::Allocation> allocations) {
   std::vector<ptx::Range> ranges = tables();
-  for (const substitute::Allocation& allocation : substitute::allocations()) {
+  for (const substitute::Allocation& allocation : allocations) {
     const std::uint64_t begin = ptx::addressOf(allocation.begin);
     ranges.push_back({begin, begin + allocation.sizeBytes});
   }
@@ -80,30 +80,42 @@ void checkAccess(const Thread& thread, std::uint64_t address, std::size_t size, 
 extern "C" {
 
 cudaError_t cudaLaunchKernel(const void* function, dim3 grid, dim3 block, void** arguments, size_t,
-                             cudaStream_t) {
-  const auto known = kernels().find(hostFunctions()[function]);
-  if (known == kernels().end()) return cudaErrorInvalidDeviceFunction;
+                             cudaStream_t stream) {
+  const auto name = hostFunctions().find(function);
+  const auto known = name == hostFunctions().end() ? kernels().end() : kernels().find(name->second);
+  if (known == kernels().end()) return substitute::launchKernel(stream, grid, block, 0, nullptr);
   const ptx::Kernel& kernel = *known->second;
-  if (block.x * block.y * block.z > kernel.maxThreads) return cudaErrorInvalidValue;
-
-  const std::vector<ptx::Range> global = globalMemory();
-  std::vector<const std::byte*> values;
-  std::vector<ptx::Range> parameters;
+  // The kernel runs later, with copies.
+  std::vector<std::vector<std::byte>> copies;
   for (std::size_t i = 0; i < kernel.parameterSizes.size(); ++i) {
-    values.push_back(static_cast<const std::byte*>(arguments[i]));
-    const std::uint64_t begin = ptx::addressOf(arguments[i]);
-    parameters.push_back({begin, begin + kernel.parameterSizes[i]});
+    const auto begin = static_cast<const std::byte*>(arguments[i]);
+    copies.emplace_back(begin, begin + kernel.parameterSizes[i]);
   }
-  return substitute::runBlocks(grid, block, [&](uint3 index) {
-    ptx::Thread thread{
-        {},        {block.x, block.y, block.z}, {index.x, index.y, index.z}, {grid.x, grid.y, grid.z}, global,
-        parameters};
-    try {
-      runThreads(kernel, thread, values.data());
-    } catch (const ptx::Fault& fault) {
-      substitute::reportFault(kernel.name + ": " + fault.what());
-    }
-  });
+  return substitute::launchKernel(
+      stream, grid, block, kernel.maxThreads,
+      [&kernel, grid, block, copies = std::move(copies)](std::span<const substitute::Allocation> memory) {
+        const std::vector<ptx::Range> global = globalMemory(memory);
+        std::vector<const std::byte*> values;
+        std::vector<ptx::Range> parameters;
+        for (const std::vector<std::byte>& copy : copies) {
+          values.push_back(copy.data());
+          const std::uint64_t begin = ptx::addressOf(copy.data());
+          parameters.push_back({begin, begin + copy.size()});
+        }
+        substitute::runBlocks(grid, [&](uint3 index) {
+          ptx::Thread thread{{},
+                             {block.x, block.y, block.z},
+                             {index.x, index.y, index.z},
+                             {grid.x, grid.y, grid.z},
+                             global,
+                             parameters};
+          try {
+            runThreads(kernel, thread, values.data());
+          } catch (const ptx::Fault& fault) {
+            substitute::reportFault(kernel.name + ": " + fault.what());
+          }
+        });
+      });
 }
 
 // What compilers put into host objects, by NVIDIA's binary interface. The module itself is not looked at: the

@@ -1,123 +1,191 @@
 // SPDX-License-Identifier: Apache-2.0
-// The CUDA runtime as tests need it: device memory is host memory with bounds that are known.
-#include "tests/cuda/substitute_runtime.h"
-
-#include <tbb/parallel_for.h>
-
+// The CUDA runtime as tests need it: devices, memory and errors.
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
-#include <map>
-#include <mutex>
+#include <string>
 #include <utility>
+
+#include "tests/cuda/substitute_state.h"
+
+using namespace substitute;
 
 namespace {
 
-std::map<const std::byte*, std::size_t> heap;  // address -> size in bytes
-std::size_t used = 0, limit = std::size_t(1) << 32;
-cudaError_t lastError = cudaSuccess;
-cudaError_t deviceCountResult = cudaSuccess;
-int devices = 1;
-std::mutex faultMutex;  // kernels run in parallel; everything else is called from one thread
-std::string fault;
-bool faultPending = false;
-
-cudaError_t returned(cudaError_t error) {
-  if (error != cudaSuccess) lastError = error;
-  return error;
+/// Memory with kPoison in it; null if there is none. The size is not rounded up: a sanitizer sees the first
+/// byte beyond it.
+std::byte* allocate(std::size_t sizeBytes) {
+  void* memory = nullptr;
+  if (posix_memalign(&memory, 256, sizeBytes) != 0) return nullptr;
+  std::memset(memory, int(kPoison), sizeBytes);
+  return static_cast<std::byte*>(memory);
 }
 
-bool onDevice(const void* memory, std::size_t sizeBytes) {
-  const auto begin = static_cast<const std::byte*>(memory);
-  auto allocation = heap.upper_bound(begin);
-  if (allocation == heap.begin()) return false;
-  --allocation;
-  return std::size_t(begin - allocation->first) + sizeBytes <= allocation->second;
+/// The allocation that begins here. Throws Failure(cudaErrorInvalidValue) if there is none.
+Memory expectAllocation(const Heap& heap, const void* memory) {
+  const auto allocation = heap.find(static_cast<const std::byte*>(memory));
+  if (allocation == heap.end()) throw Failure{cudaErrorInvalidValue};
+  return allocation->second;
 }
 
 }  // namespace
 
-namespace substitute {
-
-std::vector<Allocation> allocations() {
-  std::vector<Allocation> all;
-  for (const auto& [begin, sizeBytes] : heap) all.push_back({begin, sizeBytes});
-  return all;
-}
-
-void limitMemory(std::size_t sizeBytes) { limit = sizeBytes; }
-
-void setDeviceCount(cudaError_t result, int count) {
-  deviceCountResult = result;
-  devices = count;
-}
-
-void reportFault(const std::string& what) {
-  const std::lock_guard lock(faultMutex);
-  fault = what;
-  faultPending = true;
-}
-
-std::string lastFault() { return fault; }
-
-cudaError_t runBlocks(dim3 grid, dim3 block, const std::function<void(uint3 blockIndex)>& runBlock) {
-  const std::size_t threads = std::size_t(block.x) * block.y * block.z;
-  const bool fits = threads >= 1 && threads <= 1024 && block.z <= 64 && grid.x >= 1 && grid.y >= 1 &&
-                    grid.z >= 1 && grid.y <= 65535 && grid.z <= 65535;
-  if (!fits) return returned(cudaErrorInvalidConfiguration);
-  tbb::parallel_for(std::size_t(0), std::size_t(grid.x) * grid.y * grid.z, [&](std::size_t i) {
-    runBlock({unsigned(i % grid.x), unsigned(i / grid.x % grid.y), unsigned(i / grid.x / grid.y)});
-  });
-  return cudaSuccess;
-}
-
-}  // namespace substitute
-
 extern "C" {
 
 cudaError_t cudaGetDeviceCount(int* count) {
-  if (deviceCountResult == cudaSuccess) *count = devices;
-  return returned(deviceCountResult);
+  return call([&] {
+    if (state().deviceCountResult != cudaSuccess) throw Failure{state().deviceCountResult};
+    *count = state().deviceCount;
+  });
 }
 
-cudaError_t cudaMalloc(void** memory, size_t sizeBytes) {
-  // No rounding up of the size: a sanitizer sees the first byte beyond it.
-  if (sizeBytes > limit - used || posix_memalign(memory, 256, sizeBytes) != 0)
-    return returned(cudaErrorMemoryAllocation);
-  std::memset(*memory, 0xcd, sizeBytes);
-  heap[static_cast<std::byte*>(*memory)] = sizeBytes;
-  used += sizeBytes;
-  return cudaSuccess;
+cudaError_t cudaSetDevice(int device) {
+  return call([&] {
+    deviceOf(device);
+    caller().device = device;
+  });
 }
 
-cudaError_t cudaFree(void* memory) {
-  if (!memory) return cudaSuccess;
-  const auto allocation = heap.find(static_cast<std::byte*>(memory));
-  if (allocation == heap.end()) return returned(cudaErrorInvalidValue);
-  used -= allocation->second;
-  heap.erase(allocation);
-  std::free(memory);
-  return cudaSuccess;
+cudaError_t cudaGetDevice(int* device) {
+  return call([&] { *device = caller().device; });
 }
 
-cudaError_t cudaMemset(void* memory, int value, size_t sizeBytes) {
-  if (!onDevice(memory, sizeBytes)) return returned(cudaErrorInvalidValue);
-  std::memset(memory, value, sizeBytes);
-  return cudaSuccess;
+cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int device) {
+  return call([&] {
+    const Device& found = deviceOf(device);
+    *properties = {};
+    const std::string name = "Substitute device " + std::to_string(device);
+    std::copy(name.begin(), name.end(), properties->name);
+    properties->totalGlobalMem = found.limit;
+    properties->major = 7;
+    properties->minor = 5;
+    properties->multiProcessorCount = 4;
+  });
 }
 
-cudaError_t cudaMemcpy(void* to, const void* from, size_t sizeBytes, cudaMemcpyKind kind) {
-  const void* device = kind == cudaMemcpyHostToDevice ? to : from;
-  const void* host = kind == cudaMemcpyHostToDevice ? from : to;
-  if (!onDevice(device, sizeBytes) || onDevice(host, 1)) return returned(cudaErrorInvalidValue);
-  std::memcpy(to, from, sizeBytes);
-  return cudaSuccess;
+cudaError_t cudaDeviceGetAttribute(int* value, cudaDeviceAttr attribute, int device) {
+  return call([&] {
+    deviceOf(device);
+    switch (attribute) {
+      case cudaDevAttrMultiProcessorCount:
+        *value = 4;
+        return;
+      case cudaDevAttrComputeCapabilityMajor:
+        *value = 7;
+        return;
+      case cudaDevAttrComputeCapabilityMinor:
+        *value = 5;
+        return;
+    }
+    throw Failure{cudaErrorInvalidValue};
+  });
+}
+
+cudaError_t cudaMemGetInfo(size_t* freeBytes, size_t* totalBytes) {
+  return call([&] {
+    const Device& device = currentDevice();
+    *freeBytes = device.limit - std::min(device.used, device.limit);
+    *totalBytes = device.limit;
+  });
 }
 
 cudaError_t cudaDeviceSynchronize() {
-  return std::exchange(faultPending, false) ? returned(cudaErrorIllegalAddress) : cudaSuccess;
+  return call([] {
+    currentDevice();
+    finishDevice(caller().device);
+    surfaceFault(caller().device);
+  });
 }
 
-cudaError_t cudaGetLastError() { return std::exchange(lastError, cudaSuccess); }
+cudaError_t cudaMalloc(void** memory, size_t sizeBytes) {
+  return call([&] {
+    Device& device = currentDevice();
+    *memory = nullptr;
+    if (sizeBytes == 0) return;
+    const std::size_t available = device.limit - std::min(device.used, device.limit);
+    std::byte* const begin = sizeBytes <= available ? allocate(sizeBytes) : nullptr;
+    if (!begin) throw Failure{cudaErrorMemoryAllocation};
+    state().deviceMemory[begin] = {sizeBytes, caller().device};
+    device.used += sizeBytes;
+    *memory = begin;
+  });
+}
+
+cudaError_t cudaFree(void* memory) {
+  return release([&] {
+    if (!memory) return;
+    const Memory freed = expectAllocation(state().deviceMemory, memory);
+    state().freesThatWaited += finishDevice(freed.device);
+    state().deviceMemory.erase(static_cast<std::byte*>(memory));
+    std::free(memory);
+    state().devices[std::size_t(freed.device)].used -= freed.sizeBytes;
+    expectAlive(freed.device);
+  });
+}
+
+cudaError_t cudaHostAlloc(void** memory, size_t sizeBytes, unsigned flags) {
+  return call([&] {
+    currentDevice();
+    if (flags & ~unsigned(cudaHostAllocPortable)) throw Failure{cudaErrorInvalidValue};
+    *memory = nullptr;
+    if (sizeBytes == 0) return;
+    std::byte* const begin = allocate(sizeBytes);
+    if (!begin) throw Failure{cudaErrorMemoryAllocation};
+    state().pinnedMemory[begin] = {sizeBytes, caller().device};
+    *memory = begin;
+  });
+}
+
+cudaError_t cudaFreeHost(void* memory) {
+  return release([&] {
+    if (!memory) return;
+    const Memory freed = expectAllocation(state().pinnedMemory, memory);
+    state().freesThatWaited += finishUsersOf({static_cast<std::byte*>(memory), freed.sizeBytes});
+    state().pinnedMemory.erase(static_cast<std::byte*>(memory));
+    std::free(memory);
+    expectAlive(freed.device);
+  });
+}
+
+cudaError_t cudaMemset(void* memory, int value, size_t sizeBytes) {
+  return call([&] {
+    currentDevice();
+    if (sizeBytes == 0) return;
+    expectOnDevice(memory, sizeBytes, caller().device);
+    finishBlockingStreams(caller().device);
+    std::memset(memory, value, sizeBytes);
+  });
+}
+
+cudaError_t cudaMemcpy(void* to, const void* from, size_t sizeBytes, cudaMemcpyKind kind) {
+  return call([&] {
+    currentDevice();
+    const bool upload = kind == cudaMemcpyHostToDevice;
+    if (!upload && kind != cudaMemcpyDeviceToHost) throw Failure{cudaErrorInvalidMemcpyDirection};
+    if (sizeBytes == 0) return;
+    expectOnDevice(upload ? to : from, sizeBytes, caller().device);
+    if (allocationOf(state().deviceMemory, upload ? from : to, 1)) throw Failure{cudaErrorInvalidValue};
+    finishBlockingStreams(caller().device);
+    surfaceFault(caller().device);
+    std::memcpy(to, from, sizeBytes);
+    if (upload) state().bytesToDevice += sizeBytes;
+  });
+}
+
+cudaError_t cudaPeekAtLastError() {
+  cudaError_t error = cudaSuccess;
+  locked([&] {
+    const bool lost = state().devices[std::size_t(caller().device)].lost;
+    error = lost ? cudaErrorIllegalAddress : caller().lastError;
+  });
+  return error;
+}
+
+cudaError_t cudaGetLastError() {
+  const cudaError_t error = cudaPeekAtLastError();
+  caller().lastError = cudaSuccess;
+  return error;
+}
 
 const char* cudaGetErrorString(cudaError_t error) {
   return error == cudaErrorMemoryAllocation ? "out of memory" : "an error of the substitute runtime";

@@ -43,6 +43,8 @@ cudaError_t cudaLaunchKernel(Kernel* kernel, dim3 grid, dim3 block, void** argum
 #else
 
 #include <functional>
+#include <tuple>
+#include <utility>
 
 #define __host__
 #define __device__
@@ -53,22 +55,27 @@ inline thread_local uint3 threadIdx, blockIdx;
 inline thread_local dim3 blockDim;
 
 namespace substitute {
-/// Runs every thread of the grid, blocks in parallel; the launch's checks as in a launch of compiled PTX.
-cudaError_t runBlocks(dim3 grid, dim3 block, const std::function<void(uint3 blockIndex)>& runBlock);
+// As in substitute_runtime.h.
+cudaError_t launchBlocks(cudaStream_t stream, dim3 grid, dim3 block,
+                         std::function<void(uint3 blockIndex)> runBlock);
 }  // namespace substitute
 
-template <class Argument>
-cudaError_t cudaLaunchKernel(void (*kernel)(Argument), dim3 grid, dim3 block, void** arguments, size_t,
-                             cudaStream_t) {
-  const Argument& argument = *static_cast<const Argument*>(arguments[0]);
-  return substitute::runBlocks(grid, block, [&](uint3 index) {
+template <class... Arguments>
+cudaError_t cudaLaunchKernel(void (*kernel)(Arguments...), dim3 grid, dim3 block, void** arguments, size_t,
+                             cudaStream_t stream) {
+  // The kernel runs later, with copies.
+  const auto values = [&]<std::size_t... kIndex>(std::index_sequence<kIndex...>) {
+    return std::tuple<Arguments...>(*static_cast<const Arguments*>(arguments[kIndex])...);
+  }
+  (std::index_sequence_for<Arguments...>());
+  return substitute::launchBlocks(stream, grid, block, [kernel, block, values](uint3 index) {
     blockIdx = index;
     blockDim = block;
     for (unsigned z = 0; z < block.z; ++z)
       for (unsigned y = 0; y < block.y; ++y)
         for (unsigned x = 0; x < block.x; ++x) {
           threadIdx = {x, y, z};
-          kernel(argument);
+          std::apply(kernel, values);
         }
   });
 }
