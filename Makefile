@@ -7,6 +7,8 @@
 # make soak    tests SCENES more random scenes, starting where the last run ended; keeps failing ones in build/soak
 DATA ?=
 PORT ?= 8080
+# ON: with CUDA, if nvcc is installed; its kernels take a quarter of an hour to compile
+CUDA ?= OFF
 JOBS ?= $(shell nproc)
 FUZZ_SECONDS ?= 600
 SCENES ?= 20000
@@ -33,7 +35,7 @@ $(DEMO): | build
 
 # Configured without the tests, whose libraries may not be installed, until `make test` has configured with them.
 build: deps
-	cmake --preset release -DBUILD_TESTING=$(if $(wildcard build/release/tests),ON,OFF) > /dev/null
+	cmake --preset release -DSCOLOPAX_CUDA=$(CUDA) -DBUILD_TESTING=$(if $(wildcard build/release/tests),ON,OFF) > /dev/null
 	cmake --build --preset release --target scolopax -j $(JOBS)
 
 web: deps

@@ -12,11 +12,4 @@ void check(cudaError_t result, const char* doing) {
               std::string("CUDA: ") + doing + " failed: " + cudaGetErrorString(result));
 }
 
-int deviceCount() {
-  int count = 0;  // a failing call leaves it unchanged
-  if (cudaGetDeviceCount(&count) == cudaSuccess) return count;
-  cudaGetLastError();
-  return 0;
-}
-
 }  // namespace scolopax::cuda

@@ -9,7 +9,4 @@ namespace scolopax::cuda {
 /// names the operation that failed: "copying 64 bytes to the device".
 void check(cudaError_t result, const char* doing);
 
-/// Number of usable devices; 0 without a driver, with a driver that is too old, or after any other error.
-int deviceCount();
-
 }  // namespace scolopax::cuda

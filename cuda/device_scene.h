@@ -1,30 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene's arrays in device memory: a copy of what the view of a render plan points to. Kernels read it.
+// What the view of a render plan points to, in device memory. Kernels read it.
 #pragma once
+#include <cstddef>
+#include <memory>
 #include <vector>
 
-#include "cuda/device_buffer.h"
-#include "renderer/kernel/views.h"
+#include "cuda/device_memory.h"
+#include "cuda/device_volume.h"
+#include "renderer/data/render_plan.h"
 
 namespace scolopax::cuda {
 
 class DeviceScene {
  public:
-  /// Copies the arrays that `host` points to, except MajorantView::active, which kernels on devices do not
-  /// use. Throws Error(tooLarge) if they do not fit into the device's memory.
-  explicit DeviceScene(const kernel::SceneView& host);
-  /// The same scene with device pointers; valid while this object lives.
-  const kernel::SceneView& view() const { return view_; }
+  /// Uploads what `before`, if given, does not already hold: an edit moves what it changes. The visible
+  /// channels of `volume` must be on the device; `memory` and `uploader` must be those of the device. Throws
+  /// Error(tooLarge).
+  DeviceScene(std::shared_ptr<const RenderPlan> plan, std::shared_ptr<DeviceVolume> volume,
+              DeviceMemory& memory, Uploader& uploader, const DeviceScene* before = nullptr);
+  const std::shared_ptr<const RenderPlan>& plan() const { return plan_; }
+  /// `host`, a view of the plan with other values than its own, with device pointers. They are valid while
+  /// this object lives.
+  kernel::SceneView viewOf(const kernel::SceneView& host) const;
 
  private:
-  template <class T>
-  void moveToDevice(const T** array, std::size_t count);
-  template <class Value>
-  void moveToDevice(kernel::CurveView<Value>* curve);
-  void moveToDevice(kernel::OpticalCurveView* curve);
+  /// An array of the plan, which keeps the host's copy alive.
+  struct Array {
+    const void* host;
+    std::size_t bytes;
+    std::byte* device;
+    DeviceBytes memory;  // that contains it
+  };
+  class Upload;
 
+  const std::shared_ptr<const RenderPlan> plan_;
+  const std::shared_ptr<DeviceVolume> volume_;
+  std::vector<Array> arrays_;
+  DeviceBytes channels_;  // kernel::ChannelView, of this plan alone
+  DeviceBytes totals_,
+      surfaceTotals_;  // computed on the device; shared with the plan before if it has the same
   kernel::SceneView view_;
-  std::vector<DeviceBuffer<std::byte>> buffers_;
 };
 
 }  // namespace scolopax::cuda

@@ -1,48 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
-// Passes over a picture on a CUDA device: uploads a scene, and returns one sample of every pixel and its
-// cost.
+// Starts the kernel that renders a band of a picture: some rows of one sample.
 #pragma once
 #include <cuda_runtime_api.h>
 
 #include <glm/vec4.hpp>
-#include <span>
 
-#include "cuda/device_scene.h"
-#include "renderer/data/scene.h"
+#include "renderer/data/instances.h"
 #include "renderer/kernel/rng.h"
 
 namespace scolopax::cuda {
 
-/// As kernel::RenderPixel, with device pointers.
-struct DevicePass {
+/// All pointers are to device memory. The arrays begin at the first pixel of the band.
+struct DeviceBand {
   kernel::SceneView scene;
   kernel::SampleNumber number;
-  glm::vec4* pixels;
-  kernel::SampleCost* cost;
+  int firstRow, rows;
+  glm::vec4* pixels;              ///< as kernel::RenderPixel::pass
+  kernel::SampleCost* cost;       ///< null if costs are not counted
+  kernel::FirstCollision* first;  ///< null if first collisions are not recorded
 };
 
-/// Starts a pass without waiting for it.
-using LaunchFunction = cudaError_t (*)(const DevicePass&);
+/// Starts the kernel on a stream of the current device, without waiting for it.
+using LaunchFunction = cudaError_t (*)(const DeviceBand&, cudaStream_t);
 
-/// The kernels of one integrator for a scene. Each integrator is compiled in a file of its own. With `plain`,
-/// they can render only what a PlainSceneView can represent.
-template <class Integrator>
-LaunchFunction chooseLaunch(const Scene& scene, bool plain);
+/// The kernels of one integrator. With PlainSceneView, they can render only what isPlain() allows.
+template <class Integrator, class View>
+LaunchFunction launchOf(const Instance& instance);
 
-class Passes {
- public:
-  /// `view` is that of a render plan of `scene`. `counting`: sum up the costs of samples.
-  Passes(const Scene& scene, const kernel::SceneView& view, bool counting);
-  /// Renders one sample of every pixel into width x height linear premultiplied RGBA values.
-  void render(const kernel::SampleNumber& number, std::span<glm::vec4> pixels);
-  /// Costs of all passes so far, one per pixel; empty unless counting.
-  std::vector<kernel::SampleCost> cost() const;
+/// Whether a band needs no more than kernels of plain scenes.
+bool isPlain(const DeviceBand& band, const kernel::ChannelView* hostChannels);
 
- private:
-  LaunchFunction launch_;
-  DeviceScene scene_;
-  DeviceBuffer<glm::vec4> pixels_;
-  DeviceBuffer<kernel::SampleCost> cost_;
-};
+/// The kernel that renders the band. `hostChannels`: the channels of its scene, in host memory.
+LaunchFunction chooseLaunch(const Instance& instance, const DeviceBand& band,
+                            const kernel::ChannelView* hostChannels);
 
 }  // namespace scolopax::cuda

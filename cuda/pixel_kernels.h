@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kernels for CUDA: one thread per pixel, and one instance for every combination that a scene can use.
-// The instances of each integrator are compiled in a file of its own, kernels_*.cu.
+// The kernels for CUDA: one thread per pixel, and one instance for every combination that a pass can use. The
+// instances of each integrator are compiled in two files of its own (kernels.cmake): for plain scenes, and
+// for all.
 #pragma once
 #include <cuda_runtime.h>
 
 #include "cuda/launch.h"
-#include "renderer/data/instances.h"
 #include "renderer/kernel/blend_modes.h"
 #include "renderer/kernel/render_pixel.h"
 #include "renderer/kernel/shade.h"
@@ -16,32 +16,35 @@ namespace scolopax::cuda {
 inline constexpr unsigned kBlockWidth = 8, kBlockHeight = 16;
 
 template <class Integrator, class Blend, class Lighting, class View>
+struct RenderBand {
+  kernel::RenderPixel<Integrator, Blend, Lighting, View> render;
+  int firstRow, rows;
+};
+
+template <class Integrator, class Blend, class Lighting, class View>
 __global__ void __launch_bounds__(kBlockWidth* kBlockHeight)
-    renderPixels(kernel::RenderPixel<Integrator, Blend, Lighting, View> render) {
+    renderPixels(RenderBand<Integrator, Blend, Lighting, View> band) {
+  const int width = band.render.scene.width;
   const int x = int(blockIdx.x * blockDim.x + threadIdx.x);
-  const int y = int(blockIdx.y * blockDim.y + threadIdx.y);
-  if (x < render.scene.width && y < render.scene.height) render(y * render.scene.width + x);
+  const int row = int(blockIdx.y * blockDim.y + threadIdx.y);
+  if (x < width && row < band.rows) band.render((band.firstRow + row) * width + x, row * width + x);
 }
 
 template <class Integrator, class Blend, class Lighting, class View>
-cudaError_t launch(const DevicePass& pass) {
-  kernel::RenderPixel<Integrator, Blend, Lighting, View> render{View{pass.scene}, pass.number, pass.pixels,
-                                                                pass.cost};
+cudaError_t launch(const DeviceBand& given, cudaStream_t stream) {
+  RenderBand<Integrator, Blend, Lighting, View> band{
+      {View{given.scene}, given.number, given.pixels, given.cost, given.first}, given.firstRow, given.rows};
   const dim3 block(kBlockWidth, kBlockHeight);
-  const dim3 grid((unsigned(pass.scene.width) + block.x - 1) / block.x,
-                  (unsigned(pass.scene.height) + block.y - 1) / block.y);
-  void* arguments[] = {&render};
-  return cudaLaunchKernel(renderPixels<Integrator, Blend, Lighting, View>, grid, block, arguments, 0,
-                          nullptr);
+  const dim3 grid((unsigned(given.scene.width) + block.x - 1) / block.x,
+                  (unsigned(given.rows) + block.y - 1) / block.y);
+  void* arguments[] = {&band};
+  return cudaLaunchKernel(renderPixels<Integrator, Blend, Lighting, View>, grid, block, arguments, 0, stream);
 }
 
-template <class Integrator>
-LaunchFunction chooseLaunch(const Scene& scene, bool plain) {
-  return visitBlendAndLight(scene, [&](auto blend, auto lighting) -> LaunchFunction {
-    using Blend = typename decltype(blend)::type;
-    using Lighting = typename decltype(lighting)::type;
-    return plain ? launch<Integrator, Blend, Lighting, kernel::PlainSceneView>
-                 : launch<Integrator, Blend, Lighting, kernel::SceneView>;
+template <class Integrator, class View>
+LaunchFunction launchOf(const Instance& instance) {
+  return visitBlendAndLight(instance, [](auto blend, auto lighting) -> LaunchFunction {
+    return launch<Integrator, typename decltype(blend)::type, typename decltype(lighting)::type, View>;
   });
 }
 

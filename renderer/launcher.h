@@ -7,17 +7,22 @@
 #include <functional>
 #include <glm/vec4.hpp>
 #include <memory>
+#include <stop_token>
 #include <string_view>
 
-#include "renderer/data/scene.h"
+#include "renderer/data/render_plan.h"
 #include "renderer/kernel/rng.h"
-#include "renderer/kernel/views.h"
 
 namespace scolopax {
 
 /// One sample of every pixel of a picture. `cost` and `first` are as in kernel::RenderPixel, and `pixels` is
 /// its `pass`.
 struct Pass {
+  /// Owns what `scene` points to, and shares it with the plans before and after it. A launcher may keep it
+  /// for as long as it needs (shared_from_this).
+  const RenderPlan* plan;
+  Method method;  ///< automatic renders as superposed
+  /// The plan's view; camera, size, resolution, random numbers and lighting may be other than the plan's.
   kernel::SceneView scene;
   kernel::SampleNumber number;
   glm::vec4* pixels;
@@ -36,12 +41,16 @@ class Launcher {
   /// Calls f in the launcher's thread arena: parallel loops in f use no other threads. Rethrows what f
   /// throws.
   virtual void run(const std::function<void()>& f) = 0;
-  /// Renders the pixels of a pass that are not yet done, with the method, blend mode and lighting of `scene`;
-  /// Method::automatic renders as superposed. Returns false if pixels are left because `cancel` became true
-  /// or the deadline passed. Rays end early once `cancel` is true; the deadline is looked at between rays, so
-  /// that one that takes longer than a turn is completed. Runs in the caller's thread arena: call it
-  /// from run() to use the launcher's threads.
-  virtual bool launch(const Scene& scene, const Pass& pass) = 0;
+  /// Moves a plan to the device, if there is one, so that launching its passes does not have to. Throws
+  /// Error(cancelled) once `stop` is requested, and Error(tooLarge).
+  virtual void upload(const std::shared_ptr<const RenderPlan>& plan, const std::stop_token& stop) = 0;
+  /// Whether uploading a plan of the scene would take longer than a few milliseconds.
+  virtual bool uploadTakesLong(const std::shared_ptr<const Volume>& volume, const Scene& scene) const = 0;
+  /// Renders the pixels of a pass that are not yet done. Returns false if pixels are left because `cancel`
+  /// became true or the deadline passed. Rays end early once `cancel` is true; the deadline is looked at
+  /// between rays, so that one that takes longer than a turn is completed. Runs in the caller's thread arena:
+  /// call it from run() to use the launcher's threads.
+  virtual bool launch(const Pass& pass) = 0;
 };
 
 /// `threads` 0 means all.

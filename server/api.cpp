@@ -33,9 +33,9 @@ int statusOf(ErrorCode code) {
       return 422;
     case ErrorCode::busy:
     case ErrorCode::cancelled:
+    case ErrorCode::device:
       return 503;
     case ErrorCode::io:
-    case ErrorCode::device:
       return 500;
   }
   return 500;

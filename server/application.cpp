@@ -49,7 +49,7 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
   for (const NamedValue& aov : kAovs) aovs.push_back({{"name", aov.name}, {"doc", aov.doc}});
   return {{"version", SCOLOPAX_VERSION},
           {"protocolVersion", protocol::kProtocolVersion},
-          {"backend", "cpu"},
+          {"backend", config.backend},
           {"blendModes", named(lists.blendModes)},
           {"methods", named(lists.methods)},
           {"filters", named(lists.filters)},

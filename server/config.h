@@ -15,6 +15,7 @@ struct Config {
   std::string certificateFile, keyFile;     ///< PEM; empty: no TLS
   std::string token;                        ///< empty: a new random one at each start
   int threads = 0;                          ///< for rendering; 0: all
+  std::string backend = "cpu";              ///< what renders, as clients are told
   std::string webRoot;                      ///< folder of the built page; empty: none
   std::vector<std::string> allowedOrigins;  ///< other than the server's own
 

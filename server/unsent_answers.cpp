@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/unsent_answers.h"
 
-#include <algorithm>
 #include <map>
 #include <mutex>
 #include <utility>

@@ -14,11 +14,12 @@
 namespace scolopax {
 namespace {
 
-TileFunction chooseTiles(Scene scene, const kernel::SceneView& view) {
-  scene.shadows = scene.shadows && view.lightCount > 0;  // without lights there is nothing to block
-  if (hasStep(scene.method)) return quadratureTileFunction(scene, view);
-  return visitIntegrator(scene,
-                         [&](auto type) { return chooseTileFunction<typename decltype(type)::type>(scene); });
+TileFunction chooseTiles(const Pass& pass) {
+  const Instance instance = instanceOf(pass.method, pass.plan->scene().blend, pass.scene);
+  const TileFunction packets = packetTileFunction(instance, pass.scene, fastestInstructionSet());
+  return packets ? packets : visitIntegrator(instance, [&](auto type) {
+    return chooseTileFunction<typename decltype(type)::type>(instance);
+  });
 }
 
 class CpuLauncher final : public Launcher {
@@ -29,10 +30,13 @@ class CpuLauncher final : public Launcher {
 
   void run(const std::function<void()>& f) override { arena_.execute(f); }
 
-  bool launch(const Scene& scene, const Pass& given) override {
+  void upload(const std::shared_ptr<const RenderPlan>&, const std::stop_token&) override {}
+  bool uploadTakesLong(const std::shared_ptr<const Volume>&, const Scene&) const override { return false; }
+
+  bool launch(const Pass& given) override {
     Pass pass = given;
     pass.scene.cancel = pass.cancel;
-    const TileFunction renderTileAt = chooseTiles(scene, pass.scene);
+    const TileFunction renderTileAt = chooseTiles(pass);
     const int tilesX = (pass.scene.width + kTile - 1) / kTile;
     const int tilesY = (pass.scene.height + kTile - 1) / kTile;
     tbb::parallel_for(0, tilesX * tilesY, [&](int i) { renderTileAt(pass, i % tilesX, i / tilesX); });

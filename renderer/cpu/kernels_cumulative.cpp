@@ -5,6 +5,6 @@
 
 namespace scolopax {
 
-template TileFunction chooseTileFunction<kernel::Analog<kernel::Cumulative>>(const Scene&);
+template TileFunction chooseTileFunction<kernel::Analog<kernel::Cumulative>>(const Instance&);
 
 }  // namespace scolopax

@@ -5,6 +5,6 @@
 
 namespace scolopax {
 
-template TileFunction chooseTileFunction<kernel::Analog<kernel::NDda>>(const Scene&);
+template TileFunction chooseTileFunction<kernel::Analog<kernel::NDda>>(const Instance&);
 
 }  // namespace scolopax

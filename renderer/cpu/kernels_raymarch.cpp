@@ -4,7 +4,7 @@
 
 namespace scolopax {
 
-template TileFunction chooseTileFunction<kernel::RayMarch<kernel::EqualSteps>>(const Scene&);
-template TileFunction chooseTileFunction<kernel::RayMarch<kernel::VoxelCells>>(const Scene&);
+template TileFunction chooseTileFunction<kernel::RayMarch<kernel::EqualSteps>>(const Instance&);
+template TileFunction chooseTileFunction<kernel::RayMarch<kernel::VoxelCells>>(const Instance&);
 
 }  // namespace scolopax

@@ -5,6 +5,6 @@
 
 namespace scolopax {
 
-template TileFunction chooseTileFunction<kernel::Analog<kernel::Superposed>>(const Scene&);
+template TileFunction chooseTileFunction<kernel::Analog<kernel::Superposed>>(const Instance&);
 
 }  // namespace scolopax

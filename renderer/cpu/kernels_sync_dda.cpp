@@ -5,6 +5,6 @@
 
 namespace scolopax {
 
-template TileFunction chooseTileFunction<kernel::Analog<kernel::SyncDda>>(const Scene&);
+template TileFunction chooseTileFunction<kernel::Analog<kernel::SyncDda>>(const Instance&);
 
 }  // namespace scolopax

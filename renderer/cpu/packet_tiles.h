@@ -74,15 +74,16 @@ void renderTilePackets(const Pass& pass, int tileX, int tileY) {
     }
 }
 
-inline TileFunction packetTiles(const Scene& scene, bool voxelwise) {
-  return visitBlendAndLight(scene, [voxelwise](auto blend, auto lighting) -> TileFunction {
-    using Blend = typename decltype(blend)::type;
-    using Lighting = typename decltype(lighting)::type;
-    return voxelwise ? renderTilePackets<kernel::VoxelCells, Lighting, Blend::kSums, Blend::kSeparate,
-                                         Blend::kMixes>
-                     : renderTilePackets<kernel::EqualSteps, Lighting, Blend::kSums, Blend::kSeparate,
-                                         Blend::kMixes>;
-  });
+inline TileFunction packetTiles(const Instance& instance) {
+  return visitBlendAndLight(instance,
+                            [voxelwise = instance.voxelwise](auto blend, auto lighting) -> TileFunction {
+                              using Blend = typename decltype(blend)::type;
+                              using Lighting = typename decltype(lighting)::type;
+                              return voxelwise ? renderTilePackets<kernel::VoxelCells, Lighting, Blend::kSums,
+                                                                   Blend::kSeparate, Blend::kMixes>
+                                               : renderTilePackets<kernel::EqualSteps, Lighting, Blend::kSums,
+                                                                   Blend::kSeparate, Blend::kMixes>;
+                            });
 }
 
 }  // namespace scolopax::SCOLOPAX_SIMD_SPACE

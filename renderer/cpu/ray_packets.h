@@ -7,17 +7,14 @@
 
 namespace scolopax {
 
-/// The fastest tile function for quadrature: packets where they are possible, else single rays.
-TileFunction quadratureTileFunction(const Scene& scene, const kernel::SceneView& view);
-
 /// Packets with instruction set `set`, which the processor must support. Null where only single rays are
 /// possible: for the baseline set, for methods other than quadrature, whose rays diverge, and for volumes of
 /// 2^30 macrocells or more, which a packet's walk cannot index.
-TileFunction packetTileFunction(const Scene& scene, const kernel::SceneView& view, InstructionSet set);
+TileFunction packetTileFunction(const Instance& instance, const kernel::SceneView& view, InstructionSet set);
 
 /// Packets of 8 and 16 rays. Each is compiled for its instruction set in a file of its own; null except on
 /// x86-64.
-TileFunction avx2PacketTiles(const Scene& scene, bool voxelwise);
-TileFunction avx512PacketTiles(const Scene& scene, bool voxelwise);
+TileFunction avx2PacketTiles(const Instance& instance);
+TileFunction avx512PacketTiles(const Instance& instance);
 
 }  // namespace scolopax

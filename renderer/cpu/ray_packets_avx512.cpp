@@ -8,9 +8,9 @@
 
 namespace scolopax {
 
-TileFunction avx512PacketTiles([[maybe_unused]] const Scene& scene, [[maybe_unused]] bool voxelwise) {
+TileFunction avx512PacketTiles([[maybe_unused]] const Instance& instance) {
 #if defined(__x86_64__)
-  return lanes_avx512::packetTiles(scene, voxelwise);
+  return lanes_avx512::packetTiles(instance);
 #else
   return nullptr;
 #endif

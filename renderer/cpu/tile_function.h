@@ -2,6 +2,7 @@
 // Functions that render one sample of every pixel of a tile. The CPU launcher calls them; kernels implement
 // them.
 #pragma once
+#include "renderer/data/instances.h"
 #include "renderer/launcher.h"
 
 namespace scolopax {
@@ -12,9 +13,9 @@ inline constexpr int kTile = 16;
 /// Renders tile (tileX, tileY) of a pass, counted in tiles.
 using TileFunction = void (*)(const Pass&, int tileX, int tileY);
 
-/// The tile function of one integrator for a scene. Each integrator is compiled in a file of its own,
+/// The tile function of one integrator for a pass. Each integrator is compiled in a file of its own,
 /// kernels_*.cpp.
 template <class Integrator>
-TileFunction chooseTileFunction(const Scene& scene);
+TileFunction chooseTileFunction(const Instance& instance);
 
 }  // namespace scolopax

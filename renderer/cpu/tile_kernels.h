@@ -39,8 +39,8 @@ void renderTile(const Pass& pass, int tileX, int tileY) {
 }
 
 template <class Integrator>
-TileFunction chooseTileFunction(const Scene& scene) {
-  return visitBlendAndLight(scene, [](auto blend, auto lighting) -> TileFunction {
+TileFunction chooseTileFunction(const Instance& instance) {
+  return visitBlendAndLight(instance, [](auto blend, auto lighting) -> TileFunction {
     return renderTile<Integrator, typename decltype(blend)::type, typename decltype(lighting)::type>;
   });
 }

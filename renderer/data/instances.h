@@ -4,6 +4,7 @@
 #include <type_traits>
 
 #include "renderer/data/scene.h"
+#include "renderer/kernel/views.h"
 
 namespace scolopax::kernel {
 // Declared only: a file that compiles an integrator includes it, and no other.
@@ -27,11 +28,21 @@ struct Lit;
 
 namespace scolopax {
 
-/// Returns f(std::type_identity<Integrator>{}). A backend normally resolves Method::automatic first; here it
-/// counts as superposed.
+struct Instance {
+  Method method;  ///< automatic renders as superposed
+  BlendMode blend;
+  bool lit;        ///< shading or shadows
+  bool voxelwise;  ///< quadrature also cuts rays at the faces of voxel cells
+};
+inline Instance instanceOf(Method method, BlendMode blend, const kernel::SceneView& view) {
+  // Without lights there is nothing to block.
+  return {method, blend, view.shading || (view.shadows && view.lightCount > 0), view.cutsAtVoxels()};
+}
+
+/// Returns f(std::type_identity<Integrator>{}).
 template <class F>
-auto visitIntegrator(const Scene& scene, F&& f) {
-  switch (scene.method) {
+auto visitIntegrator(const Instance& instance, F&& f) {
+  switch (instance.method) {
     case Method::automatic:
     case Method::superposed:
       return f(std::type_identity<kernel::Analog<kernel::Superposed>>{});
@@ -45,23 +56,18 @@ auto visitIntegrator(const Scene& scene, F&& f) {
     case Method::hybrid:
       break;
   }
-  return f(std::type_identity<kernel::RayMarch<kernel::EqualSteps>>{});
-}
-
-/// Returns f(std::type_identity<Lighting>{}).
-template <class F>
-auto visitLight(const Scene& scene, F&& f) {
-  return scene.shading || scene.shadows ? f(std::type_identity<kernel::Lit>{})
-                                        : f(std::type_identity<kernel::Unlit>{});
+  return instance.voxelwise ? f(std::type_identity<kernel::RayMarch<kernel::VoxelCells>>{})
+                            : f(std::type_identity<kernel::RayMarch<kernel::EqualSteps>>{});
 }
 
 /// Returns f(std::type_identity<Blend>{}, std::type_identity<Lighting>{}).
 template <class F>
-auto visitBlendAndLight(const Scene& scene, F&& f) {
+auto visitBlendAndLight(const Instance& instance, F&& f) {
   const auto with = [&](auto blend) {
-    return visitLight(scene, [&](auto lighting) { return f(blend, lighting); });
+    return instance.lit ? f(blend, std::type_identity<kernel::Lit>{})
+                        : f(blend, std::type_identity<kernel::Unlit>{});
   };
-  switch (scene.blend) {
+  switch (instance.blend) {
     case BlendMode::density:
       return with(std::type_identity<kernel::BlendDensity>{});
     case BlendMode::max:

@@ -241,21 +241,11 @@ void MajorantGrid::Totals::measureFilled(glm::ivec3 blocks, glm::ivec3 cells) {
 }
 
 float MajorantGrid::totalOf(const LevelInterval* intervals) const {
-  float total = 0.0f;
-  for (const BoundTable& table : *tables_) {
-    const float bound = table.over(intervals[table.column]);
-    total = sums_ ? total + bound : std::max(total, bound);
-  }
-  return total;
+  return kernel::combinedBound(tables_->data(), int(tables_->size()), sums_, intervals);
 }
 
 std::uint32_t MajorantGrid::activeOf(const LevelInterval* intervals) const {
-  std::uint32_t active = 0;
-  for (std::size_t n = 0; n < tables_->size(); ++n) {
-    const BoundTable& table = (*tables_)[n];
-    if (table.over(intervals[table.column]) > 0.0f) active |= 1u << n;
-  }
-  return active;
+  return kernel::activeChannels(tables_->data(), int(tables_->size()), intervals);
 }
 
 kernel::MajorantView MajorantGrid::view() const {
@@ -265,6 +255,9 @@ kernel::MajorantView MajorantGrid::view() const {
           macrocells_->intervals.data(),
           int(macrocells_->levels.size()),
           tables_->data(),
+          int(tables_->size()),
+          sums_,
+          totals_->radii.data(),
           totals_->filledLow,
           totals_->filledHigh,
           totals_->active.empty() ? nullptr : totals_->active.data()};

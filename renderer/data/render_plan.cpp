@@ -145,12 +145,24 @@ bool needsGradients(const Channel& channel, const ChannelAppearance& appearance)
   return any(appearance.opacity, isAboveZero) && any(factor, isAboveZero) &&
          (channel.histogram.nonFiniteCount > 0 || any(factor, [](double value) { return value != 1; }));
 }
+
+/// Knots of all curves.
+std::size_t knotsOf(const ChannelAppearance& look) {
+  return look.opacity.size() + look.color.size() +
+         (look.gradientOpacity ? look.gradientOpacity->factor.size() : 0);
+}
 }  // namespace
 
 bool RenderPlan::nextTakesLong(const Scene& scene) const {
   // An edit may change the totals of all cells.
   constexpr std::size_t kManyIntervals = 4 << 20;
   if (macrocells_->size != scene.macrocell || macrocells_->intervals.size() > kManyIntervals) return true;
+  // With a gamma, the place of a knot is found by trial.
+  constexpr std::size_t kManyKnots = 2048;
+  std::size_t knots = 0;
+  for (std::size_t i = 0; i < scene.channels.size() && i < scene_.channels.size(); ++i)
+    if (scene.channels[i] != scene_.channels[i]) knots += knotsOf(scene.channels[i]);
+  if (knots > kManyKnots) return true;
   for (std::size_t i = 0; i < scene.channels.size() && i < channels_.measured.size(); ++i) {
     const Measured& measured = channels_.measured[i];
     const bool spline = scene.channels[i].interpolation == Interpolation::cubic;

@@ -28,7 +28,7 @@ void checkStep(double step);
 /// Throws Error(badInput) if RenderPlan would refuse the scene for anything but its camera and curves.
 void checkScene(const Scene& scene, const Volume& volume);
 
-class RenderPlan {
+class RenderPlan : public std::enable_shared_from_this<RenderPlan> {
  public:
   /// `before`, if given, is a plan of the same volume; what the scene leaves unchanged is shared with it. The
   /// memory of macrocells and of what is kept per macrocell is charged to `memory`, if given. Throws
@@ -45,6 +45,7 @@ class RenderPlan {
   /// What had to be rebuilt because it could not be shared.
   const RebuildStats& rebuilt() const { return rebuilt_; }
   const Scene& scene() const { return scene_; }
+  const std::shared_ptr<const Volume>& volume() const { return volume_; }
   const Grid& grid() const { return volume_->grid(); }
   /// Valid while the plan lives.
   const kernel::SceneView& view() const { return view_; }

@@ -61,7 +61,8 @@ bool Corrections::render(Launcher& launcher, const RenderPlan& plan, Film& film,
                          std::chrono::steady_clock::time_point deadline) {
   if (stage_ == Stage::notBegun) beginRows(film, addLevel);
   if (stage_ == Stage::complete) return true;
-  Pass pass{plan.view(), sampleNumber(plan.scene().sampling, film.corrections(level_)),
+  Pass pass{&plan,       plan.scene().method,
+            plan.view(), sampleNumber(plan.scene().sampling, film.corrections(level_)),
             nullptr,     nullptr,
             nullptr,     done_.data(),
             &cancel,     deadline};
@@ -70,7 +71,7 @@ bool Corrections::render(Launcher& launcher, const RenderPlan& plan, Film& film,
   const auto renderAt = [&](const Resolution& resolution, glm::vec4* pixels) {
     pass.pixels = pixels;
     setResolution(pass.scene, resolution);
-    return launcher.launch(plan.scene(), pass);
+    return launcher.launch(pass);
   };
   const LevelEstimate& level = levels_[level_].estimate;
   if (stage_ == Stage::fine) {

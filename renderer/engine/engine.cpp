@@ -66,7 +66,8 @@ class Engine final : public Renderer {
     // Freeing the memory of a large film takes time, and so does clearing the records.
     const bool largeFilm = std::max(pixels, film_.pixelCount()) >= kLargePicture &&
                            (pixels != film_.pixelCount() || recording_ || counting_);
-    return largeFilm || scene.method == Method::automatic || !plan_ || plan_->nextTakesLong(scene);
+    return largeFilm || scene.method == Method::automatic || !plan_ || plan_->nextTakesLong(scene) ||
+           launcher_->uploadTakesLong(volume_, scene);
   }
   Choice choice() const override {
     const Scene& scene = plan_->scene();
@@ -77,7 +78,9 @@ class Engine final : public Renderer {
   }
 
   bool renderPixels(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
-    Pass pass{plan_->view(),
+    Pass pass{plan_.get(),
+              plan_->scene().method,
+              plan_->view(),
               sampleNumber(plan_->scene().sampling, film_.samples()),
               film_.pass(),
               counting_ ? cost_.data() : nullptr,
@@ -88,7 +91,7 @@ class Engine final : public Renderer {
     if (automaticChosen_ && hasStep(automatic_.method)) setResolution(pass.scene, automatic_.resolution);
     bool complete = false;
     launcher_->run([&] {
-      complete = launcher_->launch(plan_->scene(), pass) &&
+      complete = launcher_->launch(pass) &&
                  corrections_.render(
                      *launcher_, *plan_, film_, [&] { return addLevel(); }, cancel, pass.deadline);
     });
@@ -191,6 +194,7 @@ class Engine final : public Renderer {
       chosen.step = sceneStep(choice.resolution);
     }
     makeNext();
+    launcher_->upload(plan, stop);
     stats.filmReset = !plan_ || automatic != automaticChosen_ || !plan_->makesSamePicture(chosen);
     plan_ = std::move(plan);
     automatic_ = std::move(choice);

@@ -21,14 +21,15 @@ class SampledPicking final : public Picking {
                  const PixelArea& area)
       : launcher_(launcher),
         plan_(std::move(plan)),
-        unlit_(scene),
+        method_(scene.method),
         number_(sampleNumber(Sampling::independent, 0)),
         pixels_(pixelsToPick(area)),
         side_(pickSamplesSide(pixels_.size())),
         isPoint_(scene.filter == PixelFilter::point),
         unit_(isPoint_ ? kPointUnit : 1.0f / float(side_)),
         view_(plan_->view()) {
-    unlit_.shading = unlit_.shadows = false;  // lighting does not change what a ray hits
+    view_.shading = view_.shadows = false;  // lighting does not change what a ray hits
+    view_.lightCount = 0;
     view_.rays = makeCameraRays(scene.camera, plan_->grid(), scene.width, scene.height);
     // Depths are measured from where rays start: from a distant eye, they would be too coarse for a point.
     start_ = double(std::exchange(view_.rays.start, 0.0f));
@@ -38,7 +39,6 @@ class SampledPicking final : public Picking {
     view_.seed = scene.seed;
     view_.filterWidth = 0;
     setResolution(view_, resolutionOf(scene));
-    view_.lightCount = 0;
     const auto samples = std::size_t(side_ * side_);
     met_.resize(samples);
     colors_.resize(samples);
@@ -52,8 +52,8 @@ class SampledPicking final : public Picking {
       // a time.
       const glm::vec2 corner = glm::vec2(pixels_[at_]) + (isPoint_ ? 0.5f : 0.0f);
       view_.rays.halfSize = (halfSize_ - corner) / unit_;
-      if (!launcher_.launch(unlit_, {view_, number_, colors_.data(), nullptr, met_.data(), done_.data(),
-                                     &kNever, deadline}))
+      if (!launcher_.launch({plan_.get(), method_, view_, number_, colors_.data(), nullptr, met_.data(),
+                             done_.data(), &kNever, deadline}))
         return false;
       if (const auto sample = visibleSample(met_)) found_.push_back(pickedBy(int(*sample)));
       std::fill(done_.begin(), done_.end(), std::uint8_t(0));
@@ -78,7 +78,7 @@ class SampledPicking final : public Picking {
 
   Launcher& launcher_;
   const std::shared_ptr<const RenderPlan> plan_;
-  Scene unlit_;
+  const Method method_;
   const kernel::SampleNumber number_;
   const std::vector<glm::ivec2> pixels_;
   const int side_;

@@ -7,6 +7,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/data/camera.h"
+#include "renderer/data/instances.h"
 #include "renderer/data/sampling.h"
 
 namespace scolopax {
@@ -33,14 +34,18 @@ double meanVariance(std::size_t n, std::size_t pixels, const Value& value) {
 
 Thumbnails::Thumbnails(Launcher& launcher, const RenderPlan& plan, Method method, bool spread,
                        const std::stop_token& stop)
-    : launcher_(launcher), scene_(plan.scene()), view_(plan.view()), onStop_(stop, RaiseFlag{&stopped_}) {
-  scene_.method = method;
-  const bool lit = scene_.shading || (scene_.shadows && view_.lightCount > 0);
-  const double longer = std::max(scene_.width, scene_.height);
+    : launcher_(launcher),
+      plan_(plan),
+      method_(method),
+      view_(plan.view()),
+      onStop_(stop, RaiseFlag{&stopped_}) {
+  const Scene& scene = plan.scene();
+  const bool lit = instanceOf(method, scene.blend, view_).lit;
+  const double longer = std::max(scene.width, scene.height);
   const double scale = (lit ? kLitThumbnailSide : kThumbnailSide) / longer;
-  view_.width = std::max(1, int(std::lround(scene_.width * scale)));
-  view_.height = std::max(1, int(std::lround(scene_.height * scale)));
-  view_.rays = makeCameraRays(scene_.camera, plan.grid(), view_.width, view_.height);
+  view_.width = std::max(1, int(std::lround(scene.width * scale)));
+  view_.height = std::max(1, int(std::lround(scene.height * scale)));
+  view_.rays = makeCameraRays(scene.camera, plan.grid(), view_.width, view_.height);
   view_.filterWidth *= spread ? float(scale) : 0.0f;
   view_.seed = 0;
   view_.stratum = stratumOf(method);
@@ -55,9 +60,10 @@ Pictures Thumbnails::render(const Resolution& resolution, std::size_t count) {
     const auto number = sampleNumber(Sampling::independent, std::uint32_t(pictures.samples.size()));
     std::vector<glm::vec4>& sample = pictures.samples.emplace_back(pixels);
     std::vector<std::uint8_t> done(pixels, 0);
-    const Pass pass{view_,   number,      sample.data(), cost.data(),
-                    nullptr, done.data(), &stopped_,     std::chrono::steady_clock::time_point::max()};
-    if (!launcher_.launch(scene_, pass)) throw Error(ErrorCode::cancelled, "the bias estimate was cancelled");
+    const Pass pass{
+        &plan_,      method_, view_,       number,    sample.data(),
+        cost.data(), nullptr, done.data(), &stopped_, std::chrono::steady_clock::time_point::max()};
+    if (!launcher_.launch(pass)) throw Error(ErrorCode::cancelled, "the bias estimate was cancelled");
     rays_ += pixels;
   }
   for (const kernel::SampleCost& ray : cost) pictures.fetches += double(ray.fetches);

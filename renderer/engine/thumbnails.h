@@ -26,8 +26,8 @@ struct Pictures {
 
 class Thumbnails {
  public:
-  /// Rays go through the centres of the thumbnail's pixels or, if `spread`, are spread over as much as a
-  /// pixel of the picture covers with the scene's filter.
+  /// Borrows the launcher and the plan. Rays go through the centres of the thumbnail's pixels or, if
+  /// `spread`, are spread over as much as a pixel of the picture covers with the scene's filter.
   Thumbnails(Launcher& launcher, const RenderPlan& plan, Method method, bool spread,
              const std::stop_token& stop);
 
@@ -42,7 +42,8 @@ class Thumbnails {
     void operator()() const { *flag = true; }
   };
   Launcher& launcher_;
-  Scene scene_;
+  const RenderPlan& plan_;
+  const Method method_;
   kernel::SceneView view_;
   std::uint64_t rays_ = 0;
   std::atomic<bool> stopped_{false};

@@ -51,6 +51,27 @@ SCOLOPAX_HD inline TotalCode codeOfTotal(float total) {
 }
 SCOLOPAX_HD inline TotalCode codeOfEmpty(int radius) { return TotalCode(kEmptyCode | radius); }
 
+/// Combined bound of visible channels over a cell's intervals: `sums` adds their bounds up, otherwise it is
+/// the largest.
+SCOLOPAX_HD inline float combinedBound(const BoundTable* tables, int count, bool sums,
+                                       const LevelInterval* intervals) {
+  float total = 0.0f;
+  for (int n = 0; n < count; ++n) {
+    const float bound = tables[n].over(intervals[tables[n].column]);
+    total = sums ? total + bound : (bound > total ? bound : total);
+  }
+  return total;
+}
+
+/// Bit n is set if the bound of visible channel n over a cell's intervals is above 0.
+SCOLOPAX_HD inline std::uint32_t activeChannels(const BoundTable* tables, int count,
+                                                const LevelInterval* intervals) {
+  std::uint32_t active = 0;
+  for (int n = 0; n < count; ++n)
+    if (tables[n].over(intervals[tables[n].column]) > 0.0f) active |= 1u << n;
+  return active;
+}
+
 /// Cell (i,j,k) has index (k * cells.y + j) * cells.x + i and covers voxel coordinates [i, i+1] * cellSize on
 /// the x axis, and likewise on the others. The outer cells extend to the faces of the box.
 struct MajorantView {
@@ -60,6 +81,9 @@ struct MajorantView {
   const LevelInterval* intervals;  ///< `columns` intervals per cell
   int columns;
   const BoundTable* tables;  ///< per visible channel
+  int tableCount;
+  bool sums;                  ///< as for combinedBound()
+  const std::uint8_t* radii;  ///< per block, x fastest: emptyRadius() of its cells; for devices
   /// Cells (i,j,k) outside [filledLow, filledHigh) are empty. The range consists of whole blocks.
   glm::ivec3 filledLow, filledHigh;
   /// Per cell: bit n is set if the bound of visible channel n is above 0. For packets of rays, which look up
@@ -72,6 +96,14 @@ struct MajorantView {
   SCOLOPAX_HD float total(std::size_t cell) const {
     return totals[cell] < kEmptyCode ? std::bit_cast<float>(std::uint32_t(totals[cell]) << 16) : 0.0f;
   }
+  SCOLOPAX_HD const LevelInterval* intervalsOf(std::size_t cell) const {
+    return &intervals[cell * std::size_t(columns)];
+  }
+  /// Code of a cell, for a launcher that computes the totals itself.
+  SCOLOPAX_HD TotalCode codeOf(std::size_t cell, int radius) const {
+    return radius > 0 ? codeOfEmpty(radius)
+                      : codeOfTotal(combinedBound(tables, tableCount, sums, intervalsOf(cell)));
+  }
   /// Largest r such that all blocks less than r blocks away from the cell's block, along every axis, are
   /// empty; at most kMaxEmptyRadius. 0 for a cell that is not empty.
   SCOLOPAX_HD int emptyRadius(std::size_t cell) const {
@@ -79,7 +111,7 @@ struct MajorantView {
   }
   /// Bound of visible channel n.
   SCOLOPAX_HD float bound(std::size_t cell, int n) const {
-    return tables[n].over(intervals[cell * std::size_t(columns) + std::size_t(tables[n].column)]);
+    return tables[n].over(intervalsOf(cell)[tables[n].column]);
   }
 };
 

@@ -10,6 +10,17 @@
 #define SCOLOPAX_HD
 #endif
 
+// Device kernels of plain scenes are compiled in files of their own, which define SCOLOPAX_PLAIN_SCENES:
+// without the code that only other scenes need, because a device allocates registers and local memory for all
+// compiled code, whether it runs or not.
+namespace scolopax::kernel {
+#if defined(__CUDA_ARCH__) && defined(SCOLOPAX_PLAIN_SCENES)
+inline constexpr bool kPlainDevice = true;
+#else
+inline constexpr bool kPlainDevice = false;
+#endif
+}  // namespace scolopax::kernel
+
 // SCOLOPAX_HOT marks functions in which most of the time is spent; everything that they call is inlined.
 // SCOLOPAX_APART and SCOLOPAX_RARE mark functions that are seldom called and are not inlined. On a device,
 // everything is inlined except SCOLOPAX_RARE functions, which only few scenes need. With sanitizers, whose

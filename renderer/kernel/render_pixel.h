@@ -35,27 +35,28 @@ struct RenderPixel {
   SampleCost* cost;                 ///< the same shape, or null if costs are not counted
   FirstCollision* first = nullptr;  ///< the same shape, or null if it is not needed
 
-  SCOLOPAX_HD void operator()(int pixel) const {
+  SCOLOPAX_HD void operator()(int pixel) const { (*this)(pixel, pixel); }
+  /// `at`: the pixel's index in the arrays, which may be those of a part of the picture.
+  SCOLOPAX_HD void operator()(int pixel, int at) const {
     Sampler sampler(std::uint32_t(pixel), number, scene.seed);
-    const PixelRay<One> at = rayThrough<One>(scene, pixel % scene.width, pixel / scene.width, sampler, true);
-#if defined(__CUDA_ARCH__)
-    constexpr FirstCollision* const first = nullptr;  // devices do not record it, and need not compile it
-#endif
+    const PixelRay<One> through =
+        rayThrough<One>(scene, pixel % scene.width, pixel / scene.width, sampler, true);
+    FirstCollision* const collisions = kPlainDevice ? nullptr : first;
     SampleCost spent;
     glm::vec4 result(0.0f);
     FirstCollision met;
-    if (scene.channelCount > 0 && at.inside.enter < at.inside.exit)
-      result = Integrator::template sample<Blend, Lighting>(scene, at.ray, at.inside, sampler, &spent,
-                                                            first ? &met : nullptr);
+    if (scene.channelCount > 0 && through.inside.enter < through.inside.exit)
+      result = Integrator::template sample<Blend, Lighting>(scene, through.ray, through.inside, sampler,
+                                                            &spent, collisions ? &met : nullptr);
     if (scene.isCancelled()) return;
-    pass[pixel] = result;
-    if (first) first[pixel] = {scene.rays.depth(at.x, at.y, met.depth), met.channel};
+    pass[at] = result;
+    if (collisions) collisions[at] = {scene.rays.depth(through.x, through.y, met.depth), met.channel};
     if (cost) {
       spent.randomBlocks += sampler.blocks();
-      cost[pixel].fetches += spent.fetches;
-      cost[pixel].cellSteps += spent.cellSteps;
-      cost[pixel].randomBlocks += spent.randomBlocks;
-      cost[pixel].truncated += spent.truncated;
+      cost[at].fetches += spent.fetches;
+      cost[at].cellSteps += spent.cellSteps;
+      cost[at].randomBlocks += spent.randomBlocks;
+      cost[at].truncated += spent.truncated;
     }
   }
 };

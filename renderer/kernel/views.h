@@ -112,14 +112,10 @@ struct FieldView {
   bool finite;           ///< whether all voxels are finite
   int lane, stride;      ///< index among the interleaved channels, and their number
 
-  /// Kernels for devices are compiled for trilinear interpolation alone.
-#if defined(__CUDA_ARCH__)
-  SCOLOPAX_HD bool has(Filter which) const { return which == Filter::trilinear; }
-  SCOLOPAX_HD unsigned cost() const { return 1; }
-#else
-  SCOLOPAX_HD bool has(Filter which) const { return filter == which; }
-  SCOLOPAX_HD unsigned cost() const { return fetches; }
-#endif
+  SCOLOPAX_HD bool has(Filter which) const {
+    return kPlainDevice ? which == Filter::trilinear : filter == which;
+  }
+  SCOLOPAX_HD unsigned cost() const { return kPlainDevice ? 1 : fetches; }
 };
 
 /// One channel: its values, and how a stored value becomes extinction and colour.
@@ -173,31 +169,25 @@ struct SceneView {
   float smallestSpacing;            ///< world units
   const std::atomic<bool>* cancel;  ///< null on devices: whether rays should end early, without a result
 
-  static constexpr int kFactors = kMaxVisibleChannels;  ///< channels that may have one: length of arrays
-  /// Whether the opacity of channel n depends on the gradient.
-  SCOLOPAX_HD bool hasFactor(int n) const { return channels[n].factor.curve.count != 0; }
+  /// Channels whose opacity may depend on the gradient: length of arrays, which must not be empty.
+  static constexpr int kFactors = kPlainDevice ? 1 : kMaxVisibleChannels;
+  SCOLOPAX_HD bool hasFactor(int n) const { return !kPlainDevice && channels[n].factor.curve.count != 0; }
+  SCOLOPAX_HD bool hasSurfaces() const { return !kPlainDevice && surfaces; }
+  SCOLOPAX_HD bool hasNearest() const { return !kPlainDevice && nearest; }
   /// Whether quadrature cuts rays at the faces of voxel cells. It must for nearest voxels, where fields jump.
   SCOLOPAX_HD bool cutsAtVoxels() const { return voxelwise || nearest; }
-  /// Kernels for devices are compiled without surfaces and filters.
 #if defined(__CUDA_ARCH__)
-  SCOLOPAX_HD static constexpr bool hasSurfaces() { return false; }
-  SCOLOPAX_HD static constexpr bool hasNearest() { return false; }
   SCOLOPAX_HD static constexpr bool isCancelled() { return false; }
 #else
-  SCOLOPAX_HD bool hasSurfaces() const { return surfaces; }
-  SCOLOPAX_HD bool hasNearest() const { return nearest; }
   /// A single ray may take seconds, so loops along rays ask.
   SCOLOPAX_HD bool isCancelled() const { return cancel && cancel->load(std::memory_order_relaxed); }
 #endif
 };
 
-/// A scene in which no opacity depends on the gradient. Kernels of this view are compiled without the code
-/// that only other scenes need. Only devices have such kernels: there, registers and local memory are
-/// allocated for all compiled code, whether it runs or not.
-struct PlainSceneView : SceneView {
-  static constexpr int kFactors = 1;  // none, but arrays must not be empty
-  SCOLOPAX_HD static constexpr bool hasFactor(int) { return false; }
-};
+/// A plain scene: trilinear interpolation, no surfaces, no opacity that depends on the gradient, and no
+/// record of first collisions. A type of its own, because device kernels of plain scenes are compiled apart
+/// (kPlainDevice).
+struct PlainSceneView : SceneView {};
 
 /// Cost of one sample per lane, for tests, benchmarks and the cost heat map.
 template <class L>

@@ -22,6 +22,7 @@
 #include "renderer/metrics/metrics.h"
 #include "renderer/reference/render.h"
 #include "server/commands/bench_points.h"
+#include "server/commands/render_device.h"
 #include "server/commands/scene_arguments.h"
 #include "server/commands/validators.h"
 
@@ -40,6 +41,7 @@ struct BenchOptions {
   std::vector<double> steps{4, 2, 1, 0.5, 0};
   std::vector<int> macrocells;  // none: the scene's
   std::vector<int> threads{0};
+  std::string device = "cpu";
   int repetitions = 3;
   double longest = 10;
   std::filesystem::path truth, json;
@@ -89,7 +91,8 @@ using Renderers = std::map<int, std::unique_ptr<Renderer>>;
 
 Renderers renderersFor(const std::shared_ptr<const Volume>& volume, const BenchOptions& options) {
   Renderers renderers;
-  for (const int threads : options.threads) renderers[threads] = makeCpuRenderer(volume, threads);
+  for (const int threads : options.threads)
+    renderers[threads] = rendererFactory(options.device, threads).make(volume);
   return renderers;
 }
 
@@ -262,6 +265,7 @@ CLI::App* addBenchCommand(CLI::App& root) {
   command->add_option("--macrocells", o->macrocells, "Macrocell edges, in voxels; default: the scene's")
       ->delimiter(',')
       ->check(CLI::Range(1, 64));
+  checkDevice(command->add_option("--device", o->device, kDeviceDoc))->capture_default_str();
   command->add_option("--threads", o->threads, "Numbers of threads; 0: all")
       ->delimiter(',')
       ->check(CLI::Range(0, 1024));

@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "server/commands/render_device.h"
 #include "server/dataset_store.h"
 
 namespace scolopax {
@@ -33,17 +34,21 @@ void printText(const server::Dataset& dataset) {
 CLI::App* addInfoCommand(CLI::App& root) {
   struct InfoOptions {
     std::vector<std::filesystem::path> paths;
-    bool json = false;
+    bool json = false, devices = false;
   };
   CLI::App* command = root.add_subcommand(
       "info",
       "Print what volume files contain: dimensions, spacing, and each channel's name, type and range");
   const auto options = std::make_shared<InfoOptions>();
-  command->add_option("PATH", options->paths, "Volume files; files with the same grid form one data set")
-      ->required();
+  command->add_option("PATH", options->paths, "Volume files; files with the same grid form one data set");
   command->add_flag("--json", options->json,
                     "Print a JSON list of what GET /api/v1/datasets/ID returns for each");
+  command->add_flag("--devices", options->devices, "Print what can render, with the names for --device");
   command->callback([options] {
+    if (options->devices) fmt::print("{}", describeDevices());
+    if (options->paths.empty() && !options->devices)
+      throw CLI::ValidationError("info", "expected at least one volume file, or --devices");
+    if (options->paths.empty()) return;
     const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
     const auto datasets = io::loadDatasets(options->paths, io::defaultMemoryLimitBytes(), warn);
     if (options->json) {

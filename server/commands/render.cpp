@@ -17,6 +17,7 @@
 #include "renderer/io/output_file.h"
 #include "renderer/renderer.h"
 #include "server/commands/interrupt.h"
+#include "server/commands/render_device.h"
 #include "server/commands/scene_arguments.h"
 #include "server/commands/validators.h"
 #include "server/scene_resolver.h"
@@ -36,6 +37,7 @@ struct RenderOptions {
   std::vector<std::string> aovs;
   std::filesystem::path stats;
   int threads = 0;
+  std::string device = "auto";
 };
 
 /// An AOV to be written beside the picture.
@@ -135,7 +137,10 @@ void render(const RenderOptions& options) {
     stop = {options.samples.value_or(0), options.seconds.value_or(0), options.error.value_or(0)};
   const Scene& scene = resolved->render;
 
-  const auto renderer = makeCpuRenderer(resolved->dataset->volume, options.threads);
+  const auto renderer =
+      rendererFactory(options.device, options.threads, nullptr, true, [](const std::string& line) {
+        fmt::print(stderr, "scolopax: {}\n", line);
+      }).make(resolved->dataset->volume);
   if (!options.stats.empty()) renderer->countCosts();
   if (!aovs.empty()) renderer->recordAovs();
   const RebuildStats rebuild = renderer->setScene(scene);
@@ -181,6 +186,7 @@ CLI::App* addRenderCommand(CLI::App& root) {
   command->add_option("--seconds", o->seconds, "Stop after this time")->check(numberUpTo(1e9, false));
   command->add_option("--error", o->error, "Stop at this estimated RMSE over linear premultiplied RGBA")
       ->check(numberUpTo(1e9, false));
+  checkDevice(command->add_option("--device", o->device, kDeviceDoc))->capture_default_str();
   command->add_option("--threads", o->threads, "Threads to use; 0: all")
       ->envname("SCOLOPAX_THREADS")
       ->check(CLI::Range(0, 1024));

@@ -21,6 +21,7 @@
 #include "server/application.h"
 #include "server/auth.h"
 #include "server/command_config.h"
+#include "server/commands/render_device.h"
 #include "server/commands/validators.h"
 #include "server/net/server.h"
 #include "server/scene_resolver.h"
@@ -34,6 +35,7 @@ struct ServeOptions {
   std::filesystem::path dataRoot;
   std::string tokenFile;
   std::string configFile;
+  std::string device = "auto", whenDeviceFails = "cpu";
   std::string logLevel = "info";
   double keepSeconds = 300;
   std::uint64_t maxMemoryMebibytes = io::defaultMemoryLimitBytes() / 2 >> 20;
@@ -104,14 +106,12 @@ void serve(ServeOptions options) {
     log->info("data set {}: {} x {} x {}, {} channels", dataset.id, dims.x, dims.y, dims.z,
               dataset.volume->channels().size());
   }
-  const int threads = options.config.threads;
   const auto memory = std::make_shared<MemoryBudget>(options.config.maxMemoryBytes);
-  server::Application application(
-      options.config, std::move(datasets),
-      [threads, memory](std::shared_ptr<const Volume> volume) {
-        return makeCpuRenderer(std::move(volume), threads, memory);
-      },
-      memory, warn);
+  const RendererFactory factory =
+      rendererFactory(options.device, config.threads, memory, options.whenDeviceFails == "cpu", warn);
+  options.config.backend = factory.backend;
+  log->info("rendering on {}", factory.backend);
+  server::Application application(options.config, std::move(datasets), factory.make, memory, warn);
   catchSignals();
   application.start();
   std::printf("Scolopax is ready: %s\n", application.url().c_str());
@@ -149,6 +149,10 @@ CLI::App* addServeCommand(CLI::App& root) {
       ->type_name("FILE");
   add("data-root", options->dataRoot, "Folder that contains every PATH and that they are relative to")
       ->type_name("FOLDER");
+  checkDevice(add("device", options->device, kDeviceDoc));
+  add("when-device-fails", options->whenDeviceFails,
+      "What sessions do once a CUDA device has failed: go on on the CPU, or end with the error")
+      ->check(CLI::IsMember({"cpu", "end"}));
   add("threads", config.threads, "Threads for rendering; 0: all")->check(CLI::Range(0, 1024))->type_name("N");
   add("log-level", options->logLevel, "Least severe messages to log on standard error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "critical", "off"}));

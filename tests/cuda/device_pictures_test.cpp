@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "renderer/renderer.h"
@@ -12,8 +13,6 @@ namespace scolopax {
 namespace {
 
 using namespace test;
-
-const std::atomic<bool> kNever = false;
 
 std::size_t differentPixels(const Image& a, const Image& b) {
   std::size_t count = 0;
@@ -29,32 +28,52 @@ double coverage(const Image& image) {
   return double(shown) / double(image.pixels.size());
 }
 
+/// Compares every AOV, and what a pick in the middle finds.
+void expectSameRecords(const Renderer& cpu, const Renderer& device, const Scene& scene) {
+  for (std::size_t a = 0; a < std::size(kAovs); ++a) {
+    if (Aov(a) == Aov::cost) continue;  // may differ
+    const std::vector<float> expected = cpu.aov(Aov(a)).values, found = device.aov(Aov(a)).values;
+    ASSERT_EQ(found.size(), expected.size());
+    std::size_t different = 0, known = 0;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      different += !(found[i] == expected[i] || (std::isnan(found[i]) && std::isnan(expected[i])));
+      known += !std::isnan(expected[i]);
+    }
+    EXPECT_EQ(different, 0u) << kAovs[a].name;
+    EXPECT_GT(known, 0u) << kAovs[a].name;
+  }
+  const PixelArea area{scene.width / 2, scene.height / 2, 2, 2};
+  const auto expected = cpu.pick(scene, area), found = device.pick(scene, area);
+  ASSERT_TRUE(expected->run(Renderer::kNoBudget) && found->run(Renderer::kNoBudget));
+  ASSERT_EQ(found->found().size(), expected->found().size());
+  for (std::size_t i = 0; i < found->found().size(); ++i) {
+    EXPECT_EQ(found->found()[i].channel, expected->found()[i].channel);
+    EXPECT_EQ(found->found()[i].voxel, expected->found()[i].voxel);
+  }
+}
+
 /// Whether a device's counts of fetches and cells are those of the CPU.
 enum class Counts { equal, fewer, atMost };
 
-/// Renders on both, compares pictures and counts.
+/// Renders on both, compares pictures and counts, and with `record` also AOVs and a pick.
 void expectSameOnBoth(const std::shared_ptr<const Volume>& volume, const Scene& scene, int samples,
-                      Counts counts = Counts::equal) {
-  const auto cpu = makeCpuRenderer(volume, 1);
-  cpu->countCosts();
-  cpu->setScene(scene);
-  for (int i = 0; i < samples; ++i) ASSERT_TRUE(cpu->renderSample(kNever));
-  const Image expected = cpu->image();
-  const PictureAndCost found = renderOnDevice(volume, scene, std::uint32_t(samples));
-  ASSERT_EQ(found.image.pixels.size(), expected.pixels.size());
-  EXPECT_EQ(differentPixels(found.image, expected), 0u);
-  EXPECT_GT(coverage(expected), 0.1);
-
-  const RenderStats stats = cpu->stats();
-  RenderStats counted;
-  for (const kernel::SampleCost& cost : found.cost) {
-    counted.fetches += cost.fetches;
-    counted.cellSteps += cost.cellSteps;
-    counted.randomBlocks += cost.randomBlocks;
-    counted.truncatedRays += cost.truncated;
+                      Counts counts = Counts::equal, bool record = false) {
+  const auto cpu = makeCpuRenderer(volume, 1), device = makeCudaRenderer(volume);
+  for (Renderer* renderer : {cpu.get(), device.get()}) {
+    renderer->countCosts();
+    if (record) renderer->recordAovs();
+    renderer->setScene(scene);
+    for (int i = 0; i < samples; ++i) ASSERT_TRUE(renderer->renderSample(kNever));
   }
+  const Image expected = cpu->image(), found = device->image();
+  ASSERT_EQ(found.pixels.size(), expected.pixels.size());
+  EXPECT_EQ(differentPixels(found, expected), 0u);
+  EXPECT_GT(coverage(expected), 0.1);
+  if (record) expectSameRecords(*cpu, *device, scene);
+
+  const RenderStats stats = cpu->stats(), counted = device->stats();
   // The CPU takes several rays or points at once, and so looks at some that do not show.
-  if (scene.method == Method::raymarch || scene.method == Method::hybrid) counts = Counts::atMost;
+  if (hasStep(cpu->choice().method)) counts = Counts::atMost;
 #if defined(SCOLOPAX_HOST_KERNELS)
   if (counts == Counts::fewer) counts = Counts::equal;
 #endif
@@ -77,7 +96,7 @@ void expectSameOnBoth(const std::shared_ptr<const Volume>& volume, const Scene& 
 class DevicePicture : public testing::Test {
  protected:
   void SetUp() override {
-    if (cuda::deviceCount() == 0) GTEST_SKIP() << "no CUDA device";
+    if (cuda::devices().empty()) GTEST_SKIP() << "no CUDA device";
   }
 };
 class DevicePictures : public DevicePicture, public testing::WithParamInterface<Method> {};
@@ -101,9 +120,9 @@ void forEveryBlendModeAndLight(Scene scene, Method method, F&& f) {
 // Sizes that fill the last blocks of threads and sizes that do not.
 TEST_P(DevicePictures, AreThoseOfTheCpuInEveryBlendModeAndLight) {
   const auto mixed = mixedVolume(), withSign = signedVolume();
-  forEveryBlendModeAndLight(obliqueScene(*mixed, 24, 24), GetParam(),
-                            [&](const Scene& scene) { expectSameOnBoth(mixed, scene, 3); });
-  Scene scene = obliqueScene(*withSign, 19, 13);
+  forEveryBlendModeAndLight(obliqueScene(*mixed, 16, 16), GetParam(),
+                            [&](const Scene& scene) { expectSameOnBoth(mixed, scene, 2); });
+  Scene scene = obliqueScene(*withSign, 13, 11);
   scene.filter = PixelFilter::point;
   scene.sampling = Sampling::independent;
   forEveryBlendModeAndLight(scene, GetParam(),
@@ -113,7 +132,7 @@ TEST_P(DevicePictures, AreThoseOfTheCpuInEveryBlendModeAndLight) {
 // Of integers, of voxels that are not finite, and beside a channel without.
 TEST_P(DevicePictures, WithOpacityByTheGradientAreThoseOfTheCpuInEveryBlendModeAndLight) {
   const auto volume = mixedVolume();
-  Scene scene = obliqueScene(*volume, 17, 14);
+  Scene scene = obliqueScene(*volume, 13, 11);
   for (const std::size_t n : {1, 2}) {
     const Histogram& histogram = volume->channels()[n].histogram;
     GradientOpacity factor;
@@ -144,6 +163,45 @@ TEST_P(DevicePictures, OfThickCellsAreThoseOfTheCpu) {
   }
 }
 
+/// A scene with a cubic channel, a channel of nearest voxels, a trilinear one, and surfaces of two.
+Scene sceneOfEverything(const Volume& volume) {
+  Scene scene = obliqueScene(volume, 13, 11);
+  scene.channels[0].interpolation = Interpolation::cubic;
+  scene.channels[0].isovalues = {{100, 0.5, {}}, {180, 1, glm::dvec3(1, 0, 0)}};
+  scene.channels[1].peaks = Peaks::both;
+  scene.channels[2].interpolation = Interpolation::nearest;
+  const glm::dvec3 centre(volume.grid().worldFromVoxel * glm::dvec4(glm::dvec3(volume.grid().dims) * 0.5, 1));
+  scene.clip = {{centre, {1, 0.3, -0.2}, std::vector<int>{0}}, {centre + 2.0, {-1, -1, -0.5}, {}}};
+  scene.crop = Crop{{2, 2, 2}, {8, 7, 11}, 0x5a3c96bu | Crop::kInnermost};
+  return scene;
+}
+
+TEST_P(DevicePictures, WithSurfacesFiltersClipAndCropAreThoseOfTheCpuInEveryBlendModeAndLight) {
+  const auto volume = mixedVolume();
+  forEveryBlendModeAndLight(sceneOfEverything(*volume), GetParam(), [&](const Scene& each) {
+    expectSameOnBoth(volume, each, 2, Counts::atMost, true);
+  });
+}
+
+TEST_P(DevicePictures, WithRecordsAreThoseOfTheCpu) {
+  const auto volume = mixedVolume();
+  Scene scene = obliqueScene(*volume, 13, 11);
+  scene.method = GetParam();
+  for (const BlendMode blend : {BlendMode::density, BlendMode::mix}) {
+    scene.blend = blend;
+    expectSameOnBoth(volume, scene, 2, Counts::atMost, true);
+  }
+}
+
+// From one face of voxel cells to the next.
+TEST_P(DevicePictures, AtStepZeroAreThoseOfTheCpuInEveryBlendModeAndLight) {
+  if (!hasStep(GetParam())) GTEST_SKIP() << "the method has no step";
+  const auto volume = mixedVolume();
+  Scene scene = obliqueScene(*volume, 11, 9);
+  scene.step = 0;
+  forEveryBlendModeAndLight(scene, GetParam(), [&](const Scene& each) { expectSameOnBoth(volume, each, 2); });
+}
+
 INSTANTIATE_TEST_SUITE_P(Of, DevicePictures,
                          testing::Values(Method::superposed, Method::cumulative, Method::syncDda,
                                          Method::nDda, Method::raymarch, Method::hybrid),
@@ -162,12 +220,34 @@ TEST_F(DevicePicture, OfOnePixelAndOfThinStripsIsThatOfTheCpu) {
   }
 }
 
+// Which may be another one than on the CPU, where a sample costs something else.
+TEST_F(DevicePicture, OfMethodAutoIsThatOfTheMethodAndStepThatItHasChosen) {
+  const auto volume = mixedVolume();
+  for (const bool shadows : {false, true}) {
+    Scene scene = obliqueScene(*volume, 24, 20);
+    scene.method = Method::automatic;
+    scene.shadows = shadows;
+    const auto device = makeCudaRenderer(volume), cpu = makeCpuRenderer(volume, 1);
+    device->setScene(scene);
+    const Choice choice = device->choice();
+    scene.method = choice.method;
+    scene.step = choice.step;
+    cpu->setScene(scene);
+    for (int i = 0; i < 4; ++i) ASSERT_TRUE(device->renderSample(kNever) && cpu->renderSample(kNever));
+    ASSERT_TRUE(device->choice().corrections.empty()) << "which the CPU's picture does not have";
+    EXPECT_EQ(differentPixels(device->image(), cpu->image()), 0u);
+    EXPECT_GT(coverage(cpu->image()), 0.1);
+  }
+}
+
 TEST_F(DevicePicture, OfASceneWithoutVisibleChannelsIsTransparent) {
   const auto volume = mixedVolume();
   Scene scene = obliqueScene(*volume, 8, 8);
   for (ChannelAppearance& channel : scene.channels) channel.visible = false;
-  const PictureAndCost picture = renderOnDevice(volume, scene, 1);
-  EXPECT_EQ(coverage(picture.image), 0);
+  const auto device = makeCudaRenderer(volume);
+  device->setScene(scene);
+  ASSERT_TRUE(device->renderSample(kNever));
+  EXPECT_EQ(coverage(device->image()), 0);
 }
 
 }  // namespace

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes that need every branch of the kernels, and their pictures by the device path.
+// Scenes that need every branch of the kernels.
 #pragma once
 #include <string>
 
-#include "cuda/launch.h"
-#include "renderer/data/film.h"
-#include "renderer/data/render_plan.h"
-#include "renderer/data/sampling.h"
+#include "cuda/cuda_launcher.h"
+#include "renderer/renderer.h"
 #include "tests/support/volumes.h"
 
 namespace scolopax::test {
@@ -45,6 +43,7 @@ inline Scene obliqueScene(const Volume& volume, int width, int height) {
   scene.width = width;
   scene.height = height;
   scene.seed = 7;
+  scene.method = Method::superposed;
   scene.camera = framingCamera(volume.grid(), 40, double(width) / height);
   scene.channels.resize(volume.channels().size());
   const glm::dvec3 colors[] = {{0.9, 0.4, 0.1}, {0.2, 0.8, 0.3}, {0.1, 0.3, 1}};
@@ -59,7 +58,7 @@ inline Scene obliqueScene(const Volume& volume, int width, int height) {
     channel.color = {{0, colors[i % 3]}, {0.6, {1, 1, 1}}, {1, colors[(i + 1) % 3]}};
     channel.visible = i < 3;
   }
-  scene.channels[1].gamma = 1.7;
+  if (scene.channels.size() > 1) scene.channels[1].gamma = 1.7;
   const glm::dvec3 centre(volume.grid().worldFromVoxel * glm::dvec4(glm::dvec3(volume.grid().dims) * 0.5, 1));
   scene.lights.resize(3);
   scene.lights[0].type = LightType::directional;
@@ -72,22 +71,14 @@ inline Scene obliqueScene(const Volume& volume, int width, int height) {
   return scene;
 }
 
-/// Picture and cost by cuda/, with whatever runtime the program is linked with.
-struct PictureAndCost {
-  Image image;
-  std::vector<kernel::SampleCost> cost;
-};
-inline PictureAndCost renderOnDevice(const std::shared_ptr<const Volume>& volume, const Scene& scene,
-                                     std::uint32_t samples) {
-  const RenderPlan plan(volume, scene);
-  Film film;
-  film.reset(scene.width, scene.height);
-  cuda::Passes passes(scene, plan.view(), true);
-  for (std::uint32_t sample = 0; sample < samples; ++sample) {
-    passes.render(sampleNumber(scene.sampling, sample), {film.pass(), film.pixelCount()});
-    film.add();
-  }
-  return {film.image(), passes.cost()};
+/// A renderer on CUDA devices of whatever runtime the program is linked with. An error of a device is one of
+/// the renderer.
+inline std::unique_ptr<Renderer> makeCudaRenderer(const std::shared_ptr<const Volume>& volume,
+                                                  const cuda::SharedDevices& devices) {
+  return makeRenderer(cuda::makeCudaLauncher(devices, 1, {.continueOnCpu = false, .log = nullptr}), volume);
+}
+inline std::unique_ptr<Renderer> makeCudaRenderer(const std::shared_ptr<const Volume>& volume) {
+  return makeCudaRenderer(volume, cuda::openDevices({0}));
 }
 
 }  // namespace scolopax::test

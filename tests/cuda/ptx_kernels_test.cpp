@@ -2,10 +2,10 @@
 // The compiled kernels themselves: all there, and every access of theirs checked.
 #include <gmock/gmock.h>
 
-#include "renderer/data/instances.h"
 #include "tests/cuda/device_scenes.h"
 #include "tests/cuda/ptx_machine.h"
 #include "tests/cuda/substitute_runtime.h"
+#include "tests/cuda/uploaded_plan.h"
 
 namespace scolopax {
 namespace {
@@ -13,25 +13,27 @@ namespace {
 using namespace test;
 
 TEST(PtxKernels, AreOneForEveryMethodBlendModeAndLight) {
-  // auto is one of the others, and hybrid is raymarch with another number in its view. Of each there is one
-  // with light and one without, and another of both for plain scenes.
-  EXPECT_EQ(ptx::kernelNames().size(), (std::size(kMethods) - 2) * std::size(kBlendModes) * 2 * 2);
+  // auto is one of the others; raymarch and hybrid share two, for equal steps and for voxel cells. Of each
+  // there is one with light and one without, and another of both for plain scenes. One more rebuilds totals.
+  EXPECT_EQ(ptx::kernelNames().size(), (std::size(kMethods) - 1) * std::size(kBlendModes) * 2 * 2 + 1);
 }
 
 TEST(PtxKernels, AreCaughtReadingAndWritingWhereTheyMayNot) {
-  const auto volume = mixedVolume();
-  const Scene scene = obliqueScene(*volume, 8, 8);
-  const RenderPlan plan(volume, scene);
-  const auto faultOf = [&](kernel::SceneView view, std::size_t pixels) {
-    const cuda::DeviceBuffer<glm::vec4> film(pixels);
-    const auto launch = cuda::chooseLaunch<kernel::Analog<kernel::Superposed>>(scene, true);
-    EXPECT_EQ(launch({view, sampleNumber(scene.sampling, 0), film.data(), nullptr}), cudaSuccess);
+  const UploadedPlan uploaded(mixedVolume(), obliqueScene(*mixedVolume(), 8, 8));
+  const auto faultOf = [&](const kernel::SceneView& view, std::size_t pixels) {
+    const ExactPixels film(pixels);
+    cuda::DeviceBand band = uploaded.band(film.data());
+    band.scene = view;
+    const Instance instance{Method::superposed, BlendMode::density, false, false};
+    const auto launch = cuda::chooseLaunch(instance, band, uploaded.plan().view().channels);
+    EXPECT_EQ(launch(band, nullptr), cudaSuccess);
     return cudaDeviceSynchronize() == cudaSuccess ? "" : substitute::lastFault();
   };
-  const cuda::DeviceScene uploaded(plan.view());
-  EXPECT_EQ(faultOf(uploaded.view(), 64), "");
-  EXPECT_THAT(faultOf(uploaded.view(), 63), testing::HasSubstr("store outside of memory"));
-  EXPECT_THAT(faultOf(plan.view(), 64), testing::HasSubstr("load outside of memory"));  // the host's pointers
+  const kernel::SceneView onDevice = uploaded.band(nullptr).scene;
+  EXPECT_EQ(faultOf(onDevice, 64), "");
+  EXPECT_THAT(faultOf(onDevice, 63), testing::HasSubstr("store outside of memory"));
+  EXPECT_THAT(faultOf(uploaded.plan().view(), 64),
+              testing::HasSubstr("load outside of memory"));  // the host's
 }
 
 TEST(PtxInstructions, OfBitFieldsInsertOneAndCutWhatIsBeyond) {
@@ -40,6 +42,13 @@ TEST(PtxInstructions, OfBitFieldsInsertOneAndCutWhatIsBeyond) {
   EXPECT_EQ(ptx::insertBits<std::uint64_t>(3, 1, 1, 63), 7u);
   EXPECT_EQ(ptx::insertBits<std::uint64_t>(~0ull, 5, 64, 4), 5u);
   EXPECT_EQ(ptx::insertBits<std::uint64_t>(~0ull, 5, 0, 0), 5u);
+}
+
+TEST(PtxInstructions, OfFunnelShiftsTakeBitsFromBothWords) {
+  EXPECT_EQ(ptx::funnelLeft(0x80000001, 0x12345678, 4), 0x23456788u);
+  EXPECT_EQ(ptx::funnelLeft(0x80000001, 0x12345678, 32), 0x12345678u);
+  EXPECT_EQ(ptx::funnelRight(0x80000001, 0x12345678, 4), 0x88000000u);
+  EXPECT_EQ(ptx::funnelRight(0x80000001, 0x12345678, 32), 0x80000001u);
 }
 
 TEST(PtxMemory, IsWhatAThreadOwnsAlignedAndOnlyWhileItDoes) {

@@ -202,4 +202,12 @@ T insertBits(T field, T into, std::uint32_t position, std::uint32_t length) {
   return into;
 }
 
+/// The upper or lower word of high:low, shifted by the lowest five bits of `by`.
+inline std::uint32_t funnelLeft(std::uint32_t low, std::uint32_t high, std::uint32_t by) {
+  return std::uint32_t(((std::uint64_t(high) << 32 | low) << (by & 31)) >> 32);
+}
+inline std::uint32_t funnelRight(std::uint32_t low, std::uint32_t high, std::uint32_t by) {
+  return std::uint32_t((std::uint64_t(high) << 32 | low) >> (by & 31));
+}
+
 }  // namespace ptx

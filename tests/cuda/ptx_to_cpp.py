@@ -361,6 +361,13 @@ class FunctionTranslator:
         position, length = (self.value(operand, "u32") for operand in operands[3:5])
         return self.assign(operands[0], type_name, f"ptx::insertBits({field}, {into}, {position}, {length})")
 
+    def do_shf(self, modifiers, operands):
+        if modifiers not in (["l", "wrap", "b32"], ["r", "wrap", "b32"]):
+            raise Refused("funnel shift that is not of 32 bits and wrapping")
+        low, high, by = (self.value(operand, "u32") for operand in operands[1:4])
+        name = "funnelLeft" if modifiers[0] == "l" else "funnelRight"
+        return self.assign(operands[0], "u32", f"ptx::{name}({low}, {high}, {by})")
+
     def do_popc(self, modifiers, operands):
         count = f"std::popcount({self.value(operands[1], plain(modifiers[-1]))})"
         return self.assign(operands[0], "u32", f"std::uint32_t({count})")

@@ -12,6 +12,8 @@ import urllib.error
 import urllib.request
 
 PROGRAM = os.environ["SCOLOPAX"]
+# What renders in the servers of these tests.
+DEVICE = os.environ.get("SCOLOPAX_TEST_DEVICE", "cpu")
 
 
 def write_volume(folder, name="blob", size=16, channels=("a", "b")):
@@ -52,11 +54,12 @@ class Server:
     """`with Server("--max-sessions", "2") as server:` runs on a free loopback port and is ended by SIGTERM. `tls`: the
     client's context for a server with a certificate."""
 
-    def __init__(self, *options, environment=None, paths=None, port=True, tls=None):
+    def __init__(self, *options, environment=None, paths=None, port=True, tls=None, device=DEVICE):
         self.tls = tls
         self.folder = tempfile.TemporaryDirectory()
         paths = write_volume(self.folder.name) if paths is None else paths
-        command = [PROGRAM, "serve", *paths, *(["--port", "0"] if port else []), *options]
+        command = [PROGRAM, "serve", *paths, *(["--port", "0"] if port else []), "--device", device,
+                   *options]
         clean = {k: v for k, v in os.environ.items() if not k.startswith("SCOLOPAX_")}
         self.log = open(os.path.join(self.folder.name, "log"), "w+", encoding="utf-8")
         self.process = subprocess.Popen(

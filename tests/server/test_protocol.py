@@ -14,7 +14,7 @@ import websockets
 sys.path.insert(0, os.path.dirname(__file__))
 from protocol_client import (FINAL, PATIENCE, Frame, Proxy, Viewer, apply_patch, call, call_json, connect,  # noqa: E402
                              png_colors, png_size)
-from serving import Server  # noqa: E402
+from serving import DEVICE, Server  # noqa: E402
 
 FIXTURES = os.path.join(os.path.dirname(__file__), "..", "..", "protocol", "fixtures")
 SMALL = {"width": 64, "height": 48}
@@ -97,7 +97,7 @@ class DataSets(unittest.TestCase):
 class Description(unittest.TestCase):
     def test_capabilities_hold_what_is_documented(self):
         status, told = call_json(server, "GET", "/api/v1/capabilities")
-        self.assertEqual((status, told["protocolVersion"], told["backend"]), (200, 1, "cpu"))
+        self.assertEqual((status, told["protocolVersion"], told["backend"]), (200, 1, DEVICE))
         parts = call_json(server, "GET", "/api/v1/schema.json")[1]["$defs"]
         for list_name, part, field in (("methods", "Integrator", "method"), ("blendModes", "Blend", "mode"),
                                        ("filters", "ImageSettings", "filter"),

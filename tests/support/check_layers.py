@@ -31,7 +31,7 @@ LIBRARIES = [
     (r"OpenImageIO/", ["renderer/io/", "renderer/data/colormap.cpp"]),
     (r"nifti|teem/", ["renderer/io/"]),
     (r"turbojpeg\.h", ["server/encoder.cpp"]),
-    (r"tbb/|oneapi/", ["renderer/"]),
+    (r"tbb/|oneapi/", ["renderer/", "cuda/"]),
 ]
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
 

@@ -3,8 +3,8 @@
 
 #include <cstring>
 
-#include "renderer/renderer.h"
 #include "tests/cuda/device_scenes.h"
+#include "tests/cuda/uploaded_plan.h"
 
 namespace scolopax::test {
 
@@ -13,19 +13,16 @@ int differenceOfOneInstance() {
   Scene scene = obliqueScene(*volume, 21, 35);  // of no size that blocks of threads fill
   scene.method = Method::syncDda;
   scene.shading = scene.shadows = true;
-  const RenderPlan plan(volume, scene);
-  const cuda::DeviceScene uploaded(plan.view());
-  const cuda::DeviceBuffer<glm::vec4> pixels(std::size_t(scene.width) * std::size_t(scene.height));
-  cuda::check(oneInstance()({uploaded.view(), sampleNumber(scene.sampling, 0), pixels.data(), nullptr}),
-              "starting a kernel");
+  const UploadedPlan uploaded(volume, scene);
+  std::vector<glm::vec4> found(std::size_t(scene.width) * std::size_t(scene.height));
+  const ExactPixels pixels(found.size());
+  cuda::check(oneInstance()(uploaded.band(pixels.data()), nullptr), "starting a kernel");
   cuda::check(cudaDeviceSynchronize(), "rendering");
-  std::vector<glm::vec4> found(pixels.count());
   pixels.copyTo(found);
 
   const auto cpu = makeCpuRenderer(volume, 1);
   cpu->setScene(scene);
-  const std::atomic<bool> never = false;
-  cpu->renderSample(never);
+  cpu->renderSample(kNever);
   const Image expected = cpu->image();
   int different = 0;
   for (std::size_t i = 0; i < found.size(); ++i)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One instance of the kernels, for builds that are wrong on purpose.
+#define SCOLOPAX_PLAIN_SCENES
 #include "tests/cuda/controls/one_instance.h"
 
 #include "cuda/pixel_kernels.h"

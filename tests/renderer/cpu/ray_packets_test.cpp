@@ -170,9 +170,10 @@ class RayPackets : public testing::TestWithParam<InstructionSet> {
     scene_ = scene;
     plan_.emplace(volume, scene);
     view_ = plan_->view();
-    tiles_ = packetTileFunction(scene, view_, GetParam());
+    tiles_ = packetTileFunction(instance(), view_, GetParam());
     return tiles_ != nullptr;
   }
+  Instance instance() const { return instanceOf(scene_.method, scene_.blend, view_); }
   std::size_t count() const { return std::size_t(scene_.width) * std::size_t(scene_.height); }
 
   /// Renders the pixels that are not done; the others get 3.
@@ -180,7 +181,9 @@ class RayPackets : public testing::TestWithParam<InstructionSet> {
     const std::atomic<bool> never = false;
     Picture picture{std::vector<glm::vec4>(count(), glm::vec4(3)), std::vector<kernel::SampleCost>(count()),
                     std::vector<kernel::FirstCollision>(count())};
-    const Pass pass{view_,
+    const Pass pass{&*plan_,
+                    scene_.method,
+                    view_,
                     sampleNumber(scene_.sampling, sample),
                     picture.pixels.data(),
                     picture.cost.data(),
@@ -198,9 +201,9 @@ class RayPackets : public testing::TestWithParam<InstructionSet> {
                     std::vector<kernel::FirstCollision>(count())};
     const kernel::SampleNumber number = sampleNumber(scene_.sampling, sample);
     const auto renderAll = [&]<class Steps>(std::type_identity<Steps>) {
-      visitBlendAndLight(scene_, [&](auto blend, auto features) {
+      visitBlendAndLight(instance(), [&](auto blend, auto lighting) {
         const kernel::RenderPixel<kernel::RayMarch<Steps>, typename decltype(blend)::type,
-                                  typename decltype(features)::type>
+                                  typename decltype(lighting)::type>
             render{view_, number, picture.pixels.data(), picture.cost.data(), picture.first.data()};
         for (int pixel = 0; pixel < int(count()); ++pixel)
           if (!done[std::size_t(pixel)]) render(pixel);
@@ -351,7 +354,7 @@ TEST_P(RayPackets, LeaveWhatTheyCannotDoToSingleRays) {
   for (const BlendMode blend : {BlendMode::density, BlendMode::max, BlendMode::mix, BlendMode::composite})
     EXPECT_TRUE(takes([&](Scene& s) { s.blend = blend; })) << nameOf(blend);
   view_.majorants.cells = glm::ivec3(1024);
-  EXPECT_EQ(packetTileFunction(scene_, view_, GetParam()), nullptr);
+  EXPECT_EQ(packetTileFunction(instance(), view_, GetParam()), nullptr);
   EXPECT_FALSE(takes([](Scene& s) { s.method = Method::superposed; }));
 }
 

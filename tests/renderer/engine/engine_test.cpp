@@ -374,6 +374,8 @@ TEST(CpuRenderer, TellsWhichScenesTakeLong) {
   };
   EXPECT_FALSE(with([](Scene& s) { s.channels[0].density *= 2; }));
   EXPECT_FALSE(with([](Scene& s) { s.width *= 2; }));
+  EXPECT_FALSE(with([](Scene& s) { s.channels[0].opacity.assign(1000, {0.5, 1}); }));
+  EXPECT_TRUE(with([](Scene& s) { s.channels[0].opacity.assign(3000, {0.5, 1}); }));
   EXPECT_TRUE(with([](Scene& s) { s.macrocell = 2; }));
   EXPECT_TRUE(with([](Scene& s) { s.method = Method::automatic; }));
   EXPECT_TRUE(with([](Scene& s) { s.width = s.height = 1024; }));

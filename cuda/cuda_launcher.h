@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Renders on CUDA devices. What a program needs to know of this folder is here; in a build without nvcc there
+// are no devices.
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "renderer/launcher.h"
+
+namespace scolopax::cuda {
+
+struct DeviceInfo {
+  int index;
+  std::string name;
+  int major, minor;  ///< compute capability
+  std::uint64_t memoryBytes, freeBytes;
+};
+
+/// The usable devices. None without a driver, with a driver that is too old, or after any other error; `why`,
+/// if given, then says so in a few words.
+std::vector<DeviceInfo> devices(std::string* why = nullptr);
+
+class Device;
+/// Devices that all launchers of a program share.
+using SharedDevices = std::vector<std::shared_ptr<Device>>;
+SharedDevices openDevices(const std::vector<int>& indexes);
+
+/// What to do once a device has failed: a failure of the device is one of the whole process.
+struct DeviceFailure {
+  bool continueOnCpu = true;  ///< otherwise Error(device) is thrown, at every launch
+  std::function<void(const std::string&)> log;
+};
+
+/// Bands of a picture's rows go to whichever of the devices is free. `threads`: of the CPU, for everything
+/// but kernels; 0 means all.
+std::unique_ptr<Launcher> makeCudaLauncher(SharedDevices devices, int threads, DeviceFailure failure = {});
+
+}  // namespace scolopax::cuda

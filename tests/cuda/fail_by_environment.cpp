@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lets a test of the whole program have the device fail: at call number FAIL_CALL of the runtime.
+#include <cstdlib>
+
+#include "tests/cuda/substitute_runtime.h"
+
+namespace {
+
+const bool kDone = [] {
+  if (const char* call = std::getenv("FAIL_CALL"))
+    substitute::failCall(std::strtoul(call, nullptr, 10), cudaErrorIllegalAddress);
+  return true;
+}();
+
+}  // namespace

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+// The CUDA launcher against a runtime that fails, runs out of memory and loses devices on request.
+#include "cuda/cuda_launcher.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "renderer/core/error.h"
+#include "tests/cuda/device_scenes.h"
+#include "tests/cuda/substitute_runtime.h"
+
+namespace scolopax {
+namespace {
+
+using namespace test;
+
+/// Every test begins and ends with a runtime of which nothing is in use.
+class CudaLauncher : public testing::Test {
+ protected:
+  void SetUp() override { ASSERT_TRUE(substitute::reset()); }
+  void TearDown() override {
+    EXPECT_EQ(substitute::leaks(), substitute::Leaks());
+    EXPECT_TRUE(substitute::reset());
+  }
+};
+
+/// Of one channel, so that there is little to upload.
+Scene smallScene(const Volume& volume) {
+  Scene scene = obliqueScene(volume, 16, 24);
+  for (std::size_t i = 1; i < scene.channels.size(); ++i) scene.channels[i].visible = false;
+  return scene;
+}
+
+Image rendered(Renderer& renderer, const Scene& scene, int samples = 2) {
+  renderer.setScene(scene);
+  for (int i = 0; i < samples; ++i) EXPECT_TRUE(renderer.renderSample(kNever));
+  return renderer.image();
+}
+
+void expectSamePicture(const Image& found, const Image& expected) {
+  ASSERT_EQ(found.pixels.size(), expected.pixels.size());
+  EXPECT_EQ(std::memcmp(found.pixels.data(), expected.pixels.data(), found.pixels.size() * sizeof(glm::vec4)),
+            0);
+}
+
+Image pictureOfTheCpu(const std::shared_ptr<const Volume>& volume, const Scene& scene, int samples = 2) {
+  return rendered(*makeCpuRenderer(volume, 1), scene, samples);
+}
+
+TEST_F(CudaLauncher, HasNoDevicesWhenTheDriverIsMissingOrTooOld) {
+  ASSERT_EQ(cuda::devices().size(), 1u);
+  EXPECT_EQ(cuda::devices()[0].index, 0);
+  EXPECT_GT(cuda::devices()[0].memoryBytes, 0u);
+  substitute::setDeviceCount(cudaErrorInsufficientDriver, 7);
+  std::string why;
+  EXPECT_TRUE(cuda::devices(&why).empty());
+  EXPECT_FALSE(why.empty());
+  EXPECT_EQ(cudaGetLastError(), cudaSuccess);
+}
+
+TEST_F(CudaLauncher, ThatDoesNotFitTheDeviceSaysSoAndRendersOnceThereIsMemory) {
+  const auto volume = mixedVolume();
+  const Scene scene = obliqueScene(*volume, 24, 24);
+  const Image expected = pictureOfTheCpu(volume, scene);
+  int failures = 0;
+  bool fits = false;
+  // Every allocation in turn is the first that fails.
+  for (std::size_t limit = 0; !fits; limit += 16384) {
+    const auto renderer = makeCudaRenderer(volume);
+    substitute::limitMemory(limit);
+    try {
+      rendered(*renderer, scene);
+      fits = true;
+    } catch (const Error& error) {
+      ++failures;
+      EXPECT_EQ(error.code(), ErrorCode::tooLarge);
+      EXPECT_STREQ(error.what(), "CUDA: allocating device memory failed: out of memory");
+      substitute::limitMemory(std::size_t(1) << 32);
+      expectSamePicture(rendered(*renderer, scene), expected);
+    }
+  }
+  EXPECT_GT(failures, 5);
+}
+
+TEST_F(CudaLauncher, OfAnotherSessionIsUnharmedWhenMemoryIsShort) {
+  const auto volume = mixedVolume();
+  const Scene scene = smallScene(*volume);
+  const auto devices = cuda::openDevices({0});
+  const auto first = makeCudaRenderer(volume, devices), second = makeCudaRenderer(volume, devices);
+  rendered(*first, scene, 1);
+  substitute::limitMemory(0);
+  EXPECT_THROW(rendered(*second, obliqueScene(*volume, 16, 24), 1), Error);
+  ASSERT_TRUE(first->renderSample(kNever));
+  expectSamePicture(first->image(), pictureOfTheCpu(volume, scene));
+}
+
+TEST_F(CudaLauncher, MakesRoomByForgettingVolumesThatNobodyRenders) {
+  const glm::ivec3 dims(160);  // 4 MiB
+  const auto volume = [&](int seed) {
+    return volumeOf(gridOf(dims), channelOf<std::uint8_t>(
+                                      dims, [&](int x, int y, int z) { return (x * y + z + seed) % 251; }));
+  };
+  const auto devices = cuda::openDevices({0});
+  substitute::limitMemory(std::size_t{12}
+                          << 20);  // with bands and macrocells, for one volume but not for two
+  for (int i = 0; i < 3; ++i) {
+    const auto each = volume(i);
+    Scene scene = obliqueScene(*each, 16, 16);
+    const auto renderer = makeCudaRenderer(each, devices);
+    expectSamePicture(rendered(*renderer, scene), pictureOfTheCpu(each, scene));
+  }
+}
+
+// Whichever call fails: either the device fails as a whole, and the picture is made on the CPU, or it is an
+// error of memory and the next attempt succeeds.
+TEST_F(CudaLauncher, GoesOnOnTheCpuWhicheverCallFails) {
+  const auto volume = mixedVolume();
+  const Scene scene = smallScene(*volume);
+  const Image expected = pictureOfTheCpu(volume, scene);
+  const auto attempt = [&](std::size_t call) {
+    int lines = 0;
+    std::unique_ptr<Renderer> renderer;
+    try {
+      renderer = makeRenderer(
+          cuda::makeCudaLauncher(cuda::openDevices({0}), 1,
+                                 {.continueOnCpu = true, .log = [&](const std::string&) { ++lines; }}),
+          volume);
+    } catch (const Error&) {
+      return false;  // before there was a renderer
+    }
+    substitute::failCall(call, cudaErrorIllegalAddress);
+    const std::size_t before = substitute::callCount();
+    expectSamePicture(rendered(*renderer, scene), expected);
+    const bool failed = renderer->backendName() == "cpu";
+    EXPECT_EQ(lines, failed ? 1 : 0);
+    EXPECT_EQ(failed, substitute::callCount() - before >= call) << call;
+    substitute::failCall(0, cudaSuccess);
+    return failed;
+  };
+  std::size_t call = 1;
+  while (attempt(call)) ++call;
+  EXPECT_GT(call, 30u);
+}
+
+TEST_F(CudaLauncher, EndsInWordsWhenADeviceIsLostIfThatIsWanted) {
+  const auto volume = mixedVolume();
+  const Scene scene = smallScene(*volume);
+  const auto renderer = makeCudaRenderer(volume);
+  rendered(*renderer, scene, 1);
+  substitute::loseDevice(0);
+  for (int i = 0; i < 2; ++i) {
+    try {
+      renderer->renderSample(kNever);
+      ADD_FAILURE() << "no error";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::device);
+      EXPECT_EQ(std::string(error.what()).substr(0, 6), "CUDA: ");
+    }
+  }
+}
+
+TEST_F(CudaLauncher, ReportsWhatAKernelDidWrong) {
+  const auto volume = mixedVolume();
+  const auto renderer = makeCudaRenderer(volume);
+  renderer->setScene(smallScene(*volume));
+  substitute::reportFault("as a test");
+  try {
+    renderer->renderSample(kNever);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::device);
+  }
+}
+
+TEST_F(CudaLauncher, UploadsAVolumeOnceAndOnlyChannelsThatAreVisible) {
+  const glm::ivec3 dims(64);
+  const auto volume = volumeOf(
+      gridOf(dims), channelOf<std::uint8_t>(dims, [](int x, int y, int z) { return 90 + x + y - z; }),
+      channelOf<std::uint8_t>(dims, [](int x, int y, int z) { return 100 + x - y + z; }));
+  const std::size_t plane = 64 * 64 * 64;
+  Scene scene = obliqueScene(*volume, 16, 16);
+  scene.channels[1].visible = false;
+  const auto devices = cuda::openDevices({0});
+  const auto first = makeCudaRenderer(volume, devices), second = makeCudaRenderer(volume, devices);
+  auto moved = [before = std::size_t(0)]() mutable {
+    return substitute::bytesToDevice() - std::exchange(before, substitute::bytesToDevice());
+  };
+  moved();
+  EXPECT_TRUE(first->takesLong(scene));
+  rendered(*first, scene, 1);
+  const std::size_t once = moved();
+  EXPECT_GE(once, plane);
+  EXPECT_LT(once, 2 * plane);
+  rendered(*second, scene, 1);
+  EXPECT_LT(moved(), plane);
+  scene.channels[1].visible = true;
+  EXPECT_TRUE(second->takesLong(scene));
+  rendered(*second, scene, 1);
+  EXPECT_GE(moved(), plane);
+  // The camera alone.
+  scene.camera.eye.x += 1;
+  EXPECT_FALSE(second->takesLong(scene));
+  rendered(*second, scene, 1);
+  EXPECT_LT(moved(), 4096u);
+}
+
+TEST_F(CudaLauncher, MovesLessThan100KilobytesForAnEditOfACurve) {
+  const glm::ivec3 dims(256);
+  const auto channel = [&](int shift) {
+    return channelOf<std::uint8_t>(dims, [&](int x, int y, int z) { return (x + y * shift + z) >> 2; });
+  };
+  const auto volume = volumeOf(gridOf(dims), channel(1), channel(2), channel(0), channel(1));
+  Scene scene = obliqueScene(*volume, 16, 16);
+  scene.channels[3].visible = true;
+  const auto renderer = makeCudaRenderer(volume);
+  rendered(*renderer, scene, 1);
+  const std::size_t before = substitute::bytesToDevice();
+  scene.channels[2].opacity = {{0.2, 0}, {0.5, 0.9}, {1, 0.1}};
+  scene.channels[2].density = 2;
+  renderer->setScene(scene);
+  EXPECT_LT(substitute::bytesToDevice() - before, 100'000u);
+  ASSERT_TRUE(renderer->renderSample(kNever));
+  EXPECT_LT(substitute::bytesToDevice() - before, 100'000u);
+  expectSamePicture(renderer->image(), pictureOfTheCpu(volume, scene, 1));
+}
+
+TEST_F(CudaLauncher, ContinuesWhereACancelledPassEnded) {
+  const auto volume = mixedVolume();
+  const Scene scene = obliqueScene(*volume, 40, 60);
+  const auto renderer = makeCudaRenderer(volume);
+  renderer->setScene(scene);
+  const std::atomic<bool> cancelled{true};
+  EXPECT_FALSE(renderer->renderSample(cancelled));
+  EXPECT_EQ(renderer->samples(), 0u);
+  int slices = 1;
+  while (!renderer->renderSample(kNever, std::chrono::nanoseconds(1)) && slices < 100) ++slices;
+  // A pass whose time is over renders nothing.
+  EXPECT_EQ(slices, 100);
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(renderer->renderSample(kNever));
+  expectSamePicture(renderer->image(), pictureOfTheCpu(volume, scene));
+}
+
+TEST_F(CudaLauncher, DividesAPictureAmongDevices) {
+  substitute::setDeviceCount(cudaSuccess, 3);
+  ASSERT_EQ(cuda::devices().size(), 3u);
+  const auto volume = mixedVolume();
+  Scene scene = obliqueScene(*volume, 600, 300);  // more than one band each
+  scene.channels[0].density = scene.channels[1].density = 0.05;
+  const auto renderer = makeCudaRenderer(volume, cuda::openDevices({0, 2}));
+  renderer->recordAovs();
+  expectSamePicture(rendered(*renderer, scene, 1), pictureOfTheCpu(volume, scene, 1));
+  int on[3] = {};
+  for (const substitute::Allocation& allocation : substitute::allocations()) ++on[allocation.device];
+  EXPECT_GT(on[0], 0);
+  EXPECT_EQ(on[1], 0);
+  EXPECT_GT(on[2], 0);
+}
+
+}  // namespace
+}  // namespace scolopax
