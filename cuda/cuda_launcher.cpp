@@ -67,10 +67,13 @@ class CudaLauncher final : public Launcher {
           throw Error(ErrorCode::cancelled, "the upload was cancelled");
     });
   }
-  bool uploadTakesLong(const std::shared_ptr<const Volume>& volume, const Scene& scene) const override {
+  bool uploadTakesLong(const RenderPlan& before, const Scene& scene) const override {
     return !onCpu() && std::any_of(devices_.begin(), devices_.end(), [&](const auto& device) {
-      for (std::size_t i = 0; i < scene.channels.size(); ++i)
-        if (scene.channels[i].visible && !device->volume(volume)->has(int(i))) return true;
+      const auto& channels = before.scene().channels;
+      for (std::size_t i = 0; i < scene.channels.size() && i < channels.size(); ++i)
+        if (scene.channels[i].visible && scene.channels[i] != channels[i] &&
+            !device->volume(before.volume())->has(int(i)))
+          return true;
       return false;
     });
   }

@@ -44,8 +44,9 @@ class Launcher {
   /// Moves a plan to the device, if there is one, so that launching its passes does not have to. Throws
   /// Error(cancelled) once `stop` is requested, and Error(tooLarge).
   virtual void upload(const std::shared_ptr<const RenderPlan>& plan, const std::stop_token& stop) = 0;
-  /// Whether uploading a plan of the scene would take longer than a few milliseconds.
-  virtual bool uploadTakesLong(const std::shared_ptr<const Volume>& volume, const Scene& scene) const = 0;
+  /// Whether uploading a plan of the scene would take longer than a few milliseconds. `before` is a plan of
+  /// the same volume that has been uploaded.
+  virtual bool uploadTakesLong(const RenderPlan& before, const Scene& scene) const = 0;
   /// Renders the pixels of a pass that are not yet done. Returns false if pixels are left because `cancel`
   /// became true or the deadline passed. Rays end early once `cancel` is true; the deadline is looked at
   /// between rays, so that one that takes longer than a turn is completed. Runs in the caller's thread arena:

@@ -31,7 +31,7 @@ class CpuLauncher final : public Launcher {
   void run(const std::function<void()>& f) override { arena_.execute(f); }
 
   void upload(const std::shared_ptr<const RenderPlan>&, const std::stop_token&) override {}
-  bool uploadTakesLong(const std::shared_ptr<const Volume>&, const Scene&) const override { return false; }
+  bool uploadTakesLong(const RenderPlan&, const Scene&) const override { return false; }
 
   bool launch(const Pass& given) override {
     Pass pass = given;

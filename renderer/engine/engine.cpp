@@ -67,7 +67,7 @@ class Engine final : public Renderer {
     const bool largeFilm = std::max(pixels, film_.pixelCount()) >= kLargePicture &&
                            (pixels != film_.pixelCount() || recording_ || counting_);
     return largeFilm || scene.method == Method::automatic || !plan_ || plan_->nextTakesLong(scene) ||
-           launcher_->uploadTakesLong(volume_, scene);
+           launcher_->uploadTakesLong(*plan_, scene);
   }
   Choice choice() const override {
     const Scene& scene = plan_->scene();

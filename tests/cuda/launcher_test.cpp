@@ -175,9 +175,12 @@ TEST_F(CudaLauncher, ReportsWhatAKernelDidWrong) {
 
 TEST_F(CudaLauncher, UploadsAVolumeOnceAndOnlyChannelsThatAreVisible) {
   const glm::ivec3 dims(64);
-  const auto volume = volumeOf(
-      gridOf(dims), channelOf<std::uint8_t>(dims, [](int x, int y, int z) { return 90 + x + y - z; }),
-      channelOf<std::uint8_t>(dims, [](int x, int y, int z) { return 100 + x - y + z; }));
+  const auto wave = [&] {
+    return volumeOf(gridOf(dims),
+                    channelOf<std::uint8_t>(dims, [](int x, int y, int z) { return 90 + x + y - z; }),
+                    channelOf<std::uint8_t>(dims, [](int x, int y, int z) { return 100 + x - y + z; }));
+  };
+  const auto volume = wave(), otherVolume = wave();
   const std::size_t plane = 64 * 64 * 64;
   Scene scene = obliqueScene(*volume, 16, 16);
   scene.channels[1].visible = false;
@@ -198,6 +201,16 @@ TEST_F(CudaLauncher, UploadsAVolumeOnceAndOnlyChannelsThatAreVisible) {
   EXPECT_TRUE(second->takesLong(scene));
   rendered(*second, scene, 1);
   EXPECT_GE(moved(), plane);
+  // A channel of which nothing can be seen is not needed.
+  const auto third = makeCudaRenderer(otherVolume, devices);
+  Scene transparent = scene;
+  transparent.channels[1].opacity = {{0, 0}};
+  rendered(*third, transparent, 1);
+  transparent.camera.eye.x += 1;
+  EXPECT_FALSE(third->takesLong(transparent));
+  transparent.channels[1].opacity = {{0, 1}};
+  EXPECT_TRUE(third->takesLong(transparent));
+  moved();
   // The camera alone.
   scene.camera.eye.x += 1;
   EXPECT_FALSE(second->takesLong(scene));
