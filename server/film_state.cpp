@@ -7,9 +7,12 @@
 namespace scolopax::server {
 
 bool FilmState::stale(const RenderRequest& request) const {
-  // When edits have stopped, the resolution returns to full in steps; a film that already has it continues.
+  // When edits have stopped, the resolution returns to full in steps; a film that already has it continues,
+  // if it was drawn with the scene's own method.
   const bool finerDue = divisor != 1 && (small || restShown || !request.pollSamples.empty());
-  return !scene || request.revision != revision || (!request.interactive && finerDue) ||
+  // While edits arrive, `auto` is drawn with a fixed step (drawnScene), whose bias no samples reduce.
+  const bool methodDue = small && scene && scene->render.method == Method::automatic;
+  return !scene || request.revision != revision || (!request.interactive && (finerDue || methodDue)) ||
          (request.aovs && !recording);
 }
 

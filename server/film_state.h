@@ -34,7 +34,8 @@ struct FilmState {
   std::uint32_t shownFailures = 0;  ///< the session's failures when that frame was made
   TimePoint shownAt;
 
-  /// Whether the request needs a new film: for another scene, a finer resolution, or AOVs.
+  /// Whether the request needs a new film: for another scene, a finer resolution, the scene's own method, or
+  /// AOVs.
   bool stale(const RenderRequest& request) const;
   /// Whether a pass whose scene is stale continues, up to RenderPolicy::shield: the first pass of a film
   /// begun while edits arrived, and the first after an abandoned pass. So pictures are shown however fast

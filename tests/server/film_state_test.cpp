@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "tests/server/fakes.h"
 
 namespace scolopax::server {
@@ -31,6 +33,11 @@ TEST(FilmState, IsStaleForAnotherRevisionAndWhenAFinerPictureIsDue) {
   e.request.revision = 1;
   e.request.interactive = false;
   EXPECT_FALSE(e.film.stale(e.request));  // it has full size
+  const auto automatic = std::make_shared<ResolvedScene>();
+  automatic->render.method = Method::automatic;
+  const auto scene = std::exchange(e.film.scene, automatic);
+  EXPECT_TRUE(e.film.stale(e.request));  // drawn with the step of edits, not with what auto chooses
+  e.film.scene = scene;
   e.film.divisor = 2;
   EXPECT_TRUE(e.film.stale(e.request));
   e.film.small = false;
