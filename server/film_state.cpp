@@ -9,16 +9,16 @@ namespace scolopax::server {
 bool FilmState::stale(const RenderRequest& request) const {
   // When edits have stopped, the resolution returns to full in steps; a film that already has it continues,
   // if it was drawn with the scene's own method.
-  const bool finerDue = divisor != 1 && (small || restShown || !request.pollSamples.empty());
+  const bool finerDue = divisor != 1 && (begunInteractive || restShown || !request.pollSamples.empty());
   // While edits arrive, `auto` is drawn with a fixed step (drawnScene), whose bias no samples reduce.
-  const bool methodDue = small && scene && scene->render.method == Method::automatic;
+  const bool methodDue = begunInteractive && scene && scene->render.method == Method::automatic;
   return !scene || request.revision != revision || (!request.interactive && (finerDue || methodDue)) ||
          (request.aovs && !recording);
 }
 
-bool FilmState::keepsPass(const RenderRequest& request, const RenderPolicy& policy, TimePoint now) const {
-  return unfinished && shown.revision != revision && ((request.interactive && small) || abandoned) &&
-         now - passBegan < policy.shield;
+bool FilmState::shieldsPass(const RenderRequest& request, const RenderPolicy& policy, TimePoint now) const {
+  return unfinished && shown.revision != revision &&
+         ((request.interactive && begunInteractive) || abandoned) && now - passBegan < policy.shield;
 }
 
 bool FilmState::firstOfEdit(const RenderRequest& request) const {
@@ -26,7 +26,7 @@ bool FilmState::firstOfEdit(const RenderRequest& request) const {
 }
 
 bool FilmState::lateForEdit(const RenderRequest& request, const RenderPolicy& policy) const {
-  return unfinished && small && firstOfEdit(request) && divisor < kMostDivisor &&
+  return unfinished && begunInteractive && firstOfEdit(request) && divisor < kMostDivisor &&
          passSeconds >= std::chrono::duration<double>(policy.tooLate).count();
 }
 

@@ -22,7 +22,7 @@ struct FilmState {
   std::uint32_t revision = 0;                  ///< of that scene
   double divisor = 1;                          ///< of width and height
   bool recording = false;                      ///< the renderer keeps AOVs
-  bool small = false;                          ///< the film was begun while edits arrived
+  bool begunInteractive = false;               ///< the film was begun while edits arrived
   bool restShown = false;                      ///< the film has been shown since edits stopped
 
   bool unfinished = false;  ///< a pass was interrupted or has used up its slice
@@ -40,10 +40,11 @@ struct FilmState {
   /// Whether a pass whose scene is stale continues, up to RenderPolicy::shield: the first pass of a film
   /// begun while edits arrived, and the first after an abandoned pass. So pictures are shown however fast
   /// edits come.
-  bool keepsPass(const RenderRequest& request, const RenderPolicy& policy, TimePoint now) const;
+  bool shieldsPass(const RenderRequest& request, const RenderPolicy& policy, TimePoint now) const;
   /// Whether edits arrive and the newest one has not been shown yet.
   bool firstOfEdit(const RenderRequest& request) const;
-  /// Whether that picture takes longer than RenderPolicy::tooLate and can be restarted at a lower resolution.
+  /// Whether the first picture after an edit takes longer than RenderPolicy::tooLate and can be restarted at
+  /// a lower resolution.
   bool lateForEdit(const RenderRequest& request, const RenderPolicy& policy) const;
   /// Whether a frame should be made of the film in its present state. None is as long as one with more
   /// samples is shown: the film was dropped meanwhile.

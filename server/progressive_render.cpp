@@ -161,14 +161,14 @@ void ProgressiveRender::supervise() {
   if (!job_ || job_->done()) return;
   const bool useless =
       taking_ ? taking_->uselessFor(request)
-      : part_ ? film_.stale(request) && !film_.keepsPass(request, context_.policy, context_.now())
+      : part_ ? film_.stale(request) && !film_.shieldsPass(request, context_.policy, context_.now())
               : showing_ && film_.stale(request);
   if (!request.wanted || useless) job_->cancel();
 }
 
 void ProgressiveRender::takeScene(const RenderRequest& request, const Others& others, PassResult& result) {
   pick_.forget();
-  if (film_.small && film_.unfinished && film_.scene)
+  if (film_.begunInteractive && film_.unfinished && film_.scene)
     resolution_.passGivenUp(true, filmSize(), film_.passSeconds);
   const auto volume = request.scene->dataset->volume;
   if (volume_ != volume) {
@@ -210,16 +210,15 @@ void ProgressiveRender::sceneTaken(PassResult& result) {
   film_.scene = request.scene;
   film_.revision = request.revision;
   film_.divisor = taking->divisor;
-  film_.small = request.interactive;
+  film_.begunInteractive = request.interactive;
   film_.restShown = false;
   result.built = taking->inBackground;
   result.rebuildSeconds = secondsBetween(taking->begin, context_.now());
   rebuildUs_ = microseconds(result.rebuildSeconds);
 }
 
-/// The longest turn of a first picture after an edit. While other sessions are edited, it is their pictures
-/// that wait: a pass then gets the time that it was planned for and, if that is not enough, short turns, as
-/// do the passes after it until one is completed.
+/// The longest turn of a first picture after an edit. While other sessions are edited, their first pictures
+/// have priority: this pass gets its planned time once, then short turns until a pass completes.
 std::chrono::microseconds ProgressiveRender::urgentSlice(int editedOthers) const {
   constexpr double kMargin = 1.5;  // so that a pass as long as planned needs a single turn
   const RenderPolicy& policy = context_.policy;
@@ -270,7 +269,7 @@ void ProgressiveRender::sampleAdded(PassResult& result) {
   result.pixels = filmSize();
   filmSeconds_ += result.renderSeconds;
   renderUs_ = microseconds(result.renderSeconds);
-  resolution_.passDone(film_.small, result.pixels, result.renderSeconds);
+  resolution_.passDone(film_.begunInteractive, result.pixels, result.renderSeconds);
 }
 
 void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
@@ -329,7 +328,7 @@ void ProgressiveRender::turn(const RenderRequest& request, const Others& others,
   bool took = taking_ != nullptr;
   if (collected) collect(result);
   if (!request.wanted || job_) return;
-  if ((film_.stale(request) && !film_.keepsPass(request, context_.policy, context_.now())) ||
+  if ((film_.stale(request) && !film_.shieldsPass(request, context_.policy, context_.now())) ||
       film_.lateForEdit(request, context_.policy)) {
     takeScene(request, others, result);
     took = true;

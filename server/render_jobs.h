@@ -20,7 +20,7 @@ namespace scolopax::server {
 /// picture at rest.
 Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive);
 
-/// A scene on its way into the renderer.
+/// A scene being brought into the renderer.
 struct SceneTaking {
   RenderRequest request;
   TimePoint begin;
@@ -53,7 +53,7 @@ struct PassPart {
   void render(Renderer& renderer, const Now& now, const std::stop_token& stop);
 };
 
-/// A picture on its way out of the film.
+/// A picture being made from the film.
 struct PictureMaking {
   RenderedFrame frame;
   bool interactive = false;              ///< made while edits arrive

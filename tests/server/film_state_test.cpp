@@ -21,7 +21,7 @@ struct Edited {
   Edited() {
     request.scene = film.scene = std::make_shared<const ResolvedScene>();
     request.revision = film.revision = 1;
-    request.wanted = request.interactive = film.small = true;
+    request.wanted = request.interactive = film.begunInteractive = true;
   }
 };
 
@@ -40,7 +40,7 @@ TEST(FilmState, IsStaleForAnotherRevisionAndWhenAFinerPictureIsDue) {
   e.film.scene = scene;
   e.film.divisor = 2;
   EXPECT_TRUE(e.film.stale(e.request));
-  e.film.small = false;
+  e.film.begunInteractive = false;
   EXPECT_FALSE(e.film.stale(e.request));  // an intermediate size, which is shown first
   e.film.restShown = true;
   EXPECT_TRUE(e.film.stale(e.request));
@@ -54,10 +54,10 @@ TEST(FilmState, KeepsThePassOfASmallPictureForAsLongAsItsShield) {
   e.film.unfinished = true;
   e.film.passBegan = begin;
   e.request.revision = 2;
-  EXPECT_TRUE(e.film.keepsPass(e.request, kPolicy, begin + kPolicy.shield - 1us));
-  EXPECT_FALSE(e.film.keepsPass(e.request, kPolicy, begin + kPolicy.shield));
+  EXPECT_TRUE(e.film.shieldsPass(e.request, kPolicy, begin + kPolicy.shield - 1us));
+  EXPECT_FALSE(e.film.shieldsPass(e.request, kPolicy, begin + kPolicy.shield));
   e.film.shown.revision = 1;  // the pass would only refine the picture on screen
-  EXPECT_FALSE(e.film.keepsPass(e.request, kPolicy, begin));
+  EXPECT_FALSE(e.film.shieldsPass(e.request, kPolicy, begin));
 }
 
 TEST(FilmState, IsLateOnceThePassOfAnEditHasTakenTooLong) {
