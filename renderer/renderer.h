@@ -77,6 +77,8 @@ class Renderer {
     return true;
   }
   static constexpr std::chrono::nanoseconds kNoBudget = std::chrono::hours(24 * 365);
+  /// Whether addPixels(), image() and aov() block the caller for longer than a few milliseconds.
+  virtual bool filmIsLarge() const = 0;
   virtual Choice choice() const = 0;
   /// Samples per pixel in the film.
   virtual std::uint32_t samples() const = 0;

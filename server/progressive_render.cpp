@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "renderer/core/error.h"
-#include "renderer/data/film.h"
 #include "server/render_jobs.h"
 #include "server/stop_rule.h"
 
@@ -126,8 +125,6 @@ std::uint64_t ProgressiveRender::filmSize() const {
   return std::uint64_t(scene.width) * std::uint64_t(scene.height);
 }
 
-bool ProgressiveRender::largeFilm() const { return filmSize() >= kLargePicture; }
-
 void ProgressiveRender::perform(Background* background, Background::Work work, Next next,
                                 PassResult& result) {
   if (!background) {
@@ -185,10 +182,12 @@ void ProgressiveRender::takeScene(const RenderRequest& request, const Others& ot
   taking_->scene = drawnScene(*request.scene, taking_->divisor, request.interactive);
   taking_->record = request.aovs && !film_.recording;
   taking_->renderer = renderer_;
-  taking_->inBackground = !renderer_ || renderer_->takesLong(taking_->scene);
+  // Beginning to record clears memory.
+  taking_->inBackground = !renderer_ || taking_->record || renderer_->takesLong(taking_->scene);
   Scene chosen = taking_->scene;
   if (chosen.method == Method::automatic) chosen.method = Method::hybrid;
-  taking_->onlyChooses = taking_->inBackground && renderer_ && !renderer_->takesLong(chosen);
+  taking_->onlyChooses =
+      taking_->inBackground && renderer_ && !taking_->record && !renderer_->takesLong(chosen);
   const auto build = [taking = taking_, volume, make = context_.makeRenderer](const std::stop_token& stop) {
     if (!taking->renderer) taking->renderer = make(volume);
     taking->stats = taking->renderer->setScene(taking->scene, stop);
@@ -259,7 +258,8 @@ void ProgressiveRender::partRendered(PassResult& result) {
     // So that the error is known when it is needed; if estimating it takes long, show() does it.
     if (estimate && !renderer->errorTakesLong()) renderer->estimatedError();
   };
-  perform(largeFilm() ? &context_.background : nullptr, add, &ProgressiveRender::sampleAdded, result);
+  perform(renderer_->filmIsLarge() ? &context_.background : nullptr, add, &ProgressiveRender::sampleAdded,
+          result);
 }
 
 void ProgressiveRender::sampleAdded(PassResult& result) {
@@ -292,7 +292,7 @@ void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
   showing_->sampleError = sampleError_;
   const auto make = [showing = showing_, renderer = renderer_, pixels = filmSize(), memory = context_.memory](
                         const std::stop_token& stop) { showing->make(*renderer, pixels, memory, stop); };
-  const bool takesLong = largeFilm() || renderer_->errorTakesLong();
+  const bool takesLong = renderer_->filmIsLarge() || renderer_->errorTakesLong();
   perform(takesLong ? &context_.background : nullptr, make, &ProgressiveRender::pictureMade, result);
 }
 

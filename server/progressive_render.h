@@ -94,7 +94,6 @@ class ProgressiveRender {
   bool pickable(const RenderRequest& request) const;
   double wantedDivisor(const RenderRequest& request, int editedOthers);
   std::uint64_t filmSize() const;
-  bool largeFilm() const;
   void fail(const RenderRequest& request, const Error& error);
   void dropRenderer();
   void park();

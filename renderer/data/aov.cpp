@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/data/aov.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,6 +9,7 @@
 
 #include "renderer/data/colormap.h"
 #include "renderer/data/defaults.h"
+#include "renderer/data/pixel_loops.h"
 
 namespace scolopax {
 namespace {
@@ -79,32 +77,30 @@ void FirstCollisions::reset(std::size_t pixels, std::size_t channels) {
 }
 
 void FirstCollisions::add(std::span<const int> volumeChannels) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pass_.size(), 1 << 14), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      if (pass_[i].channel < 0) continue;
-      depthSum_[i] += double(pass_[i].depth);
-      ++hits_[i * channels_ + std::size_t(volumeChannels[std::size_t(pass_[i].channel)])];
-    }
+  forEachPixel(pass_.size(), [&](std::size_t i) {
+    if (pass_[i].channel < 0) return;
+    depthSum_[i] += double(pass_[i].depth);
+    ++hits_[i * channels_ + std::size_t(volumeChannels[std::size_t(pass_[i].channel)])];
   });
 }
 
 std::vector<float> FirstCollisions::depth() const {
   std::vector<float> depth(depthSum_.size(), kUndefined);
-  for (std::size_t i = 0; i < depth.size(); ++i) {
+  forEachPixel(depth.size(), [&](std::size_t i) {
     const auto first = hits_.begin() + std::ptrdiff_t(i * channels_);
     const auto hits = std::accumulate(first, first + std::ptrdiff_t(channels_), std::uint64_t(0));
     if (hits > 0) depth[i] = float(depthSum_[i] / double(hits));
-  }
+  });
   return depth;
 }
 
 std::vector<float> FirstCollisions::channel() const {
   std::vector<float> channel(depthSum_.size(), kUndefined);
-  for (std::size_t i = 0; i < channel.size(); ++i) {
+  forEachPixel(channel.size(), [&](std::size_t i) {
     const auto first = hits_.begin() + std::ptrdiff_t(i * channels_);
     const auto most = std::max_element(first, first + std::ptrdiff_t(channels_));
     if (*most > 0) channel[i] = float(most - first);
-  }
+  });
   return channel;
 }
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/data/film.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
@@ -13,6 +11,7 @@
 #include <new>
 
 #include "renderer/core/error.h"
+#include "renderer/data/pixel_loops.h"
 #include "renderer/kernel/rng.h"
 
 namespace scolopax {
@@ -21,14 +20,6 @@ namespace {
 static_assert(kernel::kScramblings == 2);
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kGrain = 1 << 14;
-
-template <class F>
-void forEachPixel(std::size_t pixels, const F& f) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pixels, kGrain), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) f(i);
-  });
-}
 
 /// Sum of f(i) over pixels; the same bits for any number of threads.
 template <class F>
@@ -37,8 +28,7 @@ double sumOverPixels(std::size_t pixels, const F& f) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) sum += f(i);
     return sum;
   };
-  return tbb::parallel_deterministic_reduce(tbb::blocked_range<std::size_t>(0, pixels, kGrain), 0.0, add,
-                                            std::plus<>());
+  return tbb::parallel_deterministic_reduce(pixelRange(pixels), 0.0, add, std::plus<>());
 }
 
 double squaredLength(const glm::dvec4& v) { return glm::dot(v, v); }

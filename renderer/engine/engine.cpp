@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The engine: makes render plans, owns the film, has a launcher render passes, and keeps errors, costs and
 // AOVs.
+#include <tbb/parallel_reduce.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +13,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/data/film.h"
+#include "renderer/data/pixel_loops.h"
 #include "renderer/data/render_plan.h"
 #include "renderer/data/sampling.h"
 #include "renderer/engine/corrections.h"
@@ -64,10 +67,13 @@ class Engine final : public Renderer {
   bool takesLong(const Scene& scene) const override {
     const auto pixels = std::size_t(scene.width) * std::size_t(scene.height);
     // Freeing the memory of a large film takes time, and so does clearing the records.
-    const bool largeFilm = std::max(pixels, film_.pixelCount()) >= kLargePicture &&
+    const bool largeFilm = (filmIsLarge() || filmBytes(pixels, scene) >= kLargeBytes) &&
                            (pixels != film_.pixelCount() || recording_ || counting_);
     return largeFilm || scene.method == Method::automatic || !plan_ || plan_->nextTakesLong(scene) ||
            launcher_->uploadTakesLong(*plan_, scene);
+  }
+  bool filmIsLarge() const override {
+    return plan_ && filmBytes(film_.pixelCount(), plan_->scene()) >= kLargeBytes;
   }
   Choice choice() const override {
     const Scene& scene = plan_->scene();
@@ -143,21 +149,23 @@ class Engine final : public Renderer {
     AovValues result{which, film_.width(), film_.height(), {}};
     result.values.assign(film_.pixelCount(), std::numeric_limits<float>::quiet_NaN());
     if (!recording_ || film_.samples() == 0) return result;
-    switch (which) {
-      case Aov::depth:
-        result.values = first_.depth();
-        break;
-      case Aov::transmittance:
-        result.values = film_.transmittance();
-        break;
-      case Aov::channel:
-        result.values = first_.channel();
-        break;
-      case Aov::cost:
-        std::transform(fetches_.begin(), fetches_.end(), result.values.begin(),
-                       [&](std::uint64_t n) { return float(double(n) / film_.samples()); });
-        break;
-    }
+    launcher_->run([&] {
+      switch (which) {
+        case Aov::depth:
+          result.values = first_.depth();
+          break;
+        case Aov::transmittance:
+          result.values = film_.transmittance();
+          break;
+        case Aov::channel:
+          result.values = first_.channel();
+          break;
+        case Aov::cost:
+          std::transform(fetches_.begin(), fetches_.end(), result.values.begin(),
+                         [&](std::uint64_t n) { return float(double(n) / film_.samples()); });
+          break;
+      }
+    });
     return result;
   }
 
@@ -243,16 +251,31 @@ class Engine final : public Renderer {
 
   /// Moves the costs of a pass into sums that do not overflow.
   void addCosts() {
-    stats_.rays += cost_.size();
-    for (std::size_t i = 0; i < cost_.size(); ++i) {
-      stats_.fetches += cost_[i].fetches;
-      stats_.cellSteps += cost_[i].cellSteps;
-      stats_.randomBlocks += cost_[i].randomBlocks;
-      stats_.truncatedRays += cost_[i].truncated;
-      if (recording_) fetches_[i] += cost_[i].fetches;
-      cost_[i] = {};
-    }
+    const auto add = [&](const auto& range, RenderStats sum) {
+      sum.rays += range.size();
+      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+        sum.fetches += cost_[i].fetches;
+        sum.cellSteps += cost_[i].cellSteps;
+        sum.randomBlocks += cost_[i].randomBlocks;
+        sum.truncatedRays += cost_[i].truncated;
+        if (recording_) fetches_[i] += cost_[i].fetches;
+        cost_[i] = {};
+      }
+      return sum;
+    };
+    const auto join = [](RenderStats a, const RenderStats& b) {
+      a.rays += b.rays;
+      a.fetches += b.fetches;
+      a.cellSteps += b.cellSteps;
+      a.randomBlocks += b.randomBlocks;
+      a.truncatedRays += b.truncatedRays;
+      return a;
+    };
+    stats_ = join(stats_, tbb::parallel_reduce(pixelRange(cost_.size()), RenderStats(), add, join));
   }
+
+  /// Those of a film of kLargePicture pixels without records.
+  static constexpr std::size_t kLargeBytes = kLargePicture * (Film::kPixelBytes + sizeof(std::uint8_t));
 
   const std::unique_ptr<Launcher> launcher_;
   const std::shared_ptr<MemoryBudget> budget_;

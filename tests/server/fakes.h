@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "renderer/core/error.h"
+#include "renderer/data/film.h"
 #include "server/net/web_socket.h"
 #include "server/progressive_render.h"
 #include "server/render_loop.h"
@@ -44,6 +45,7 @@ struct FakeControl {
   int renderersMade = 0;
   bool takesLong = false;                         ///< what takesLong() returns, for every scene
   bool choosingTakesLong = false;                 ///< the same, for scenes with the automatic method
+  bool filmIsLarge = false;                       ///< what filmIsLarge() returns for small pictures
   std::function<void(std::stop_token)> building;  ///< called in setScene
   std::shared_ptr<MemoryBudget> memory;           ///< from which films take memory
   std::uint64_t filmPixelBytes = 1;               ///< how much per pixel
@@ -135,6 +137,10 @@ class FakeRenderer : public Renderer {
     return true;
   }
   void addPixels() override { ++samples_; }
+  bool filmIsLarge() const override {
+    return control_->filmIsLarge ||
+           std::uint64_t(scene_.width) * std::uint64_t(scene_.height) >= kLargePicture;
+  }
   Choice choice() const override { return {scene_.method, scene_.step, {}}; }
   std::uint32_t samples() const override { return samples_; }
   double estimatedError(std::stop_token stop) const override {

@@ -342,6 +342,34 @@ TEST(RenderLoop, RendersInTheBackgroundWhatCannotBeDividedIntoTurns) {
   EXPECT_TRUE(workshop.background.waiting.empty());
 }
 
+TEST(RenderLoop, BeginsToRecordAovsInTheBackground) {
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.steps(2);
+  workshop.background.atOnce = false;
+  EXPECT_EQ(session->waitForFrame({.aovs = true}, 0ms), nullptr);
+  workshop.steps(3);
+  EXPECT_EQ(workshop.background.waiting.size(), 1u);
+  workshop.background.finish();
+  workshop.steps(3);
+  EXPECT_NE(session->latestFrame()->aovs, nullptr);
+}
+
+TEST(RenderLoop, AddsUpInTheBackgroundWhatIsLargeInBytes) {
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
+  session->addViewer(std::make_shared<FakeViewer>());
+  workshop.step();
+  workshop.background.atOnce = false;
+  workshop.step();
+  EXPECT_TRUE(workshop.background.waiting.empty());
+  workshop.control->filmIsLarge = true;
+  workshop.step();
+  EXPECT_EQ(workshop.background.waiting.size(), 1u);
+}
+
 TEST(RenderLoop, EndsAPassInTheBackgroundThatAnEditMakesUseless) {
   Workshop workshop;
   const auto session = workshop.store.create(seedPatch(1));

@@ -379,6 +379,15 @@ TEST(CpuRenderer, TellsWhichScenesTakeLong) {
   EXPECT_TRUE(with([](Scene& s) { s.macrocell = 2; }));
   EXPECT_TRUE(with([](Scene& s) { s.method = Method::automatic; }));
   EXPECT_TRUE(with([](Scene& s) { s.width = s.height = 1024; }));
+  // Smaller pictures are as large in bytes when more is kept of each pixel.
+  EXPECT_FALSE(with([](Scene& s) { s.width = s.height = 900; }));
+  EXPECT_FALSE(renderer->filmIsLarge());
+  renderer->recordAovs();
+  EXPECT_FALSE(renderer->filmIsLarge());
+  EXPECT_TRUE(with([](Scene& s) { s.width = s.height = 900; }));
+  scene.width = scene.height = 900;
+  renderer->setScene(scene);
+  EXPECT_TRUE(renderer->filmIsLarge());
 }
 
 TEST(CpuRenderer, SpendsNothingOnChannelsThatCannotBeSeen) {
