@@ -156,9 +156,9 @@ void setEncodedBody(const ApiContext& context, const net::Request& request, std:
                     const std::function<std::string(const std::stop_token&)>& encode,
                     net::Response& response) {
   inLongRequest(context, request, [&](const std::stop_token& stop) {
-    context.encoders.run(request.flow, stop, [&] {
+    context.encoders.run(request.flow, stop, [&](const std::stop_token& cancelled) {
       auto memory = MemoryBudget::take(context.memory, MemoryUse::encodings, bytes);
-      response.body = encode(stop);
+      response.body = encode(cancelled);
       memory.resize(0);
       response.heldUntilSent = context.answers.take(request.flow, response.body.size());
     });

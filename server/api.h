@@ -12,7 +12,7 @@
 
 #include "protocol/problem.h"
 #include "renderer/core/error.h"
-#include "server/answer_encoders.h"
+#include "server/background.h"
 #include "server/config.h"
 #include "server/image_types.h"
 #include "server/metrics.h"
@@ -32,7 +32,7 @@ struct ApiContext {
   SessionStore& sessions;
   StreamHub& streams;
   Metrics& metrics;
-  AnswerEncoders& encoders;
+  Background& encoders;  ///< for the pictures of answers
   MakeRenderer makeRenderer;
   std::shared_ptr<MemoryBudget> memory;  ///< also charged by the renderers that makeRenderer returns
   const UnsentAnswers& answers;
@@ -128,9 +128,9 @@ auto measuredIn(const ApiContext& context, const net::Request& request, Work&& w
   }
 }
 
-/// Sets the body to encode(stop) on one of the encoders' threads, when it is the turn of the request's flow,
-/// and charges `bytes` of memory for that. Throws what encode(), MemoryBudget::take and UnsentAnswers::take
-/// throw, and ProtocolError(503) if the client disconnects or the server stops.
+/// Sets the body to encode(stop), run by the encoders when it is the turn of the request's flow, and charges
+/// `bytes` of memory for that. Throws what encode(), MemoryBudget::take and UnsentAnswers::take throw, and
+/// ProtocolError(503) if the client disconnects or the server stops.
 void setEncodedBody(const ApiContext& context, const net::Request& request, std::uint64_t bytes,
                     const std::function<std::string(const std::stop_token&)>& encode,
                     net::Response& response);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/application.h"
 
+#include <algorithm>
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
@@ -15,6 +16,7 @@
 #include "renderer/data/colormap.h"
 #include "server/api.h"
 #include "server/auth.h"
+#include "server/background.h"
 #include "server/edit_queue.h"
 #include "server/hex_color.h"
 #include "server/loop_thread.h"
@@ -92,7 +94,9 @@ struct Application::Impl {
   const Now now = [] { return std::chrono::steady_clock::now(); };
   LoopThread renderThread, encodeThread;
   // Apart, so that what is soon done does not wait for what takes long.
-  BackgroundThreads background, builds;
+  BackgroundThreads pictures, passes{std::max<std::size_t>(1, processors() / 2)}, builds;
+  // Few, so that others' frames are not delayed.
+  BackgroundThreads encoders{std::min<std::size_t>(2, processors())};
   Metrics metrics;
   std::shared_ptr<const DatasetStore> datasets;
   std::shared_ptr<const SceneResolver> sessionResolver;
@@ -102,7 +106,6 @@ struct Application::Impl {
   EncodeLoop encodeLoop;
   json capabilities;
   StreamHub streams;
-  AnswerEncoders encoders;
   UnsentAnswers answers;
   ApiContext context;
   Authorizer authorizer;
@@ -125,11 +128,12 @@ struct Application::Impl {
         sessions(sessionResolver, {config.maxSessions, config.keepSession},
                  {now, [this] { renderThread.wake(); }, [this] { encodeThread.wake(); },
                   [this] { renderLoop.interrupt(); }}),
-        renderLoop(sessions,
-                   {makeRenderer, {}, now, log, background, builds, [this] { renderThread.wake(); }, memory},
-                   [this](const PassResult& pass) { metrics.passEnded(pass); }),
+        renderLoop(
+            sessions,
+            {makeRenderer, {}, now, log, pictures, passes, builds, [this] { renderThread.wake(); }, memory},
+            [this](const PassResult& pass) { metrics.passEnded(pass); }),
         encodeLoop(
-            sessions, now, log, background, [this] { encodeThread.wake(); }, memory),
+            sessions, now, log, pictures, [this] { encodeThread.wake(); }, memory),
         capabilities(capabilitiesJson(config, sessionResolver->lists())),
         streams(sessions, builds, metrics,
                 {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities, log}),

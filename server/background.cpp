@@ -2,11 +2,11 @@
 #include "server/background.h"
 
 #include <exception>
-#include <system_error>
 #include <utility>
 
 #include "renderer/core/error.h"
 #include "renderer/core/thread_priority.h"
+#include "renderer/core/wait_hooks.h"
 
 namespace scolopax::server {
 
@@ -28,48 +28,100 @@ void Background::Job::run() {
     promise_.set_value();
 }
 
-void Background::Job::leave() {
+void Background::Job::skip() {
   work_ = nullptr;
   promise_.set_exception(
       std::make_exception_ptr(Error(ErrorCode::cancelled, "cancelled before its turn came")));
 }
+
+void Background::run(const std::string& flow, const std::stop_token& stop, Work work) {
+  if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "cancelled: its result is no longer needed");
+  const auto job = start(flow, std::move(work), [] {});
+  const std::stop_callback stopped(stop, [&] { job->cancel(); });
+  job->wait();
+  job->rethrow();
+}
+
+/// What a job has while it works, and gives up while it waits for a build.
+class BackgroundThreads::Place final : public WaitHooks {
+ public:
+  Place(BackgroundThreads& pool, const std::string& flow, const Job& job)
+      : pool_(pool), flow_(flow), job_(job) {
+    waitHooks = this;
+  }
+  ~Place() override { waitHooks = nullptr; }
+  Place(const Place&) = delete;
+  Place& operator=(const Place&) = delete;
+
+  void beforeWait() override {
+    const std::lock_guard lock(pool_.mutex_);
+    --pool_.working_;
+    ++pool_.paused_;
+    pool_.waiting_.pause(flow_);
+    pool_.startThreadIfNeeded();
+    pool_.changed_.notify_all();
+  }
+  void afterWait() noexcept override {
+    std::unique_lock lock(pool_.mutex_);
+    ++pool_.returning_;
+    // A job that is cancelled needs no place to end.
+    pool_.changed_.wait(lock, job_.cancelled(), [&] { return pool_.working_ < pool_.maxJobs_; });
+    --pool_.returning_;
+    --pool_.paused_;
+    ++pool_.working_;
+    pool_.waiting_.resume(flow_);
+    pool_.changed_.notify_all();
+  }
+
+ private:
+  BackgroundThreads& pool_;
+  const std::string& flow_;
+  const Job& job_;
+};
 
 BackgroundThreads::~BackgroundThreads() {
   std::list<std::shared_ptr<Job>> jobs;
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
-    for (const auto* entries : {&waiting_, &running_})
-      for (const Entry& entry : *entries) jobs.push_back(entry.job);
+    jobs = jobs_;
   }
   for (const auto& job : jobs) job->cancel();
-  came_.notify_all();
+  changed_.notify_all();
   for (std::thread& thread : threads_) thread.join();
 }
 
-std::shared_ptr<Background::Job> BackgroundThreads::start(Work work, std::function<void()> ended) {
+std::shared_ptr<Background::Job> BackgroundThreads::start(const std::string& flow, Work work,
+                                                          std::function<void()> ended) {
   auto job = std::make_shared<Job>(std::move(work));
   {
     const std::lock_guard lock(mutex_);
-    if (idle_ <= waiting_.size() && threads_.size() < mostAtOnce_) startThread();
+    auto entry = std::make_unique<Entry>();
+    entry->job = job;
+    entry->ended = ended;
+    entry->onCancel.emplace(job->cancelled(), [this, flow, &which = *job] { skip(flow, which); });
+    jobs_.push_back(job);
+    waiting_.push(flow, std::move(entry));
+    startThreadIfNeeded();
     if (!threads_.empty()) {
-      Entry& entry = waiting_.emplace_back();
-      entry.job = job;
-      entry.ended = std::move(ended);
-      entry.onCancel.emplace(job->cancelled(), [this, &which = *job] { leave(which); });
-      came_.notify_one();
+      changed_.notify_all();
       return job;
     }
+    waiting_.withdraw(flow, [&](const auto& one) { return one->job == job; });
+    jobs_.remove(job);
   }
   job->run();
   ended();
   return job;
 }
 
-void BackgroundThreads::startThread() {
+/// Starts a thread for a job that waits, unless one is idle or there are as many as may work. Requires the
+/// mutex.
+void BackgroundThreads::startThreadIfNeeded() {
+  if (idle_ >= waiting_.waiting() || threads_.size() >= maxJobs_ + paused_) return;
   try {
     threads_.emplace_back([this] { work(); });
-  } catch (const std::system_error&) {  // the threads that there are do the work
+  } catch (const std::exception&) {  // the threads that there are do the work
   }
 }
 
@@ -78,36 +130,39 @@ void BackgroundThreads::work() {
   std::unique_lock lock(mutex_);
   for (;;) {
     ++idle_;
-    came_.wait(lock, [&] { return ending_ || !waiting_.empty(); });
+    changed_.wait(lock, [&] { return ending_ || mayBegin(); });
     --idle_;
-    if (waiting_.empty()) return;
-    const auto entry = waiting_.begin();
-    running_.splice(running_.end(), waiting_, entry);
+    if (!mayBegin()) return;
+    auto [flow, entry] = waiting_.take();
+    ++working_;
     lock.unlock();
     entry->onCancel.reset();
-    entry->job->run();
+    {
+      const Place place(*this, flow, *entry->job);
+      entry->job->run();
+    }
     entry->ended();
-    std::list<Entry> over;
+    const auto job = entry->job;
+    entry.reset();
     lock.lock();
-    over.splice(over.end(), running_, entry);
-    lock.unlock();
-    over.clear();
-    lock.lock();
+    --working_;
+    waiting_.end(flow);
+    jobs_.remove(job);
+    if (returning_ > 0) changed_.notify_all();
   }
 }
 
 /// Ends a job that waits.
-void BackgroundThreads::leave(const Job& job) {
-  std::list<Entry> left;
+void BackgroundThreads::skip(const std::string& flow, const Job& job) {
+  std::optional<std::unique_ptr<Entry>> skipped;
   {
     const std::lock_guard lock(mutex_);
-    const auto entry = std::find_if(waiting_.begin(), waiting_.end(),
-                                    [&](const Entry& one) { return one.job.get() == &job; });
-    if (entry == waiting_.end()) return;
-    left.splice(left.end(), waiting_, entry);
+    skipped = waiting_.withdraw(flow, [&](const auto& one) { return one->job.get() == &job; });
+    if (!skipped) return;
+    jobs_.remove((*skipped)->job);
   }
-  left.front().job->leave();
-  left.front().ended();
+  (*skipped)->job->skip();
+  (*skipped)->ended();
 }
 
 }  // namespace scolopax::server

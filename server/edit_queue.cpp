@@ -22,8 +22,9 @@ void EditQueue::push(Edit edit) {
     if (std::exchange(atWork_, true)) return;
   }
   if (!applyAll())
-    background_.start([self = shared_from_this()](const std::stop_token& stop) { self->applyMeasured(stop); },
-                      [] {});
+    background_.start(
+        session_, [self = shared_from_this()](const std::stop_token& stop) { self->applyMeasured(stop); },
+        [] {});
 }
 
 void EditQueue::end() {

@@ -10,6 +10,8 @@
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string>
+#include <utility>
 
 #include "server/background.h"
 #include "server/unmeasured.h"
@@ -28,8 +30,9 @@ class EditQueue : public std::enable_shared_from_this<EditQueue> {
     std::size_t bytes = 0;                           ///< size of the edit's message
   };
 
-  /// `background` must outlive all work of the queue.
-  explicit EditQueue(Background& background) : background_(background) {}
+  /// `background` must outlive all work of the queue, which belongs to the flow of the session.
+  EditQueue(Background& background, std::string session)
+      : background_(background), session_(std::move(session)) {}
 
   /// Applies the edit on the calling thread, unless it or one before it has to wait; it is then applied
   /// later, in the background. Throws ProtocolError(429) when too many edits wait.
@@ -47,6 +50,7 @@ class EditQueue : public std::enable_shared_from_this<EditQueue> {
   void done(const Edit& edit);
 
   Background& background_;
+  const std::string session_;  ///< its id
   std::stop_source ended_;
   std::mutex applying_;  ///< held while an edit is applied; taken before mutex_
 

@@ -48,7 +48,8 @@ void ProgressiveRender::dropRenderer() {
   volume_.reset();
   film_.recording = film_.unfinished = false;
   if (!renderer_) return;
-  context_.background.start([last = std::move(renderer_)](const std::stop_token&) {}, [] {});
+  context_.pictures.start(
+      session_->id(), [last = std::move(renderer_)](const std::stop_token&) {}, [] {});
   renderer_.reset();
 }
 
@@ -133,7 +134,7 @@ void ProgressiveRender::perform(Background* background, Background::Work work, N
     return;
   }
   next_ = next;
-  job_ = background->start(std::move(work), context_.wake);
+  job_ = background->start(session_->id(), std::move(work), context_.wake);
   if (job_->done()) collect(result);
 }
 
@@ -241,8 +242,7 @@ void ProgressiveRender::addSample(const RenderRequest& request, const Others& ot
   const auto render = [part = part_, renderer = renderer_, now = context_.now](const std::stop_token& stop) {
     part->render(*renderer, now, stop);
   };
-  perform(part_->inBackground ? &context_.background : nullptr, render, &ProgressiveRender::partRendered,
-          result);
+  perform(part_->inBackground ? &context_.passes : nullptr, render, &ProgressiveRender::partRendered, result);
 }
 
 void ProgressiveRender::partRendered(PassResult& result) {
@@ -258,7 +258,7 @@ void ProgressiveRender::partRendered(PassResult& result) {
     // So that the error is known when it is needed; if estimating it takes long, show() does it.
     if (estimate && !renderer->errorTakesLong()) renderer->estimatedError();
   };
-  perform(renderer_->filmIsLarge() ? &context_.background : nullptr, add, &ProgressiveRender::sampleAdded,
+  perform(renderer_->filmIsLarge() ? &context_.pictures : nullptr, add, &ProgressiveRender::sampleAdded,
           result);
 }
 
@@ -292,8 +292,10 @@ void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
   showing_->sampleError = sampleError_;
   const auto make = [showing = showing_, renderer = renderer_, pixels = filmSize(), memory = context_.memory](
                         const std::stop_token& stop) { showing->make(*renderer, pixels, memory, stop); };
-  const bool takesLong = renderer_->filmIsLarge() || renderer_->errorTakesLong();
-  perform(takesLong ? &context_.background : nullptr, make, &ProgressiveRender::pictureMade, result);
+  Background* const background = renderer_->errorTakesLong() ? &context_.passes
+                                 : renderer_->filmIsLarge()  ? &context_.pictures
+                                                             : nullptr;
+  perform(background, make, &ProgressiveRender::pictureMade, result);
 }
 
 void ProgressiveRender::pictureMade(PassResult&) {

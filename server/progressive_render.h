@@ -37,13 +37,13 @@ struct RenderContext {
   RenderPolicy policy;
   Now now;
   Log log;
-  Background& background;  ///< for pictures and films
-  Background& builds;      ///< for scenes, which may take much longer
+  Background& pictures;  ///< for large pictures: adding up samples, making and encoding; and releasing films
+  Background& passes;    ///< for passes with slow rays, and for errors that take long to measure
+  Background& builds;    ///< for scenes, including the automatic choice of the method
   std::function<void()> wake;
   std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for pictures; null: no limit
   std::shared_ptr<ParkedRenderers> parked = std::make_shared<ParkedRenderers>();
 };
-
 struct SceneTaking;
 struct PassPart;
 struct PictureMaking;

@@ -131,7 +131,7 @@ std::optional<TimePoint> EncodeLoop::step() {
         encodeAndPublish(*session, rendered, now, log, memory);
       };
       if (large)
-        jobs_[session.get()] = background_.start(std::move(work), wake_);
+        jobs_[session.get()] = pictures_.start(session->id(), std::move(work), wake_);
       else
         work({});
     }

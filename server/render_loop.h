@@ -47,12 +47,12 @@ class RenderLoop {
 class EncodeLoop {
  public:
   /// `wake` makes the loop run again.
-  EncodeLoop(SessionStore& store, Now now, Log log, Background& background, std::function<void()> wake,
+  EncodeLoop(SessionStore& store, Now now, Log log, Background& pictures, std::function<void()> wake,
              std::shared_ptr<MemoryBudget> memory = nullptr)
       : store_(store),
         now_(std::move(now)),
         log_(std::move(log)),
-        background_(background),
+        pictures_(pictures),
         wake_(std::move(wake)),
         memory_(std::move(memory)) {}
   /// Encodes the pictures that wait, at most one per session, and delivers the frames that are due. Large
@@ -63,7 +63,7 @@ class EncodeLoop {
   SessionStore& store_;
   const Now now_;
   const Log log_;
-  Background& background_;
+  Background& pictures_;
   const std::function<void()> wake_;
   const std::shared_ptr<MemoryBudget> memory_;
   std::map<const Session*, std::shared_ptr<Background::Job>> jobs_;

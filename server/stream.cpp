@@ -28,7 +28,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   void join(std::shared_ptr<Session> session) {
     sendText(protocol::helloText(options_.capabilities, session->id(), session->token()));
     session_ = std::move(session);
-    edits_ = std::make_shared<EditQueue>(background_);
+    edits_ = std::make_shared<EditQueue>(background_, session_->id());
     viewer_ = session_->addViewer(shared_from_this());
   }
 

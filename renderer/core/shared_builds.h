@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "renderer/core/error.h"
+#include "renderer/core/wait_hooks.h"
 
 namespace scolopax {
 
@@ -60,6 +61,7 @@ class SharedBuilds {
         : thread_([this, make](const std::stop_token& stop) mutable { run(make, stop); }) {}
 
     Result wait(const std::stop_token& stop) {
+      const Waiting waiting;  // declared first: ends when the mutex is free again
       std::unique_lock lock(mutex_);
       if (!ended_.wait(lock, stop, [this] { return done_; })) throwCancelled();
       if (failure_) std::rethrow_exception(failure_);

@@ -2,7 +2,6 @@
 // Threads with fair queuing: jobs belong to flows, and flows take turns. However many jobs one flow has, and
 // however long they take, another flow waits for at most one job of it.
 #pragma once
-#include <functional>
 #include <future>
 #include <memory>
 #include <string>
@@ -14,14 +13,12 @@ class FairPool {
   /// Like std::function<void()>, but may hold what cannot be copied.
   using Job = std::packaged_task<void()>;
 
-  /// `begin`, if given, is called first on each thread.
-  explicit FairPool(int threads, const std::function<void()>& begin = {});
+  explicit FairPool(int threads);
   ~FairPool();  ///< as join()
   FairPool(const FairPool&) = delete;
   FairPool& operator=(const FairPool&) = delete;
 
-  /// From any thread. The jobs of a flow begin in the order in which they were posted, one at a time; those
-  /// of the flow "", to which everything belongs that has no flow of its own, on half of the threads.
+  /// From any thread. The jobs of a flow begin in the order in which they were posted, one at a time.
   void post(const std::string& flow, Job job);
   /// Runs all jobs, including those that they post meanwhile, and ends the threads. Safe to call twice.
   void join();

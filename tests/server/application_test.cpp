@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "renderer/core/shared_builds.h"
 #include "tests/server/fakes.h"
 #include "tests/server/net/gate.h"
 #include "tests/server/net/test_client.h"
@@ -27,6 +28,25 @@ struct EndlessBuilds {
   void operator()(const std::stop_token& stop) {
     ++begun;
     if (eventually([&] { return stop.stop_requested(); })) ++stopped;
+  }
+};
+
+/// Scenes that all wait for the same endless build, until `over`.
+struct WaitingBuilds {
+  std::atomic<int> waiting{0};
+  std::atomic<bool> over{false};
+  EndlessBuilds build;
+  SharedBuilds<int, int> builds;
+  void operator()(const std::stop_token& stop) {
+    if (over) return;
+    ++waiting;
+    builds.get(
+        0,
+        [this](const std::stop_token& abandoned) {
+          build(abandoned);
+          return std::make_shared<const int>(0);
+        },
+        stop);
   }
 };
 
@@ -68,6 +88,7 @@ class ApplicationTest : public ::testing::Test {
   Config config_;
   std::function<void(std::stop_token)> building_;
   EndlessBuilds endless_;
+  WaitingBuilds waiting_;
   std::shared_ptr<MemoryBudget> memory_;
   std::optional<Application> application_;  ///< last: ends before what its renderers use
 };
@@ -105,8 +126,25 @@ TEST_F(ApplicationTest, EndsTheBuildOfAClientThatVanishesAndFreesItsPlace) {
   EXPECT_TRUE(eventually([&] { return call("POST /api/v1/render", kSmallPicture).status == 200; }));
 }
 
+TEST_F(ApplicationTest, KeepsNobodyWaitingForTheBuildsOfOthers) {
+  building_ = std::ref(waiting_);
+  start();
+  const int sessions = 2 * int(processors()) + 1;
+  std::vector<std::unique_ptr<TestClient>> polls;
+  for (int i = 0; i < sessions; ++i) {
+    polls.push_back(std::make_unique<TestClient>(application_->port()));
+    send(*polls.back(), "GET " + newSession() + "/frame");
+  }
+  ASSERT_TRUE(eventually([&] { return waiting_.waiting == sessions; }));
+  EXPECT_EQ(waiting_.build.begun, 1);
+  waiting_.over = true;
+  EXPECT_EQ(call("GET " + newSession(R"({"scene": {"image": {"width": 8, "height": 8}}})") + "/frame").status,
+            200);
+  EXPECT_EQ(waiting_.build.stopped, 0);
+}
+
 TEST_F(ApplicationTest, LetsNoSessionsPollsKeepOthersOut) {
-  building_ = std::ref(endless_);
+  building_ = std::ref(waiting_);
   start();
   std::vector<std::unique_ptr<TestClient>> polls;
   for (int session = 0; session < 4; ++session) {
@@ -116,7 +154,7 @@ TEST_F(ApplicationTest, LetsNoSessionsPollsKeepOthersOut) {
       send(*polls.back(), "GET " + path + "/frame");
     }
   }
-  ASSERT_TRUE(eventually([&] { return endless_.begun == 4; }));
+  ASSERT_TRUE(eventually([&] { return waiting_.waiting == 4; }));
   const std::string other = newSession();
   EXPECT_EQ(call("GET " + other + "/frame?timeout=0").status, 204);
   EXPECT_EQ(call("POST /api/v1/render", "{").status, 400);

@@ -3,17 +3,49 @@
 
 #include <gtest/gtest.h>
 #include <pthread.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
+#include <string>
+#include <thread>
 #include <vector>
 
 #include "renderer/core/error.h"
+#include "renderer/core/shared_builds.h"
+#include "tests/server/net/gate.h"
 
 namespace scolopax::server {
 namespace {
+
+using net::eventually;
+using net::Gate;
+using Jobs = std::vector<std::shared_ptr<Background::Job>>;
+
+Background::Work passing(Gate& gate) {
+  return [&gate](const std::stop_token&) { gate.pass(); };
+}
+
+/// Notes the order in which jobs run.
+class Notes {
+ public:
+  Background::Work job(const std::string& name) {
+    return [this, name](const std::stop_token&) {
+      const std::lock_guard lock(mutex_);
+      names_.push_back(name);
+    };
+  }
+  std::vector<std::string> names() {
+    const std::lock_guard lock(mutex_);
+    return names_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::string> names_;
+};
 
 /// During its lifetime no thread can be created: each would need a stack for which there is no room.
 class NoThreads {
@@ -37,10 +69,11 @@ TEST(BackgroundThreads, DoesTheWorkItselfWhenThereIsNoThread) {
   int worked = 0, ended = 0;
   {
     const NoThreads none;
-    const auto job = background.start([&](const std::stop_token&) { ++worked; }, [&] { ++ended; });
+    const auto job = background.start(
+        "a", [&](const std::stop_token&) { ++worked; }, [&] { ++ended; });
     EXPECT_TRUE(job->done());
-    const auto failing =
-        background.start([](const std::stop_token&) { throw std::runtime_error("no"); }, [&] { ++ended; });
+    const auto failing = background.start(
+        "a", [](const std::stop_token&) { throw std::runtime_error("no"); }, [&] { ++ended; });
     EXPECT_THROW(failing->rethrow(), std::runtime_error);
   }
   EXPECT_EQ(worked, 1);
@@ -49,11 +82,12 @@ TEST(BackgroundThreads, DoesTheWorkItselfWhenThereIsNoThread) {
 
 TEST(BackgroundThreads, OutlivesJobsThatEndWhileOthersBegin) {
   std::atomic<int> worked{0};
-  std::vector<std::shared_ptr<Background::Job>> jobs;
+  Jobs jobs;
   {
     BackgroundThreads background;
     for (int i = 0; i < 2000; ++i)
-      jobs.push_back(background.start([&](const std::stop_token&) { ++worked; }, [] {}));
+      jobs.push_back(background.start(
+          std::to_string(i % 3), [&](const std::stop_token&) { ++worked; }, [] {}));
   }
   int left = 0;
   for (const auto& job : jobs) {
@@ -72,11 +106,12 @@ TEST(BackgroundThreads, OutlivesJobsThatEndWhileOthersBegin) {
 struct HeldJobs {
   std::mutex mutex;
   std::condition_variable changed;
-  int begun = 0, atOnce = 0, mostAtOnce = 0, ended = 0, allowed = 0;
+  int begun = 0, atOnce = 0, mostAtOnce = 0, ended = 0, allowed = 0, started = 0;
   BackgroundThreads background{2};
 
   std::shared_ptr<Background::Job> start() {
     return background.start(
+        std::to_string(started++),
         [this](const std::stop_token&) {
           std::unique_lock lock(mutex);
           const int number = begun++;
@@ -104,7 +139,7 @@ struct HeldJobs {
 
 TEST(BackgroundThreads, RunsAsManyJobsAtOnceAsItMayAndTheOthersAfterThem) {
   HeldJobs jobs;
-  std::vector<std::shared_ptr<Background::Job>> started;
+  Jobs started;
   for (int i = 0; i < 5; ++i) started.push_back(jobs.start());
   for (int done = 0; done < 5; ++done) {
     jobs.waitFor(jobs.begun, std::min(done + 2, 5));
@@ -128,6 +163,146 @@ TEST(BackgroundThreads, EndsAJobAtOnceThatIsCancelledWhileItWaits) {
   jobs.allow(3);
   jobs.waitFor(jobs.ended, 4);
   EXPECT_EQ(jobs.begun, 3);
+}
+
+TEST(BackgroundThreads, LetSessionsTakeTurns) {
+  Gate gate;
+  Notes notes;
+  BackgroundThreads background(1);
+  background.start("z", passing(gate), [] {});
+  gate.waitFor(1);
+  Jobs jobs;
+  for (const char* name : {"a1", "a2", "a3", "b1", "b2", "c1"})
+    jobs.push_back(background.start({name[0]}, notes.job(name), [] {}));
+  jobs[1]->cancel();
+  gate.open();
+  for (const auto& job : jobs) job->wait();
+  EXPECT_EQ(notes.names(), (std::vector<std::string>{"a1", "b1", "c1", "a3", "b2"}));
+}
+
+TEST(BackgroundThreads, GiveASessionAtMostHalfOfThePlaces) {
+  Gate gate;
+  Notes notes;
+  BackgroundThreads background(4);
+  for (int i = 0; i < 10; ++i) background.start("a", passing(gate), [] {});
+  gate.waitFor(2);
+  Jobs jobs;
+  for (const char* name : {"b", "c", "d"}) jobs.push_back(background.start(name, notes.job(name), [] {}));
+  for (const auto& job : jobs) job->wait();
+  EXPECT_EQ(gate.arrived(), 2);
+  gate.open();
+}
+
+TEST(BackgroundThreads, WorkForOthersWhileJobsWaitForABuild) {
+  SharedBuilds<int, int> builds;
+  Gate built, busy;
+  std::mutex mutex;
+  int asking = 0, working = 0, mostWorking = 0;
+  BackgroundThreads background(1);
+  Jobs jobs;
+  for (int i = 0; i < 5; ++i)
+    jobs.push_back(background.start(
+        std::to_string(i % 2),
+        [&](const std::stop_token& stop) {
+          {
+            const std::lock_guard lock(mutex);
+            ++asking;
+          }
+          builds.get(
+              0,
+              [&](const std::stop_token&) {
+                built.pass();
+                return std::make_shared<const int>(0);
+              },
+              stop);
+          {
+            const std::lock_guard lock(mutex);
+            mostWorking = std::max(mostWorking, ++working);
+          }
+          busy.pass();
+          const std::lock_guard lock(mutex);
+          --working;
+        },
+        [] {}));
+  ASSERT_TRUE(eventually([&] {
+    const std::lock_guard lock(mutex);
+    return asking == 5;
+  }));
+  int others = 0;
+  background.run("other", {}, [&](const std::stop_token&) { ++others; });
+  EXPECT_EQ(others, 1);
+  EXPECT_EQ(built.arrived(), 1);
+  // Afterwards they work one at a time.
+  built.open();
+  busy.waitFor(1);
+  busy.open();
+  for (const auto& job : jobs) job->wait();
+  EXPECT_EQ(mostWorking, 1);
+}
+
+TEST(BackgroundThreads, EndAJobThatIsCancelledWhileItWaitsForABuildThoughItsPlaceIsTaken) {
+  SharedBuilds<int, int> builds;
+  Gate busy;
+  BackgroundThreads background(1);
+  const auto waiting = background.start(
+      "a",
+      [&](const std::stop_token& stop) {
+        builds.get(
+            0,
+            [](const std::stop_token& abandoned) {
+              eventually([&] { return abandoned.stop_requested(); });
+              return std::make_shared<const int>(0);
+            },
+            stop);
+      },
+      [] {});
+  background.start("b", passing(busy), [] {});
+  busy.waitFor(1);
+  waiting->cancel();
+  waiting->wait();
+  EXPECT_THROW(waiting->rethrow(), Error);
+  busy.open();
+}
+
+TEST(BackgroundThreads, RunForAThreadThatWaits) {
+  BackgroundThreads background(1);
+  int worked = 0;
+  background.run("a", {}, [&](const std::stop_token&) { ++worked; });
+  EXPECT_EQ(worked, 1);
+  EXPECT_THROW(background.run("a", {}, [](const std::stop_token&) { throw std::runtime_error("no"); }),
+               std::runtime_error);
+  std::stop_source stop;
+  EXPECT_FALSE(stop.stop_requested());
+  background.run("a", stop.get_token(), [&](const std::stop_token& cancelled) {
+    stop.request_stop();
+    worked += eventually([&] { return cancelled.stop_requested(); });
+  });
+  EXPECT_EQ(worked, 2);
+  EXPECT_THROW(background.run("a", stop.get_token(), [&](const std::stop_token&) { ++worked; }), Error);
+  EXPECT_EQ(worked, 2);
+}
+
+TEST(BackgroundThreads, LetAThreadGoThatNoLongerWaitsForItsTurn) {
+  Gate gate;
+  BackgroundThreads background(1);
+  background.start("z", passing(gate), [] {});
+  gate.waitFor(1);
+  std::stop_source stop;
+  bool worked = false;
+  {
+    const std::jthread waiting([&] {
+      EXPECT_THROW(background.run("a", stop.get_token(), [&](const std::stop_token&) { worked = true; }),
+                   Error);
+    });
+    stop.request_stop();
+  }
+  EXPECT_FALSE(worked);
+  gate.open();
+}
+
+TEST(BackgroundThreads, WorkAtLowPriority) {
+  BackgroundThreads background(1);
+  background.run("a", {}, [](const std::stop_token&) { EXPECT_GT(getpriority(PRIO_PROCESS, 0), 0); });
 }
 
 }  // namespace

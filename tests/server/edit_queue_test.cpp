@@ -26,7 +26,8 @@ struct Editor {
   std::vector<std::string> failures;
 
   Editor(SessionStore& store, Background& background)
-      : session(store.create(json::object())), queue(std::make_shared<EditQueue>(background)) {}
+      : session(store.create(json::object())),
+        queue(std::make_shared<EditQueue>(background, session->id())) {}
 
   void patch(const json& patch, std::size_t bytes = 100) {
     const auto apply = [this, patch] { session->patch(patch, {}); };

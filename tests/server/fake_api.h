@@ -19,7 +19,7 @@ struct Api {
   Metrics metrics;
   std::shared_ptr<const DatasetStore> datasets = smallStore();
   SceneResolver resolver{datasets, {64, 1000}};
-  AnswerEncoders encoders;
+  BackgroundThreads encoders{2};
   StreamHub streams{workshop.store, workshop.background, metrics, {}};
   std::atomic<bool> stopping{false};
   std::stop_source gone, abortRequests;

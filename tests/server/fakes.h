@@ -63,7 +63,7 @@ class FakeBackground : public Background {
   bool atOnce = true;
   std::vector<std::function<void()>> waiting;
 
-  std::shared_ptr<Job> start(Work work, std::function<void()> ended) override {
+  std::shared_ptr<Job> start(const std::string&, Work work, std::function<void()> ended) override {
     auto job = std::make_shared<Job>(std::move(work));
     const auto run = [job, ended = std::move(ended)] {
       job->run();
@@ -232,7 +232,7 @@ struct Workshop {
   std::shared_ptr<const SceneResolver> resolver =
       std::make_shared<const SceneResolver>(smallStore(), SceneResolver::Options{4096, 16'777'216});
   SessionStore store;
-  FakeBackground background;
+  FakeBackground background, passes;
   PassResult last;  ///< the result of the render loop's last turn
   RenderLoop render;
   EncodeLoop encode;
@@ -248,6 +248,7 @@ struct Workshop {
                 clock.now(),
                 [](const std::string&) {},
                 background,
+                passes,
                 background,
                 [this] { ++renderWakes; },
                 memory},

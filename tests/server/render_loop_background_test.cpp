@@ -316,18 +316,18 @@ TEST(RenderLoop, RendersInTheBackgroundWhatCannotBeDividedIntoTurns) {
   workshop.control->duringPass = takeLong;
   workshop.step();
   ASSERT_EQ(workshop.control->passes, std::vector<std::uint32_t>({1}));
-  workshop.background.atOnce = false;
+  workshop.passes.atOnce = false;
   workshop.control->duringPass = {};
   workshop.step();
   EXPECT_EQ(workshop.control->passes.size(), 1u);  // waits in the background
-  ASSERT_EQ(workshop.background.waiting.size(), 1u);
+  ASSERT_EQ(workshop.passes.waiting.size(), 1u);
   quick->addViewer(quickViewer);
-  workshop.background.atOnce = true;  // for the quick one's scene
   workshop.steps(4);
   EXPECT_FALSE(quickViewer->frames.empty());
   EXPECT_EQ(workshop.control->passes.back(), 2u);
+  workshop.passes.atOnce = true;
   workshop.control->duringPass = takeLong;
-  workshop.background.finish();
+  workshop.passes.finish();
   workshop.control->duringPass = {};
   EXPECT_EQ(workshop.control->passes.back(), 1u);
   const auto before = slowViewer->frames.size();
@@ -335,11 +335,29 @@ TEST(RenderLoop, RendersInTheBackgroundWhatCannotBeDividedIntoTurns) {
   EXPECT_GT(slowViewer->frames.size(), before);
   // After a while without such rays, its passes take turns again.
   workshop.clock.advance(20s);
-  workshop.background.atOnce = false;
+  workshop.passes.atOnce = false;
   const auto passes = workshop.control->passes.size();
   workshop.steps(4);
   EXPECT_GT(workshop.control->passes.size(), passes);
-  EXPECT_TRUE(workshop.background.waiting.empty());
+  EXPECT_TRUE(workshop.passes.waiting.empty());
+}
+
+TEST(RenderLoop, LetsLargePicturesNotWaitForPassesWithSlowRays) {
+  Workshop workshop;
+  const auto slow = workshop.store.create(seedPatch(1));
+  slow->addViewer(std::make_shared<FakeViewer>());
+  workshop.control->duringPass = [&] { workshop.clock.advance(1s); };
+  workshop.step();
+  workshop.control->duringPass = {};
+  workshop.passes.atOnce = false;
+  workshop.step();
+  ASSERT_EQ(workshop.passes.waiting.size(), 1u);
+  const auto large = workshop.store.create({{"image", {{"width", 1024}, {"height", 1024}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  large->addViewer(viewer);
+  workshop.steps(6);
+  EXPECT_FALSE(viewer->frames.empty());
+  EXPECT_EQ(workshop.passes.waiting.size(), 1u);
 }
 
 TEST(RenderLoop, BeginsToRecordAovsInTheBackground) {
@@ -377,15 +395,15 @@ TEST(RenderLoop, EndsAPassInTheBackgroundThatAnEditMakesUseless) {
   workshop.control->duringPass = [&] { workshop.clock.advance(1s); };
   workshop.step();
   workshop.step();
-  workshop.background.atOnce = false;
+  workshop.passes.atOnce = false;
   workshop.step();
-  ASSERT_EQ(workshop.background.waiting.size(), 1u);
+  ASSERT_EQ(workshop.passes.waiting.size(), 1u);
   session->patch(seedPatch(5), {});
   workshop.clock.advance(1s);
   workshop.step();
   const auto passes = workshop.control->passes.size();
   workshop.control->duringPass = {};
-  workshop.background.finish();
+  workshop.passes.finish();
   EXPECT_EQ(workshop.control->passes.size(), passes);  // it was cancelled
 }
 
@@ -421,21 +439,21 @@ struct Measured {
     otherSession = workshop.store.create({{"stop", {{"samples", 1}}}});
     otherSession->addViewer(other);
     workshop.steps(4);
-    workshop.background.atOnce = false;
+    workshop.passes.atOnce = false;
     workshop.steps(30);
   }
 };
 
 TEST(RenderLoop, MeasuresAnErrorThatTakesLongInTheBackgroundWhileOthersHaveTheirTurns) {
   Measured test;
-  EXPECT_EQ(test.workshop.background.waiting.size(), 1u);
+  EXPECT_EQ(test.workshop.passes.waiting.size(), 1u);
   EXPECT_EQ(test.measured, 0);
   EXPECT_EQ(test.viewer->frames.back().info.samples, 8u);
   test.otherSession->patch(seedPatch(5), {});
   test.workshop.steps(2);
   EXPECT_EQ(test.other->frames.back().info.revision, 2u);
   EXPECT_FALSE(test.viewer->frames.back().info.final);
-  test.workshop.background.finish();
+  test.workshop.passes.finish();
   test.workshop.steps(6);
   EXPECT_EQ(test.measured, 1);
   EXPECT_TRUE(test.viewer->frames.back().info.final);
@@ -446,7 +464,7 @@ TEST(RenderLoop, GivesUpMeasuringTheErrorOfADeletedSession) {
   Measured test;
   EXPECT_TRUE(test.workshop.store.remove(test.session->id()));
   test.workshop.step();
-  test.workshop.background.finish();
+  test.workshop.passes.finish();
   EXPECT_EQ(test.stopped, 1);
 }
 
@@ -454,7 +472,7 @@ TEST(RenderLoop, GivesUpMeasuringTheErrorOfASceneThatAnEditReplaces) {
   Measured test;
   test.session->patch(seedPatch(5), {});
   test.workshop.step();
-  test.workshop.background.finish();
+  test.workshop.passes.finish();
   EXPECT_EQ(test.stopped, 1);
   test.workshop.steps(2);
   EXPECT_FALSE(test.workshop.last.abandoned);  // no build was abandoned
@@ -466,9 +484,9 @@ TEST(RenderLoop, MeasuresAnewWhenSomebodyWaitsAgain) {
   Measured test;
   test.session->removeViewer(test.viewerId);
   test.workshop.step();
-  test.workshop.background.finish();
+  test.workshop.passes.finish();
   EXPECT_EQ(test.stopped, 1);
-  test.workshop.background.atOnce = true;
+  test.workshop.passes.atOnce = true;
   test.session->addViewer(test.viewer);
   test.workshop.steps(6);
   EXPECT_EQ(test.measured, 2);

@@ -29,18 +29,19 @@ struct RunningServer {
   SessionStore store{std::make_shared<const SceneResolver>(testing::smallStore(), SceneResolver::Options{}),
                      {1000, 5min},
                      hooks};
-  BackgroundThreads background;
+  BackgroundThreads pictures, passes, builds;
   RenderLoop render{
       store,
       {[this](const std::shared_ptr<const Volume>&) { return std::make_unique<FakeRenderer>(control); },
        {},
        now,
        [](const std::string&) {},
-       background,
-       background,
+       pictures,
+       passes,
+       builds,
        [this] { renderThread.wake(); }},
       [](const PassResult&) {}};
-  EncodeLoop encode{store, now, [](const std::string&) {}, background, [this] { encodeThread.wake(); }};
+  EncodeLoop encode{store, now, [](const std::string&) {}, pictures, [this] { encodeThread.wake(); }};
 
   RunningServer() {
     renderThread.start([this] { return render.step(); });

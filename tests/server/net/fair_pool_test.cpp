@@ -55,18 +55,6 @@ TEST(FairPool, RunsOneJobOfAFlowAtATimeAndOthersBeside) {
   EXPECT_EQ(gate.arrived(), 10);
 }
 
-TEST(FairPool, LeavesHalfOfTheThreadsToFlowsWithANameAndTheOtherHalfToTheRest) {
-  Gate gate;
-  Notes notes;
-  FairPool pool(4);
-  for (int i = 0; i < 10; ++i) pool.post("", FairPool::Job([&] { gate.pass(); }));
-  gate.waitFor(2);
-  pool.post("a", notes.job("a"));
-  EXPECT_TRUE(eventually([&] { return notes.names().size() == 1; }));
-  EXPECT_EQ(gate.arrived(), 2);
-  gate.open();
-}
-
 TEST(FairPool, EndsWithTheJobsThatJobsPost) {
   Notes notes;
   FairPool pool(2);
