@@ -11,6 +11,7 @@
 #include <optional>
 #include <stop_token>
 #include <thread>
+#include <utility>
 
 #include "protocol/problem.h"
 #include "renderer/core/error.h"
@@ -133,6 +134,10 @@ std::shared_ptr<const ResolvedScene> sceneOf(const ApiContext& context, const ne
   throw tooLate(context.config.maxRenderSeconds, 0);
 }
 
+std::uint64_t pixelsOf(const ResolvedScene& scene) {
+  return std::uint64_t(scene.render.width) * std::uint64_t(scene.render.height);
+}
+
 /// FNV-1a, 64 bits, of the resolved scene's canonical text: equal pictures have equal hashes.
 std::string sceneHash(const ResolvedScene& scene) {
   std::uint64_t hash = 0xcbf29ce484222325u;
@@ -142,19 +147,16 @@ std::string sceneHash(const ResolvedScene& scene) {
   return text;
 }
 
-net::Response render(ApiContext& context, std::atomic<int>& running, const net::Request& request) {
-  const ImageType* type = acceptedImageType(request.header("accept"));
-  if (!type)
-    throw ProtocolError(406, "",
-                        "expected Accept to include " + imageTypesText(&ImageType::mediaType) + ", found " +
-                            protocol::shortened(*request.header("accept")));
-  const double limit = context.config.maxRenderSeconds;
-  const auto scene = sceneOf(context, request);
-  if (scene->stop.seconds > limit)
-    throw ProtocolError(422, "/stop/seconds",
-                        "expected at most " + shortText(limit) + ", found " + shortText(scene->stop.seconds));
-  const RenderPlace place(running, context.config.maxRenders);
+struct Rendered {
+  std::shared_ptr<const Image> image;        ///< charged to the budget
+  decltype(net::Response::headers) headers;  ///< that tell how it was made
+};
 
+/// The picture of the scene. The place, and the memory of the film, are free again when this returns.
+Rendered renderPicture(const ApiContext& context, std::atomic<int>& running, const net::Request& request,
+                       const std::shared_ptr<const ResolvedScene>& scene) {
+  const double limit = context.config.maxRenderSeconds;
+  const RenderPlace place(running, context.config.maxRenders);
   const auto begin = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   const auto renderer = context.makeRenderer(scene->dataset->volume);
@@ -184,25 +186,40 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
   const auto milliseconds = std::int64_t(seconds() * 1000);
   const std::string error = nlohmann::json(errorOf(*renderer, ending.token())).dump();
   throwIfUnwanted(context, request);
-  const auto pixels = std::uint64_t(scene->render.width) * std::uint64_t(scene->render.height);
-  net::Response response{200, std::string(type->mediaType), "", {}};
+  auto memory = MemoryBudget::take(context.memory, MemoryUse::pictures, pixelsOf(*scene) * sizeof(glm::vec4));
+  const Choice choice = renderer->choice();
+  return {withShare(std::move(memory), renderer->image()),
+          {{"Scolopax-Samples", std::to_string(renderer->samples())},
+           {"Scolopax-Error", error},
+           {"Scolopax-Seed", std::to_string(scene->render.seed)},
+           {"Scolopax-Method", std::string(nameOf(choice.method))},
+           {"Scolopax-Step", shortText(choice.step)},
+           {"Scolopax-Corrections", textOf(choice.corrections)},
+           {"Scolopax-Scene", sceneHash(*scene)},
+           {"Scolopax-Render-Ms", std::to_string(milliseconds)},
+           {"Scolopax-Rebuild-Ms", std::to_string(std::int64_t(rebuild->rebuildMs))},
+           {"Vary", "Accept"}}};
+}
+
+net::Response render(ApiContext& context, std::atomic<int>& running, const net::Request& request) {
+  const ImageType* type = acceptedImageType(request.header("accept"));
+  if (!type)
+    throw ProtocolError(406, "",
+                        "expected Accept to include " + imageTypesText(&ImageType::mediaType) + ", found " +
+                            protocol::shortened(*request.header("accept")));
+  const double limit = context.config.maxRenderSeconds;
+  const auto scene = sceneOf(context, request);
+  if (scene->stop.seconds > limit)
+    throw ProtocolError(422, "/stop/seconds",
+                        "expected at most " + shortText(limit) + ", found " + shortText(scene->stop.seconds));
+  Rendered rendered = renderPicture(context, running, request, scene);
+  net::Response response{200, std::string(type->mediaType), "", std::move(rendered.headers)};
   setEncodedBody(
-      context, request, pixels * sizeof(glm::vec4) + type->memory(pixels),
+      context, request, type->memory(pixelsOf(*scene)),
       [&](const std::stop_token& stop) {
-        return imageBytes(*type, renderer->image(), scene->render.background, stop);
+        return imageBytes(*type, *rendered.image, scene->render.background, stop);
       },
       response);
-  const Choice choice = renderer->choice();
-  response.headers = {{"Scolopax-Samples", std::to_string(renderer->samples())},
-                      {"Scolopax-Error", error},
-                      {"Scolopax-Seed", std::to_string(scene->render.seed)},
-                      {"Scolopax-Method", std::string(nameOf(choice.method))},
-                      {"Scolopax-Step", shortText(choice.step)},
-                      {"Scolopax-Corrections", textOf(choice.corrections)},
-                      {"Scolopax-Scene", sceneHash(*scene)},
-                      {"Scolopax-Render-Ms", std::to_string(milliseconds)},
-                      {"Scolopax-Rebuild-Ms", std::to_string(std::int64_t(rebuild->rebuildMs))},
-                      {"Vary", "Accept"}};
   return response;
 }
 

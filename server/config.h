@@ -24,7 +24,7 @@ struct Config {
   std::uint64_t maxPixels = 16'777'216;                   ///< of one picture
   std::uint64_t maxMemoryBytes = std::uint64_t{4} << 30;  ///< for what requests make the server hold
   double maxRenderSeconds = 60;                           ///< of one POST /render
-  int maxRenders = 2;                                     ///< POST /render at once
+  int maxRenders = 2;                                     ///< POST /render that render at once
   std::size_t maxBodyBytes = std::size_t{1} << 20;
   std::size_t maxMessageBytes = std::size_t{1} << 20;
   std::size_t maxJsonDepth = 32;

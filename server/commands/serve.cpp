@@ -172,7 +172,7 @@ CLI::App* addServeCommand(CLI::App& root) {
       ->check(CLI::Range(std::uint64_t(64), std::uint64_t(1) << 32));
   limit("max-render-seconds", config.maxRenderSeconds, "Seconds of one POST /render")
       ->check(CLI::PositiveNumber);
-  limit("max-renders", config.maxRenders, "POST /render at once")->check(CLI::PositiveNumber);
+  limit("max-renders", config.maxRenders, "POST /render that render at once")->check(CLI::PositiveNumber);
   limit("max-body", config.maxBodyBytes, "Bytes of one request's body")->check(CLI::PositiveNumber);
   limit("max-message", config.maxMessageBytes, "Bytes of one WebSocket message")->check(CLI::PositiveNumber);
   limit("max-json-depth", config.maxJsonDepth, "Nesting depth of lists and objects")

@@ -9,6 +9,7 @@
 
 #include "protocol/problem.h"
 #include "tests/server/fake_api.h"
+#include "tests/server/net/gate.h"
 
 namespace scolopax::server {
 namespace {
@@ -185,6 +186,30 @@ TEST(Api, RefusesOneRenderTooManyWith503) {
   EXPECT_EQ(nested, 503);
   EXPECT_EQ(api.call("POST", "/api/v1/render", kSmallRender).status, 200);  // the slot is free again
   EXPECT_EQ(headerOf(errorResponse(ProtocolError(503, "", "busy")), "Retry-After"), "1");
+}
+
+TEST(Api, KeepsNoPlaceForARenderThatWaitsToBeEncodedNorForOneWhoseClientHasGone) {
+  Api api;
+  net::Gate gate;
+  // Takes the only place that such pictures have at the encoders.
+  api.encoders.start(
+      "", [&](const std::stop_token&) { gate.pass(); }, [] {});
+  gate.waitFor(1);
+  std::atomic<int> samples{0};
+  api.workshop.control->duringPass = [&] { ++samples; };
+  {
+    const auto render = [&] {
+      // Refused until the place of the one before is free.
+      while (!api.gone.stop_requested())
+        EXPECT_EQ(api.errorOf("POST", "/api/v1/render", kSmallRender), Expected(503, ""));
+    };
+    const std::jthread first(render);
+    EXPECT_TRUE(net::eventually([&] { return samples == 3; }));
+    const std::jthread second(render);
+    EXPECT_TRUE(net::eventually([&] { return samples == 6; }));
+    api.gone.request_stop();
+  }
+  EXPECT_EQ(gate.arrived(), 1);  // and was not opened
 }
 
 TEST(Api, EndsARenderWhenTheServerStops) {
