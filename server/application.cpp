@@ -92,7 +92,7 @@ struct Application::Impl {
   std::atomic<bool> stopping{false};
   std::stop_source abortRequests;
   const Now now = [] { return std::chrono::steady_clock::now(); };
-  LoopThread renderThread, encodeThread;
+  LoopThread renderThread, watchThread, encodeThread;
   // Apart, so that what is soon done does not wait for what takes long.
   BackgroundThreads pictures, passes{std::max<std::size_t>(1, processors() / 2)}, builds;
   // Few, so that others' frames are not delayed.
@@ -128,10 +128,18 @@ struct Application::Impl {
         sessions(sessionResolver, {config.maxSessions, config.keepSession},
                  {now, [this] { renderThread.wake(); }, [this] { encodeThread.wake(); },
                   [this] { renderLoop.interrupt(); }}),
-        renderLoop(
-            sessions,
-            {makeRenderer, {}, now, log, pictures, passes, builds, [this] { renderThread.wake(); }, memory},
-            [this](const PassResult& pass) { metrics.passEnded(pass); }),
+        renderLoop(sessions,
+                   {makeRenderer,
+                    {},
+                    now,
+                    log,
+                    pictures,
+                    passes,
+                    builds,
+                    [this] { renderThread.wake(); },
+                    memory,
+                    [this] { watchThread.wake(); }},
+                   [this](const PassResult& pass) { metrics.passEnded(pass); }),
         encodeLoop(
             sessions, now, log, pictures, [this] { encodeThread.wake(); }, memory),
         capabilities(capabilitiesJson(config, sessionResolver->lists())),
@@ -198,6 +206,7 @@ Application::~Application() { stop(); }
 
 void Application::start() {
   impl_->renderThread.start([this] { return impl_->renderLoop.step(); });
+  impl_->watchThread.start([this] { return impl_->renderLoop.watch(); });
   impl_->encodeThread.start([this] { return impl_->encodeLoop.step(); });
   impl_->server->start();
 }
@@ -224,6 +233,7 @@ void Application::stop() {
   impl_->server->stop(impl_->config.stopGrace);
   impl_->renderLoop.stop();
   impl_->renderThread.stop();
+  impl_->watchThread.stop();
   impl_->encodeThread.stop();
 }
 

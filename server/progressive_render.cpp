@@ -21,19 +21,15 @@ std::uint32_t microseconds(double seconds) { return std::uint32_t(std::clamp(sec
 
 /// A part of a pass that takes so much longer than its turn was meant to has rays that take that long; on a
 /// busy machine, any part may take a little longer.
-constexpr double kSlowRay = 0.3;
+constexpr std::chrono::milliseconds kSlowRay{300};
 /// For so long, passes are then rendered in the background, where they keep no other session waiting.
 constexpr std::chrono::seconds kSlowTime{10};
 
 }  // namespace
 
 ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, const RenderContext& context,
-                                     const std::atomic<bool>& interrupted, const std::atomic<bool>& stopping)
-    : session_(std::move(session)),
-      context_(context),
-      interrupted_(interrupted),
-      stopping_(stopping),
-      resolution_(context.policy) {}
+                                     PassEnds& ends)
+    : session_(std::move(session)), context_(context), ends_(ends), resolution_(context.policy) {}
 
 ProgressiveRender::~ProgressiveRender() {
   if (job_) job_->cancel();
@@ -87,13 +83,22 @@ bool ProgressiveRender::showDue(const RenderRequest& request) const {
   return film_.showDue(request, {renderer_->samples(), finished(request)}, context_.policy, context_.now());
 }
 
+ProgressiveRender::Step ProgressiveRender::step(const RenderRequest& request) const {
+  if (!request.wanted) return Step::none;
+  if ((film_.stale(request) && !film_.shieldsPass(request, context_.policy, context_.now())) ||
+      film_.lateForEdit(request, context_.policy))
+    return Step::takeScene;
+  if (!finished(request)) return Step::addSample;
+  return showDue(request) ? Step::show : Step::none;
+}
+
 ProgressiveRender::Work ProgressiveRender::work() const {
   const RenderRequest request = this->request();
   if (pickable(request)) return Work::urgent;
   if (parked_) return !request.wanted ? Work::none : film_.firstOfEdit(request) ? Work::urgent : Work::still;
   if (job_ && !job_->done()) return Work::none;
   if (job_) return film_.firstOfEdit(request) ? Work::urgent : Work::still;
-  if (!request.wanted || !(film_.stale(request) || !finished(request) || showDue(request))) return Work::none;
+  if (step(request) == Step::none) return Work::none;
   return film_.firstOfEdit(request) ? Work::urgent : request.interactive ? Work::refine : Work::still;
 }
 
@@ -235,21 +240,27 @@ void ProgressiveRender::addSample(const RenderRequest& request, const Others& ot
   if (!film_.unfinished) film_.passBegan = begin, film_.passSeconds = 0;
   part_ = std::make_shared<PassPart>();
   part_->slice = slice;
-  // A turn between two urgent ones is short but not interrupted, so it makes progress however fast edits
-  // come.
-  part_->ends = urgent || othersWait ? &stopping_ : &interrupted_;
   part_->inBackground = begin < slowUntil_;
-  const auto render = [part = part_, renderer = renderer_, now = context_.now](const std::stop_token& stop) {
-    part->render(*renderer, now, stop);
+  if (part_->inBackground) {
+    const auto render = [part = part_, renderer = renderer_, now = context_.now](
+                            const std::stop_token& stop) { part->render(*renderer, now, stop); };
+    perform(&context_.passes, render, &ProgressiveRender::partRendered, result);
+    return;
+  }
+  const auto render = [&](const std::stop_token&) {
+    const PassEnds::Watched watched(ends_, begin + slice + kSlowRay);
+    // A turn between two urgent ones is short but not interrupted, so it makes progress however fast edits
+    // come.
+    part_->render(*renderer_, context_.now, ends_.flag(urgent || othersWait));
   };
-  perform(part_->inBackground ? &context_.passes : nullptr, render, &ProgressiveRender::partRendered, result);
+  perform(nullptr, render, &ProgressiveRender::partRendered, result);
 }
 
 void ProgressiveRender::partRendered(PassResult& result) {
   const auto part = std::exchange(part_, nullptr);
-  if (part->seconds > std::chrono::duration<double>(part->slice).count() + kSlowRay)
-    slowUntil_ = context_.now() + kSlowTime;
-  result.cancelled = !part->complete && (part->inBackground ? part->cancel : *part->ends);
+  const bool slow = part->seconds >= std::chrono::duration<double>(part->slice + kSlowRay).count();
+  if (slow) slowUntil_ = context_.now() + kSlowTime;
+  result.cancelled = part->ended && !slow;
   film_.passSeconds += part->seconds;
   film_.unfinished = !part->complete;
   if (!part->complete) return;
@@ -330,17 +341,19 @@ void ProgressiveRender::turn(const RenderRequest& request, const Others& others,
   bool took = taking_ != nullptr;
   if (collected) collect(result);
   if (!request.wanted || job_) return;
-  if ((film_.stale(request) && !film_.shieldsPass(request, context_.policy, context_.now())) ||
-      film_.lateForEdit(request, context_.policy)) {
+  Step next = step(request);
+  if (next == Step::takeScene) {
     takeScene(request, others, result);
+    if (job_ || !film_.scene) return;
     took = true;
+    next = step(request);
   }
-  if (job_ || !film_.scene) return;
   if (took && pickIn(request)) return;  // so the pick need not wait for a pass
+  const auto mayShow = [&] { return !job_ && !film_.unfinished && showDue(request); };
   // A sample added in the background is shown before the next pass begins.
-  if (collected && !film_.unfinished && showDue(request)) return show(request, result);
-  if (!finished(request)) addSample(request, others, result);
-  if (!job_ && !film_.unfinished && showDue(request)) show(request, result);
+  if (collected && mayShow()) return show(request, result);
+  if (next == Step::addSample) addSample(request, others, result);
+  if (mayShow()) show(request, result);
 }
 
 PassResult ProgressiveRender::run(const Others& others) {

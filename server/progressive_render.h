@@ -2,7 +2,6 @@
 // One session's renderer and film, and the decisions about what to do with them next. Used only by the render
 // thread; takes scenes from Session and hands pictures back to it.
 #pragma once
-#include <atomic>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -12,6 +11,7 @@
 #include "server/background.h"
 #include "server/film_state.h"
 #include "server/parked_renderers.h"
+#include "server/pass_ends.h"
 #include "server/resolution.h"
 #include "server/session.h"
 
@@ -42,8 +42,10 @@ struct RenderContext {
   Background& builds;    ///< for scenes, including the automatic choice of the method
   std::function<void()> wake;
   std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for pictures; null: no limit
+  std::function<void()> wakeWatch = [] {};         ///< makes RenderLoop::watch() run again
   std::shared_ptr<ParkedRenderers> parked = std::make_shared<ParkedRenderers>();
 };
+
 struct SceneTaking;
 struct PassPart;
 struct PictureMaking;
@@ -62,10 +64,8 @@ class ProgressiveRender {
     still,   ///< the picture at rest
     urgent   ///< the first picture after an edit, or a pick
   };
-  /// `interrupted` ends passes early unless they are urgent, and `stopping` all; they continue in their next
-  /// turn.
-  ProgressiveRender(std::shared_ptr<Session> session, const RenderContext& context,
-                    const std::atomic<bool>& interrupted, const std::atomic<bool>& stopping);
+  /// Passes that `ends` has ended early continue in their next turn.
+  ProgressiveRender(std::shared_ptr<Session> session, const RenderContext& context, PassEnds& ends);
   ~ProgressiveRender();
   ProgressiveRender(const ProgressiveRender&) = delete;
   ProgressiveRender& operator=(const ProgressiveRender&) = delete;
@@ -87,8 +87,11 @@ class ProgressiveRender {
 
  private:
   using Next = void (ProgressiveRender::*)(PassResult&);
+  /// What a turn does, if no background job is running and it is not a pick's.
+  enum class Step { none, takeScene, addSample, show };
 
   RenderRequest request() const;
+  Step step(const RenderRequest& request) const;
   bool finished(const RenderRequest& request) const;
   bool showDue(const RenderRequest& request) const;
   bool pickable(const RenderRequest& request) const;
@@ -115,7 +118,7 @@ class ProgressiveRender {
 
   const std::shared_ptr<Session> session_;
   const RenderContext& context_;
-  const std::atomic<bool>&interrupted_, &stopping_;
+  PassEnds& ends_;
 
   std::shared_ptr<Background::Job> job_;    ///< while it exists, it owns the renderer, except for picks
   Next next_ = nullptr;                     ///< to be called when the job is done

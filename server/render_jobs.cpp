@@ -25,11 +25,16 @@ Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive
   return scene;
 }
 
+void PassPart::render(Renderer& renderer, const Now& now, const std::atomic<bool>& ends) {
+  const TimePoint begin = now();
+  complete = renderer.renderPixels(ends, slice);
+  ended = !complete && ends;
+  seconds = std::chrono::duration<double>(now() - begin).count();
+}
+
 void PassPart::render(Renderer& renderer, const Now& now, const std::stop_token& stop) {
   const std::stop_callback stopped(stop, [this] { cancel = true; });
-  const TimePoint begin = now();
-  complete = renderer.renderPixels(inBackground ? cancel : *ends, slice);
-  seconds = std::chrono::duration<double>(now() - begin).count();
+  render(renderer, now, cancel);
 }
 
 void PictureMaking::make(const Renderer& renderer, std::uint64_t pixels,

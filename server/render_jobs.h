@@ -43,13 +43,15 @@ struct SceneTaking {
 /// A part of a pass: what one turn renders of it.
 struct PassPart {
   std::chrono::microseconds slice{};
-  const std::atomic<bool>* ends = nullptr;  ///< ends the part early, in addition to `cancel`
-  std::atomic<bool> cancel{false};
   bool inBackground = false;
-  bool complete = false;  ///< the pass is complete
-  double seconds = 0;     ///< that it took
+  std::atomic<bool> cancel{false};  ///< ends the part early, if it is in the background
+  bool complete = false;            ///< the pass is complete
+  bool ended = false;               ///< it is not, because it was ended early
+  double seconds = 0;               ///< that it took
 
-  /// Ends early if `stop` is requested, even in the middle of a ray.
+  /// Ends early once `ends` is true, even in the middle of a ray.
+  void render(Renderer& renderer, const Now& now, const std::atomic<bool>& ends);
+  /// In the background: once `stop` is requested.
   void render(Renderer& renderer, const Now& now, const std::stop_token& stop);
 };
 

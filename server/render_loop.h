@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The two loops that serve all sessions: one renders them in turn, one sample pass at a time; the other
 // encodes frames and delivers them. Each is a step that returns when to run again, driven by a LoopThread or
-// by a test.
+// by a test; so is what watches the first.
 #pragma once
-#include <atomic>
 #include <functional>
 #include <map>
 #include <memory>
@@ -26,9 +25,12 @@ class RenderLoop {
   std::optional<TimePoint> step();
   /// Ends the running pass early, unless it makes the first picture after an edit or is a short turn between
   /// two of those. From any thread.
-  void interrupt() { interrupted_ = true; }
+  void interrupt() { ends_.interrupt(); }
   /// Ends the running pass early, whatever it is, and all later ones at once. From any thread.
-  void stop() { interrupted_ = stopping_ = true; }
+  void stop() { ends_.stop(); }
+  /// Ends the running pass if a ray of it takes too long; it will be continued in the background. A step of a
+  /// loop of its own, which RenderContext::wakeWatch wakes.
+  std::optional<TimePoint> watch() { return ends_.watch(); }
 
  private:
   using Renders = std::vector<std::unique_ptr<ProgressiveRender>>;
@@ -39,7 +41,7 @@ class RenderLoop {
   const RenderContext context_;
   const OnPass onPass_;
   Renders renders_;  ///< in the order of their next turns
-  std::atomic<bool> interrupted_{false}, stopping_{false};
+  PassEnds ends_;
   bool othersUrgent_ = false;  ///< the chosen turn is not urgent, but another session's is
   bool lastUrgent_ = false;    ///< the last turn was urgent
 };

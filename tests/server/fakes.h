@@ -226,7 +226,7 @@ struct FakeViewer : ViewerSink {
 struct Workshop {
   FakeClock clock;
   std::shared_ptr<FakeControl> control = std::make_shared<FakeControl>();
-  int renderWakes = 0, encoderWakes = 0;
+  int renderWakes = 0, encoderWakes = 0, watchWakes = 0;
   SessionHooks hooks{clock.now(), [this] { ++renderWakes; }, [this] { ++encoderWakes; },
                      [this] { render.interrupt(); }};
   std::shared_ptr<const SceneResolver> resolver =
@@ -251,7 +251,8 @@ struct Workshop {
                 passes,
                 background,
                 [this] { ++renderWakes; },
-                memory},
+                memory,
+                [this] { ++watchWakes; }},
                [this](const PassResult& pass) { last = pass; }),
         encode(
             store, clock.now(), [](const std::string&) {}, background, [this] { ++encoderWakes; }) {

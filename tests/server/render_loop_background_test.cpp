@@ -342,6 +342,33 @@ TEST(RenderLoop, RendersInTheBackgroundWhatCannotBeDividedIntoTurns) {
   EXPECT_TRUE(workshop.passes.waiting.empty());
 }
 
+TEST(RenderLoop, EndsAFirstPictureWhoseRaysTakeTooLongAndRendersItInTheBackground) {
+  for (const bool tooLong : {false, true}) {
+    Workshop workshop;
+    const auto session = workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}});
+    const auto viewer = std::make_shared<FakeViewer>();
+    session->addViewer(viewer);
+    workshop.step();
+    session->patch(seedPatch(5), {});
+    const auto begun = workshop.control->budgets.size(), passes = workshop.control->passes.size();
+    workshop.control->duringPass = [&] {
+      workshop.control->duringPass = {};
+      workshop.clock.advance(75ms + (tooLong ? 300ms : 299ms));
+      workshop.render.watch();
+    };
+    workshop.passes.atOnce = false;
+    workshop.step();
+    EXPECT_EQ(workshop.control->budgets.size(), begun + 1);
+    EXPECT_EQ(workshop.control->passes.size(), passes + !tooLong);
+    EXPECT_FALSE(workshop.last.cancelled);
+    workshop.step();
+    EXPECT_EQ(workshop.passes.waiting.size(), tooLong ? 1u : 0u);
+    workshop.passes.finish();
+    workshop.step();
+    EXPECT_EQ(viewer->frames.back().info.revision, 2u);
+  }
+}
+
 TEST(RenderLoop, LetsLargePicturesNotWaitForPassesWithSlowRays) {
   Workshop workshop;
   const auto slow = workshop.store.create(seedPatch(1));

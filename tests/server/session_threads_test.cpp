@@ -29,6 +29,7 @@ struct RunningServer {
   SessionStore store{std::make_shared<const SceneResolver>(testing::smallStore(), SceneResolver::Options{}),
                      {1000, 5min},
                      hooks};
+  LoopThread watchThread;
   BackgroundThreads pictures, passes, builds;
   RenderLoop render{
       store,
@@ -39,17 +40,21 @@ struct RunningServer {
        pictures,
        passes,
        builds,
-       [this] { renderThread.wake(); }},
+       [this] { renderThread.wake(); },
+       nullptr,
+       [this] { watchThread.wake(); }},
       [](const PassResult&) {}};
   EncodeLoop encode{store, now, [](const std::string&) {}, pictures, [this] { encodeThread.wake(); }};
 
   RunningServer() {
     renderThread.start([this] { return render.step(); });
+    watchThread.start([this] { return render.watch(); });
     encodeThread.start([this] { return encode.step(); });
   }
   ~RunningServer() {
     store.closeAll("the end");
     renderThread.stop();
+    watchThread.stop();
     encodeThread.stop();
   }
 };
