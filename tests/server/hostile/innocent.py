@@ -3,6 +3,7 @@
 import argparse
 import asyncio
 import contextlib
+import itertools
 import os
 import subprocess
 import sys
@@ -20,6 +21,7 @@ SANITIZED = bool(os.environ.get("SCOLOPAX_SANITIZED"))
 FULL = bool(os.environ.get("SCOLOPAX_HOSTILE_FULL"))
 SECONDS = 10 if FULL else 3
 ORBITALS = 256 if FULL else 128
+SESSIONS = 31 if FULL else 8  # of attackers who have many
 PERIOD = 0.05  # between two edits
 # An edit is late if it takes three times as long as the slowest twentieth without an attack, but no less than this: on
 # a busy machine the system itself delays a few.
@@ -92,6 +94,31 @@ async def work(server, dataset):
     call(server, "DELETE", f"/api/v1/sessions/{session['id']}")
 
 
+class Repeated:
+    """`with Repeated(action) as work:` does it again and again in a thread, and notes how long it takes each time."""
+
+    def __init__(self, action):
+        self.action, self.seconds, self.over, self.failures = action, [], threading.Event(), []
+        self.thread = threading.Thread(target=self.run)
+
+    def __enter__(self):
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self.over.set()
+        self.thread.join(120)
+
+    def run(self):
+        try:
+            while not self.over.is_set():
+                begin = time.monotonic()
+                self.action()
+                self.seconds.append(time.monotonic() - begin)
+        except Exception as error:  # pylint: disable=broad-except
+            self.failures.append(error)
+
+
 def percentile(values, p):
     return sorted(values)[min(len(values) - 1, int(p * len(values)))] if values else float("inf")
 
@@ -144,22 +171,66 @@ class HostileTest(unittest.TestCase):
             time.sleep(0.05)
         self.fail(f"{self.descriptors()} descriptors, expected at most {bound}")
 
-    def under(self, attack, memory, seconds=SECONDS):
+    def picture(self, session, patch):
+        """Edits a session and waits for its picture, as somebody does who looks at it at rest."""
+        path = f"/api/v1/sessions/{session['id']}"
+        status, _, body = self.server.call("PATCH", path + "/scene", patch)
+        self.assertEqual(status, 200, body)
+        status = 204
+        while status == 204:
+            status, _, body = self.server.call("GET", path + "/frame")
+        self.assertEqual(status, 200, body)
+
+    def page(self):
+        """Opens a page and closes it when its second picture has come."""
+        session = self.session(image={"width": 256, "height": 256}, stop={"samples": 1})
+        self.picture(session, {"integrator": {"seed": 1}})
+        self.server.call("DELETE", f"/api/v1/sessions/{session['id']}")
+
+    def resting(self, width, height, **integrator):
+        """Looks at a picture of its own until it rests, changes it, and so on."""
+        session = self.session(image={"width": width, "height": height}, stop={"samples": 1}, integrator=integrator)
+        self.addCleanup(self.server.call, "DELETE", f"/api/v1/sessions/{session['id']}")
+        return lambda seeds=itertools.count(1): self.picture(session, {"integrator": {"seed": next(seeds)}})
+
+    def beside(self):
+        """What those do who wait for pictures at rest: for the small ones, the server chooses the method (auto)."""
+        return {"page": self.page, "resting": self.resting(256, 256),
+                "1920x1080": self.resting(1920, 1080, method="raymarch", step=2)}
+
+    def under(self, attack, memory, seconds=SECONDS, beside=None):
         """Calls attack(over) while Innocent works. Asserts that it got at least a tenth of the frames that it gets
         without an attack (a server that stalls sends one or none) and, with the full attacks, that few were late; that
-        the server took at most `memory` MiB (and SLACK) more; and that it closed all descriptors."""
+        each of the actions `beside` is done, too; that the server took at most `memory` MiB (and SLACK) more; and that
+        it closed all descriptors."""
         descriptors, before = self.descriptors(), self.memory()
         with open(f"/proc/{self.server.process.pid}/clear_refs", "w", encoding="utf-8") as file:
             file.write("5")  # VmHWM begins anew
-        self.latencies_under(attack, seconds)
+        self.latencies_under(attack, seconds, beside or {})
         print(f"memory: {before:.0f} MiB before, {self.memory():.0f} MiB after, at most {self.memory('VmHWM'):.0f} MiB",
               flush=True)
         self.assert_memory_below(self.memory("VmHWM"), before + memory + SLACK)
         self.assert_descriptors_at_most(descriptors + 4)
 
-    def latencies_under(self, attack, seconds):
-        with Innocent(self.server) as viewer:
+    def done(self, works, count):
+        """How long each work took, each time since the last call; waits until it has been done `count` times."""
+        for _ in range(1200):
+            if all(len(work.seconds) >= count or work.failures for work in works.values()):
+                break
+            time.sleep(0.1)
+        else:
+            self.fail(f"in two minutes: { {name: work.seconds for name, work in works.items()} }")
+        taken = {name: work.seconds for name, work in works.items()}
+        for work in works.values():
+            work.seconds = []
+        return taken
+
+    def latencies_under(self, attack, seconds, beside):
+        with contextlib.ExitStack() as stack:
+            viewer = stack.enter_context(Innocent(self.server))
+            works = {name: stack.enter_context(Repeated(action)) for name, action in beside.items()}
             before = viewer.watch(max(2, seconds / 3))
+            undisturbed = self.done(works, 1)
             over = threading.Event()
             failures = []
 
@@ -172,6 +243,7 @@ class HostileTest(unittest.TestCase):
             thread = threading.Thread(target=run)
             thread.start()
             during = viewer.watch(seconds)
+            attacked = self.done(works, 2)  # the first may have begun before the attack
             over.set()
             thread.join(120)
             rate = len(before) / max(2, seconds / 3)
@@ -181,7 +253,9 @@ class HostileTest(unittest.TestCase):
                   f"ms, p95 {percentile(before, .95) * 1e3:.0f} ms; attacked {len(during) / seconds:.1f} frames/s, median "
                   f"{percentile(during, .5) * 1e3:.0f} ms, p95 {percentile(during, .95) * 1e3:.0f} ms, longest "
                   f"{max(during, default=float('inf')) * 1e3:.0f} ms; {late} of {len(during)} later than {bar * 1e3:.0f} ms", flush=True)
-            self.assertEqual(failures, [])
+            self.assertEqual(failures + sum((work.failures for work in works.values()), []), [])
+            for name in works:
+                print(f"{name}: undisturbed at most {max(undisturbed[name]):.1f} s, attacked {max(attacked[name]):.1f} s")
             self.assertIsNone(viewer.process.poll())
             self.assertGreaterEqual(len(during), rate * seconds / 10)
             if FULL and not SANITIZED:

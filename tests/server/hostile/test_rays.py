@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Scenes of which a single ray takes long: they keep nobody else waiting."""
+import asyncio
 import os
 import sys
 import unittest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from innocent import HostileTest  # noqa: E402
+from innocent import SESSIONS, HostileTest, Viewer, reading  # noqa: E402
 
 # Thousands of short steps, and as many again for every shadow ray from each lit part to each light.
 SLOW = {
@@ -19,7 +20,12 @@ SLOW = {
 CROWDED = [[0.5 + i / 1e7, i % 2] for i in range(4096)]
 
 
+FILMS = 500  # MiB that the pictures of 1920 x 1080 pixels take
+
+
 class Rays(HostileTest):
+    options = ("--max-sessions", "40")
+
     def edit(self, scene, patch_of):
         """Edits a session all the time, and asks for its pictures."""
         session = self.session(**scene)
@@ -37,6 +43,35 @@ class Rays(HostileTest):
 
     def test_that_take_millions_of_steps(self):
         self.edit(SLOW, lambda number: {"camera": {"fovY": 30 + number % 10}})
+
+    def test_that_ever_new_sessions_have(self):
+        async def edit_once():
+            session = self.session(**SLOW)
+            async with Viewer(self.server, session) as viewer, reading(viewer):
+                await viewer.patch({"camera": {"fovY": 31}})
+                await asyncio.sleep(0.3)
+                self.server.call("DELETE", f"/api/v1/sessions/{session['id']}")
+
+        def attack(over):
+            while not over.is_set():
+                asyncio.run(edit_once())
+        self.under(attack, 64)
+
+    def test_that_many_sessions_have(self):
+        async def watch(over, session):
+            async with Viewer(self.server, session) as viewer, reading(viewer):
+                while not over.is_set():
+                    await asyncio.sleep(0.1)
+
+        async def watch_all(over, sessions):
+            await asyncio.gather(*(watch(over, session) for session in sessions))
+
+        def attack(over):
+            sessions = [self.session(**SLOW) for _ in range(SESSIONS)]
+            asyncio.run(watch_all(over, sessions))
+            for session in sessions:
+                self.server.call("DELETE", f"/api/v1/sessions/{session['id']}")
+        self.under(attack, 8 * SESSIONS + FILMS, beside=self.beside())
 
     def test_over_curves_with_all_points_in_one_place(self):
         self.edit({"dataset": "orbitals"}, lambda number: {"channels": {"0": {"range": [-1, 1], "opacity": CROWDED[number % 9:]}}})
