@@ -178,6 +178,7 @@ void ProgressiveRender::takeScene(const RenderRequest& request, const Others& ot
     dropRenderer();
     resolution_.forget();
   }
+  if (film_.recording && !request.aovs) dropRenderer();  // with the memory of the records
   volume_ = volume;
   film_.abandoned = film_.unfinished;
   film_.unfinished = false;

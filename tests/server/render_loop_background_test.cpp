@@ -402,6 +402,24 @@ TEST(RenderLoop, BeginsToRecordAovsInTheBackground) {
   EXPECT_NE(session->latestFrame()->aovs, nullptr);
 }
 
+TEST(RenderLoop, EndsRecordingWithAnEditWhenNobodyAsksForAovsAnyMore) {
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
+  session->addViewer(std::make_shared<FakeViewer>());
+  session->waitForFrame({.aovs = true}, 0ms);
+  workshop.steps(3);
+  ASSERT_NE(session->latestFrame()->aovs, nullptr);
+  const int made = workshop.control->renderersMade;
+  workshop.clock.advance(60s);
+  session->patch(seedPatch(2), {});
+  workshop.steps(3);
+  EXPECT_EQ(workshop.control->renderersMade, made + 1);  // the records are those of the renderer
+  workshop.clock.advance(10s);
+  workshop.steps(6);
+  EXPECT_EQ(session->latestFrame()->info.revision, session->scene().revision);
+  EXPECT_EQ(session->latestFrame()->aovs, nullptr);
+}
+
 TEST(RenderLoop, AddsUpInTheBackgroundWhatIsLargeInBytes) {
   Workshop workshop;
   const auto session = workshop.store.create(json::object());
