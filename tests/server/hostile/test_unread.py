@@ -5,13 +5,15 @@ import asyncio
 import contextlib
 import json
 import os
+import socket
 import sys
+import time
 import unittest
 
 import websockets
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from innocent import FULL, HostileTest, Viewer  # noqa: E402
+from innocent import FULL, SLACK, HostileTest, Viewer  # noqa: E402
 from protocol_client import connect  # noqa: E402
 
 CLIENTS = 8 if FULL else 3
@@ -136,6 +138,79 @@ class Unread(HostileTest):
                 await round_of_edits(over)
         self.under(lambda over: asyncio.run(run(over)), UNREAD, 20 if FULL else 8)
         self.assert_closed(closed)
+
+
+class UnreadAnswers(HostileTest):
+    """Answers that are not read leave most of the memory to others."""
+    orbitals = 64
+
+    def send(self, connections, head, body=b"", times=1):
+        """A socket that has sent a request this many times, and reads nothing unless it is told to."""
+        client = connections.enter_context(socket.socket())
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.settimeout(300)
+        client.connect(("127.0.0.1", self.server.port))
+        head = (f"{head} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {self.server.token}\r\n"
+                f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n")
+        client.sendall(times * (head.encode() + body))
+        return client
+
+    def check(self, leave_unread):
+        """Calls leave_unread(connections). Then the memory for answers is bounded, and others can render."""
+        before, used, renders = self.memory(), [], []
+        with contextlib.ExitStack() as connections:
+            leave_unread(connections)
+            # Until the most that was in use is known for a while.
+            while len(used) < 600 and not (any(used) and max(used) == max(used[:-10], default=0)):
+                used.append(self.metric('scolopax_memory_bytes{use="answers"}'))
+                renders.append(self.server.call("POST", "/api/v1/render", {
+                    "image": {"width": 64, "height": 64}, "stop": {"samples": 1}})[0])
+                time.sleep(0.5)
+        print(f"\n{self.id().split('.')[-1]}: at most {max(used) / 2**20:.1f} of {self.budget / 4:.0f} MiB of unread answers; "
+              f"{before:.0f} MiB before, {self.memory():.0f} MiB after", flush=True)
+        self.assertGreater(max(used), 0)
+        self.assertLessEqual(max(used), self.budget / 4 * 2**20)
+        self.assertEqual(set(renders), {200})
+        self.assert_memory_below(self.memory(), before + self.budget + SLACK)
+
+
+class Pictures(UnreadAnswers):
+    budget = 256  # MiB
+    options = ("--max-memory", str(budget))
+
+    def test_pictures_that_are_not_read_leave_memory_to_others(self):
+        session = self.session(dataset="orbitals", image={"width": 1024, "height": 1024}, stop={"samples": 1})
+        path = f"/api/v1/sessions/{session['id']}/frame?timeout=20&format="
+        self.assertIn(200, (self.server.call("GET", path + "jpeg")[0] for _ in range(10)))
+        statuses = []
+
+        def leave_unread(connections):
+            for _ in range(30):
+                statuses.append(self.send(connections, "GET " + path + "exr").recv(12, socket.MSG_WAITALL))
+        self.check(leave_unread)
+        self.assertEqual(set(statuses), {b"HTTP/1.1 200", b"HTTP/1.1 503"})
+
+
+class Edits(UnreadAnswers):
+    budget = 64
+    options = ("--max-memory", str(budget))
+
+    def test_edits_whose_answers_are_not_read_leave_memory_to_others(self):
+        session = self.session(dataset="orbitals", image={"width": 64, "height": 64})
+        path = f"/api/v1/sessions/{session['id']}/scene"
+        for channel in range(4):
+            self.assertEqual(self.server.call("PATCH", path, {"channels": {str(channel): {
+                "opacity": CURVE, "colormap": [[position, "#102030"] for position, _ in CURVE]}}})[0], 200)
+        self.assertGreater(len(self.server.call("GET", path)[2]), 800_000)
+
+        def leave_unread(connections):
+            for _ in range(100 if FULL else 24):
+                self.send(connections, "PATCH " + path, b"{}", times=6)
+        self.check(leave_unread)
+        # A script that makes an edit learns its revision in any case.
+        status, answer = self.server.json("PATCH", path, {})
+        self.assertEqual(status, 200)
+        self.assertGreater(answer["revision"], 5)
 
 
 if __name__ == "__main__":
