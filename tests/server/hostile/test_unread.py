@@ -121,8 +121,8 @@ class Unread(HostileTest):
         async def round_of_edits(over):
             stalled = [await self.stall(session) for _ in range(CLIENTS)]
             most = number = 0
-            # The texts of a connection are dropped when it is closed.
-            while not over.is_set() and (now := await asyncio.to_thread(unread)) >= most / 4:
+            # The texts of a connection are dropped when it is closed: until then one holds some most / CLIENTS.
+            while not over.is_set() and (now := await asyncio.to_thread(unread)) >= most / (2 * CLIENTS):
                 most, number = max(most, now), number + 1
                 status, _, _ = await asyncio.to_thread(
                     self.server.call, "PATCH", path + "/scene", {"channels": {"0": {"opacity": CURVE[:4000 + number % 90]}}})
