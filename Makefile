@@ -2,7 +2,7 @@
 # make run     builds the program and the page and serves DATA, or generated demo data, on loopback
 # make test    builds and runs the tests
 # make check   does more: sanitizers, clang-tidy, fuzzing, hostile clients with large volumes, and make test with
-#              twice the samples and all combinations in the statistical tests, and 2000 random scenes
+#              all combinations in the statistical tests and 2000 random scenes. May be interrupted and continued
 # make fuzz    runs every fuzzer for another FUZZ_SECONDS, on the corpus of earlier runs
 # make soak    tests SCENES more random scenes, starting where the last run ended; keeps failing ones in build/soak
 DATA ?=
@@ -24,7 +24,7 @@ SCOLOPAX := build/release/scolopax
 # Parallel recipes would run .ci/install twice at once; the tools called use all processors by themselves.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: fuzzers run build web test check check-bench check-hostile check-asan-ubsan check-tsan check-tidy check-fuzz check-format check-cuda fuzz soak deps test-deps format clean
+.PHONY: fuzzers run build web test check check-test check-bench check-hostile check-asan-ubsan check-tsan check-tidy check-fuzz check-format check-cuda fuzz soak deps test-deps format clean
 
 run: build web $(if $(strip $(DATA)),,$(DEMO))
 	exec $(SCOLOPAX) serve $(if $(strip $(DATA)),$(DATA),$(DEMO)) --port $(PORT)
@@ -47,11 +47,20 @@ test: test-deps web
 	$(call run-tests,release,-j $(JOBS) -LE hostile)
 
 # A target's variables hold for what it needs, too, unless that has its own: these are for test.
-check: export SCOLOPAX_STATISTICS := 2
+check: export SCOLOPAX_COMBINATIONS := all
 check: export SCOLOPAX_RANDOM_SCENES := 2000
-check-asan-ubsan: export SCOLOPAX_STATISTICS := 1
+check-asan-ubsan: export SCOLOPAX_COMBINATIONS := pairs
 check-asan-ubsan: export SCOLOPAX_RANDOM_SCENES := 20
-check: check-format test check-bench check-hostile check-asan-ubsan check-cuda check-fuzz check-tsan check-tidy
+check: $(foreach stage,format test bench hostile asan-ubsan cuda fuzz tsan tidy,passed-$(stage))
+
+# A stage that has passed is not run again on the same commit, so that an interrupted check can be continued.
+passed-%:
+	@commit=$$(git status --porcelain | grep -q . && echo changed || git rev-parse HEAD); \
+	if [ $$commit = changed ] || [ "$$(cat build/passed/$* 2> /dev/null)" != $$commit ]; then \
+	  $(MAKE) check-$* && mkdir -p build/passed && echo $$commit > build/passed/$*; \
+	else echo "check-$* has passed on this commit"; fi
+
+check-test: test
 
 # Benchmarks are built for a report only: this shows that they still can be.
 check-bench: test-deps

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every tracker against the reference, and against the others, in blend modes, lights and scenes: every pair
-// of settings or, with SCOLOPAX_STATISTICS above 1, all combinations.
+// of settings or, with SCOLOPAX_COMBINATIONS=all, all combinations.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ class Estimators : public testing::TestWithParam<int> {};
 TEST_P(Estimators, HaveTheMeanOfTheReferenceAndOfEachOther) {
   const auto made = testScene(kTestScenes[GetParam()]);
   if (!made) GTEST_SKIP() << "the data set is absent from " << SCOLOPAX_DATA_DIR;
-  for (const Setting& setting : statisticsFactor() > 1 ? allSettings() : pairwiseSettings()) {
+  for (const Setting& setting : allCombinations() ? allSettings() : pairwiseSettings()) {
     if (setting.scene != GetParam()) continue;
     const Scene scene = withSetting(made->scene, setting.blend, setting.light);
     SCOPED_TRACE(testing::Message() << nameOf(scene.blend) << ' '

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Multi-level quadrature must have the reference's mean, from a coarse base step, in every scene, blend mode
-// and light: every pair of settings or, with SCOLOPAX_STATISTICS above 1, all combinations.
+// and light: every pair of settings or, with SCOLOPAX_COMBINATIONS=all, all combinations.
 #include <gtest/gtest.h>
 
 #include "tests/support/agreement.h"
