@@ -50,6 +50,7 @@ test: test-deps web
 check: export SCOLOPAX_COMBINATIONS := all
 check: export SCOLOPAX_RANDOM_SCENES := 2000
 check-asan-ubsan: export SCOLOPAX_COMBINATIONS := pairs
+check-asan-ubsan: export SCOLOPAX_STATISTICS := 0.1
 check-asan-ubsan: export SCOLOPAX_RANDOM_SCENES := 20
 check: $(foreach stage,format test bench hostile asan-ubsan cuda fuzz tsan tidy,passed-$(stage))
 

@@ -42,6 +42,7 @@ void ProgressiveRender::dropRenderer() {
   pick_.forget();
   film_.scene.reset();
   volume_.reset();
+  quick_ = false;
   film_.recording = film_.unfinished = false;
   if (!renderer_) return;
   context_.pictures.start(
@@ -241,7 +242,8 @@ void ProgressiveRender::addSample(const RenderRequest& request, const Others& ot
   if (!film_.unfinished) film_.passBegan = begin, film_.passSeconds = 0;
   part_ = std::make_shared<PassPart>();
   part_->slice = slice;
-  part_->inBackground = begin < slowUntil_;
+  // Not known to be quick: what takes long must not delay those at which edits arrive.
+  part_->inBackground = begin < slowUntil_ || (!quick_ && others.edited > 0);
   if (part_->inBackground) {
     const auto render = [part = part_, renderer = renderer_, now = context_.now](
                             const std::stop_token& stop) { part->render(*renderer, now, stop); };
@@ -261,6 +263,7 @@ void ProgressiveRender::partRendered(PassResult& result) {
   const auto part = std::exchange(part_, nullptr);
   const bool slow = part->seconds >= std::chrono::duration<double>(part->slice + kSlowRay).count();
   if (slow) slowUntil_ = context_.now() + kSlowTime;
+  quick_ = !slow;
   result.cancelled = part->ended && !slow;
   film_.passSeconds += part->seconds;
   film_.unfinished = !part->complete;

@@ -135,6 +135,7 @@ class ProgressiveRender {
   FilmState film_;
   ResolutionPolicy resolution_;
   TimePoint slowUntil_{};   ///< until then, passes are rendered in the background
+  bool quick_ = false;      ///< the last part of a pass took no longer than its turn
   double filmSeconds_ = 0;  ///< spent on the film's samples
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
   std::shared_ptr<const Image> reduced_;  ///< this revision's last reduced picture, while it is needed

@@ -97,6 +97,7 @@ class SamplerOf {
   /// Borrows `number`.
   SCOLOPAX_LANES SamplerOf(Word pixel, const SampleNumber& number, std::uint32_t seed)
       : number_(number), pixel_(pixel), seed_(seed) {}
+  SamplerOf(Word pixel, const SampleNumber&& number, std::uint32_t seed) = delete;
   /// Returns the next block. Lanes that are not in `which` do not advance, and their numbers are undefined.
   SCOLOPAX_LANES Block next(Mask which = L::everywhere()) {
     const Word block = block_;

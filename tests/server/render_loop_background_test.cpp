@@ -342,6 +342,29 @@ TEST(RenderLoop, RendersInTheBackgroundWhatCannotBeDividedIntoTurns) {
   EXPECT_TRUE(workshop.passes.waiting.empty());
 }
 
+TEST(RenderLoop, RendersTheFirstPassOfASessionInTheBackgroundWhileAnotherIsEdited) {
+  Workshop workshop;
+  const auto edited = workshop.store.create(seedPatch(1)), other = workshop.store.create(seedPatch(2));
+  edited->addViewer(std::make_shared<FakeViewer>());
+  workshop.steps(3);
+  workshop.passes.atOnce = false;
+  edited->patch(seedPatch(3), {});
+  other->addViewer(std::make_shared<FakeViewer>());
+  workshop.steps(4);
+  EXPECT_EQ(workshop.control->passes.back(), 3u);
+  ASSERT_EQ(workshop.passes.waiting.size(), 1u);
+  workshop.passes.finish();
+  EXPECT_EQ(workshop.control->passes.back(), 2u);
+  // Its rays were quick, so it takes turns from now on.
+  edited->patch(seedPatch(4), {});
+  const auto passes = workshop.control->passes.size();
+  workshop.steps(4);
+  EXPECT_TRUE(workshop.passes.waiting.empty());
+  EXPECT_GT(std::count(workshop.control->passes.begin() + std::ptrdiff_t(passes),
+                       workshop.control->passes.end(), 2u),
+            0);
+}
+
 TEST(RenderLoop, EndsAFirstPictureWhoseRaysTakeTooLongAndRendersItInTheBackground) {
   for (const bool tooLong : {false, true}) {
     Workshop workshop;

@@ -20,9 +20,9 @@
 namespace scolopax::test {
 
 inline constexpr int kReplicates = 32;
-/// Samples of a replicate, times statisticsFactor().
+/// Samples of a replicate, but for statisticsFactor().
 inline constexpr int kSamplesPerReplicate = 64;
-inline int samplesPerReplicate() { return kSamplesPerReplicate * statisticsFactor(); }
+inline int samplesPerReplicate() { return timesFactor(kSamplesPerReplicate); }
 
 struct Replicates {
   std::vector<Image> pictures;  ///< each is the mean of `samples` samples per pixel

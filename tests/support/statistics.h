@@ -17,15 +17,16 @@
 
 namespace scolopax::test {
 
-/// Factor for every number of samples here: the environment variable SCOLOPAX_STATISTICS, 1 to 1000; 1 if
-/// unset.
-inline int statisticsFactor() {
-  static const int factor = [] {
+/// Factor for every number of samples here: the environment variable SCOLOPAX_STATISTICS, 0.01 to 1000; 1 if
+/// unset. With less than 1, tests that must detect something skip: they need their samples.
+inline double statisticsFactor() {
+  static const double factor = [] {
     const char* text = std::getenv("SCOLOPAX_STATISTICS");
-    return text ? std::clamp(std::atoi(text), 1, 1000) : 1;
+    return text ? std::clamp(std::atof(text), 0.01, 1000.0) : 1.0;
   }();
   return factor;
 }
+inline int timesFactor(int samples) { return std::max(1, int(std::lround(samples * statisticsFactor()))); }
 /// Whether tests use all combinations of the settings that they vary: if the environment variable
 /// SCOLOPAX_COMBINATIONS is "all", as in `make check`. Otherwise they cover all pairs.
 inline bool allCombinations() {
@@ -39,7 +40,7 @@ inline Image renderSamples(const std::shared_ptr<const Volume>& volume, const Sc
   const auto renderer = makeCpuRenderer(volume, threads);
   renderer->setScene(scene);
   const std::atomic<bool> cancel = false;
-  for (int i = 0; i < samples * statisticsFactor(); ++i) renderer->renderSample(cancel);
+  for (int i = 0; i < timesFactor(samples); ++i) renderer->renderSample(cancel);
   return renderer->image();
 }
 
@@ -72,7 +73,7 @@ inline reference::ReferenceImage flat(const Scene& scene, glm::dvec4 value) {
 ///    components of a pixel may be identical (alpha and the only colour).
 inline ::testing::AssertionResult isUnbiased(const Image& found, int samples,
                                              const reference::ReferenceImage& expected) {
-  const double n = double(samples) * statisticsFactor();
+  const double n = timesFactor(samples);
   const std::size_t pixels = found.pixels.size();
   const double logTerm = std::log(2.0 * 4.0 * double(pixels) / 1e-9);
   const double tolerance = expected.maximumRayError + 1e-6;

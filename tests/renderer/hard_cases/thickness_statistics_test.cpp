@@ -142,7 +142,7 @@ TEST(Thickness, DoesNotDriftInAMillionSamples) {
   for (const Method method : kTrackers) {
     const Image image = renderAnalog(volume, scene, method, 1'000'000, 1);
     EXPECT_TRUE(isUnbiased(image, 1'000'000, flat(scene, {alpha, 0, 0, alpha})));
-    const double samples = 1e6 * statisticsFactor();
+    const double samples = timesFactor(1'000'000);
     const double hits =
         double(image.pixels[0].a) * samples;  // a whole number: no sample is lost or added twice
     EXPECT_NEAR(hits, std::round(hits), samples * 0x1p-25);

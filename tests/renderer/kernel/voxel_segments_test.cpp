@@ -18,7 +18,8 @@ using namespace test;
 
 /// The optical depths of the segments of a ray through constant matter of which a share `left` is seen.
 std::vector<float> depthsOfSegments(const SceneView& view, float extinction, float left, float most) {
-  Sampler sampler(0, SampleNumber{}, 1);
+  const SampleNumber number{};
+  Sampler sampler(0, number, 1);
   const PixelRay<One> at = rayThrough<One>(view, 0, 0, sampler, true);
   SegmentCubics<One, SceneView> scalars;
   SampleCost cost;
