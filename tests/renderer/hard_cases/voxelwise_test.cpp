@@ -65,7 +65,7 @@ TEST(Voxelwise, DividesCellsOfDenseMatter) {
 
 TEST(Voxelwise, DividesFrontsBehindWhichTheColorChanges) {
   // The front of a ramp of extinction is 0.004 voxels deep. Equal steps average all colours of the step that
-  // it is in, as README says.
+  // contains it (docs/how-it-works.md).
   const glm::ivec3 dims(8, 8, 8);
   const auto volume =
       volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int, int, int z) { return 32 * z; }));

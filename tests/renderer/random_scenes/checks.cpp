@@ -296,8 +296,8 @@ class Checks {
     const Worst worst = worstOf(found, longTruth(),
                                 [&](std::size_t i, int c) { return allowed(i, c) + hidden[i] * largest_; });
     if (!worst.beyond()) return;
-    // Absorption within a segment is ignored (README): while a step may be opaque, errors do not fall with
-    // the step yet, and differences between steps give no bound.
+    // Absorption within a segment is ignored (docs/how-it-works.md). While a step may be opaque, errors do
+    // not fall with the step yet, and differences between steps give no bound.
     if (depthOfStep(scene) > 1) return;
     std::ostringstream text;
     text << textOf(worst, found) << "; at steps";
