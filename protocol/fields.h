@@ -62,14 +62,15 @@ concept Described = requires {
 template <>
 struct Table<Material> {
   static constexpr std::string_view title = "Material";
-  static constexpr std::string_view doc = "How a channel answers light (Blinn-Phong).";
+  static constexpr std::string_view doc = "How a channel reflects light (Blinn-Phong).";
   static constexpr auto fields = std::tuple{
       field("ambient", &Material::ambient, "Light that comes from everywhere; also what is left in shadow.",
             {.atLeast = 0, .atMost = 10}),
       field("diffuse", &Material::diffuse, "Matt reflection.", {.atLeast = 0, .atMost = 10}),
       field("specular", &Material::specular, "Highlight, in the light's colour.",
             {.atLeast = 0, .atMost = 10}),
-      field("shininess", &Material::shininess, "Exponent of the highlight: larger is smaller and sharper.",
+      field("shininess", &Material::shininess,
+            "Exponent of the highlight; a larger one makes it smaller and sharper.",
             {.above = 0, .atMost = 10000}),
   };
 };
@@ -92,17 +93,16 @@ template <>
 struct Table<GradientOpacity> {
   static constexpr std::string_view title = "GradientOpacity";
   static constexpr std::string_view doc =
-      "A factor of the opacity by the magnitude of the gradient: emphasizes boundaries and "
+      "A factor of the opacity that depends on the magnitude of the gradient: it emphasises boundaries and "
       "hides homogeneous regions.";
   static constexpr auto fields = std::tuple{
-      field(
-          "range", &GradientOpacity::range,
-          "[lo, hi]: the magnitudes at positions 0 and 1 of the curve; those outside clamp to the ends. lo > "
-          "hi reverses, lo = hi is a step. null is chosen from the data that has opacity.",
-          {.unit = "data units per world unit"}),
+      field("range", &GradientOpacity::range,
+            "[lo, hi]: the magnitudes at positions 0 and 1 of the curve; magnitudes outside are clamped. lo "
+            "> hi reverses the curve, lo = hi is a step. null is chosen from the data that has opacity.",
+            {.unit = "data units per world unit"}),
       field("points", &GradientOpacity::points,
-            "Control points [position, factor] over the range, as those of opacity; the factor multiplies "
-            "opacity.",
+            "Control points [position, factor] over the range, interpolated as for opacity. The factor "
+            "multiplies the opacity.",
             {.maxItems = kMaxControlPoints}),
   };
 };
@@ -114,9 +114,9 @@ struct Table<Isovalue> {
   static constexpr auto fields = std::tuple{
       field("value", &Isovalue::value, "The value; null is the middle of the channel's range.",
             {.unit = "data units"}),
-      field("opacity", &Isovalue::opacity, "Share of the light from behind that the surface takes.",
+      field("opacity", &Isovalue::opacity, "Share of the light from behind that the surface absorbs.",
             {.atLeast = 0, .atMost = 1}),
-      field("color", &Isovalue::color, "Colour; null is the channel's at the value.", {.color = true}),
+      field("color", &Isovalue::color, "Colour; null is the channel's colour at the value.", {.color = true}),
   };
 };
 
@@ -126,34 +126,36 @@ struct Table<Channel> {
   static constexpr std::string_view doc = "How one channel of the data set looks.";
   static constexpr Exclusive exclusive[] = {{"color", "colormap", true}};
   static constexpr auto fields = std::tuple{
-      field("name", &Channel::name, "Label; null takes the data set's.", {.maxLength = 256}),
+      field("name", &Channel::name, "Label; null is the name in the data set.", {.maxLength = 256}),
       field("visible", &Channel::visible, "Whether the channel is drawn."),
-      field(
-          "range", &Channel::range,
-          "[lo, hi]: the data values at positions 0 and 1 of the curves; scalars outside clamp to the ends. "
-          "lo > hi reverses, lo = hi is a step. null is chosen from the histogram.",
-          {.unit = "data units"}),
+      field("range", &Channel::range,
+            "[lo, hi]: the data values at positions 0 and 1 of the curves; values outside are clamped. lo > "
+            "hi reverses the curves, lo = hi is a step. null is chosen from the histogram.",
+            {.unit = "data units"}),
       field("interpolation", &Channel::interpolation,
-            "How values between voxel centres follow from the voxels.", {.names = &Lists::interpolations}),
+            "How values between voxel centres are computed from the voxels.",
+            {.names = &Lists::interpolations}),
       field("color", &Channel::color,
-            "One colour for all values. Not together with colormap; null for both is chosen by the server.",
+            "One colour for all values; cannot be set together with colormap. If both are null, the server "
+            "chooses.",
             {.color = true}),
       field("colormap", &Channel::colormap,
             "Colour over the range: a name, or control points [position, color], interpolated in linear RGB.",
             {.maxItems = kMaxControlPoints, .names = &Lists::colormaps}),
-      field("opacity", &Channel::opacity,
-            "Control points [position, value] over the range: linear between, constant outside; positions do "
-            "not decrease, of two equal ones the later holds from there on.",
-            {.maxItems = kMaxControlPoints}),
+      field(
+          "opacity", &Channel::opacity,
+          "Control points [position, value] over the range: linear between them, constant outside. Positions "
+          "must not decrease; of two points at the same position, the later one applies from there on.",
+          {.maxItems = kMaxControlPoints}),
       field("gradientOpacity", &Channel::gradientOpacity,
-            "Opacity by the magnitude of the gradient; null is opacity that does not depend on it."),
+            "Opacity by the magnitude of the gradient; with null, opacity does not depend on the gradient."),
       field("isovalues", &Channel::isovalues,
-            "Surfaces, drawn in every blend mode and whatever the opacity curve. Together with the peaks at "
-            "most 32.",
+            "Surfaces, drawn in every blend mode and with any opacity curve; at most 32 together with the "
+            "peaks.",
             {.maxItems = kMaxIsovalueItems}),
       field("peaks", &Channel::peaks,
-            "Surfaces at the maxima of the opacity curve, as opaque as matter there that is as thick as the "
-            "smallest voxel spacing.",
+            "Surfaces at the maxima of the opacity curve. Each is as opaque as a layer of that opacity, one "
+            "smallest voxel spacing thick.",
             {.names = &Lists::peaks}),
       field("gamma", &Channel::gamma, "The position is raised to this power before both curves are read.",
             {.above = 0, .atMost = 100}),
@@ -161,7 +163,7 @@ struct Table<Channel> {
             {.unit = "1 / world unit", .atLeast = 0, .atMost = 1e30}),
       field("weight", &Channel::weight, "Factor of the channel's colour in blend mode mix.",
             {.atLeast = 0, .atMost = 1e6}),
-      field("material", &Channel::material, "How the channel answers light."),
+      field("material", &Channel::material, "How the channel reflects light."),
   };
 };
 
@@ -178,14 +180,14 @@ template <>
 struct Table<Camera> {
   static constexpr std::string_view title = "Camera";
   static constexpr std::string_view doc =
-      "Right-handed, in world space. What is null of eye, target and up is chosen so that what can be seen "
+      "Right-handed, in world space. If eye, target or up is null, it is chosen so that everything visible "
       "is in view.";
   static constexpr Exclusive exclusive[] = {{"fovY", "orthoHeight", false}};
   static constexpr auto fields = std::tuple{
       field("eye", &Camera::eye, "Where the camera stands; an orthographic camera's rays start in its plane.",
             {.unit = "world units"}),
       field("target", &Camera::target, "What it looks at.", {.unit = "world units"}),
-      field("up", &Camera::up, "Direction that points up in the picture; need not be normalised."),
+      field("up", &Camera::up, "Direction that is up in the picture; need not be normalised."),
       field("fovY", &Camera::fovY, "Full vertical angle of view of a perspective camera.",
             {.unit = "degrees", .above = 0, .below = 180}),
       field("orthoHeight", &Camera::orthoHeight,
@@ -201,7 +203,8 @@ struct Table<ClipPlane> {
   static constexpr auto fields = std::tuple{
       field("point", &ClipPlane::point, "A point of the plane; null is the volume's centre.",
             {.unit = "world units"}),
-      field("normal", &ClipPlane::normal, "Points to the side that is kept; need not be normalised, not 0."),
+      field("normal", &ClipPlane::normal,
+            "Points to the side that is kept; must not be 0, need not be normalised."),
       field("media", &ClipPlane::media, "Indices of the channels that are clipped; null is all.",
             {.atLeast = 0, .atMost = double(kMaxChannelItems - 1), .maxItems = kMaxChannelItems}),
   };
@@ -211,7 +214,7 @@ template <>
 struct Table<Crop> {
   static constexpr std::string_view title = "Crop";
   static constexpr std::string_view doc =
-      "Two planes along every axis part the volume into 27 regions, of which some are kept.";
+      "Two planes across every axis divide the volume into 27 regions, of which some are kept.";
   static constexpr auto fields = std::tuple{
       field("x", &Crop::x, "[a, b]: the planes across the first axis; null is the volume's faces.",
             {.unit = "voxels"}),
@@ -228,17 +231,16 @@ template <>
 struct Table<Integrator> {
   static constexpr std::string_view title = "Integrator";
   static constexpr std::string_view doc =
-      "How the picture is computed; all methods draw the same, but for noise and bias.";
+      "How the picture is computed. All methods show the same picture, except for noise and bias.";
   static constexpr auto fields = std::tuple{
-      field("method", &Integrator::method, "What follows the rays.", {.names = &Lists::methods}),
+      field("method", &Integrator::method, "Rendering method.", {.names = &Lists::methods}),
       field("macrocell", &Integrator::macrocell, "Edge of the cells that bound the extinction.",
             {.unit = "voxels", .atLeast = 1, .atMost = 64}),
-      field(
-          "step", &Integrator::step,
-          "Step of raymarch and hybrid, at least 0.01; 0: from one face of voxel cells to the next, between "
-          "which trilinear scalars are cubics. auto finds its own.",
-          {.unit = "smallest voxel spacing", .atLeast = 0, .atMost = 100}),
-      field("sampling", &Integrator::sampling, "How the numbers of a pixel's samples are drawn.",
+      field("step", &Integrator::step,
+            "Step of raymarch and hybrid, at least 0.01; with 0, steps end at the faces of voxel cells. auto "
+            "chooses its own steps.",
+            {.unit = "smallest voxel spacing", .atLeast = 0, .atMost = 100}),
+      field("sampling", &Integrator::sampling, "How the random numbers of a pixel's samples are drawn.",
             {.names = &Lists::samplings}),
       field("seed", &Integrator::seed, "Same scene, seed and sample count: the same picture, bit for bit.",
             {.atLeast = 0, .atMost = 4294967295.0}),
@@ -263,9 +265,8 @@ template <>
 struct Table<Stop> {
   static constexpr std::string_view title = "Stop";
   static constexpr std::string_view doc =
-      "When rendering ends: at the first of these that is reached. With none set, 64 samples for a render "
-      "and "
-      "4096 in a session.";
+      "When rendering ends: at the first of these limits that is reached. If none is set, after 64 samples "
+      "in a render and 4096 in a session.";
   static constexpr auto fields = std::tuple{
       field("samples", &Stop::samples, "Samples per pixel.", {.atLeast = 1, .atMost = 16777216}),
       field("seconds", &Stop::seconds, "Time spent rendering.", {.unit = "seconds", .above = 0}),
@@ -281,16 +282,17 @@ struct Table<Scene> {
   static constexpr auto fields = std::tuple{
       field("dataset", &Scene::dataset, "Id of the data set; null is the first.", {.maxLength = 256}),
       field("channels", &Scene::channels,
-            "Entry i is the i-th channel of the data set; missing ones take the defaults.",
+            "Entry i is the i-th channel of the data set; missing entries have the defaults.",
             {.maxItems = kMaxChannelItems}),
       field("blend", &Scene::blend, "How the channels are combined."),
-      field("camera", &Scene::camera, "Where one looks from."),
+      field("camera", &Scene::camera, "Where the eye is and where it looks."),
       field("clip", &Scene::clip, "Planes that cut away what lies behind them.", {.maxItems = kMaxClipItems}),
       field("crop", &Scene::crop, "Boxes that are cut away."),
       field("lights", &Scene::lights, "Lights for shading and shadows; none means one headlight, at the eye.",
             {.maxItems = kMaxLightItems}),
       field("shading", &Scene::shading,
-            "Light by the gradient of the scalar field, faded where the field is flat."),
+            "Lighting with the gradient of the scalar field as the surface normal; fades where the field is "
+            "flat."),
       field("shadows", &Scene::shadows, "Whether channels cast shadows, on themselves and each other."),
       field("integrator", &Scene::integrator, "How the picture is computed."),
       field("image", &Scene::image, "The picture."),
