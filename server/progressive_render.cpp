@@ -28,8 +28,11 @@ constexpr std::chrono::seconds kSlowTime{10};
 }  // namespace
 
 ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, const RenderContext& context,
-                                     PassEnds& ends)
-    : session_(std::move(session)), context_(context), ends_(ends), resolution_(context.policy) {}
+                                     PassInterrupter& interrupter)
+    : session_(std::move(session)),
+      context_(context),
+      interrupter_(interrupter),
+      resolution_(context.policy) {}
 
 ProgressiveRender::~ProgressiveRender() {
   if (job_) job_->cancel();
@@ -251,10 +254,10 @@ void ProgressiveRender::addSample(const RenderRequest& request, const Others& ot
     return;
   }
   const auto render = [&](const std::stop_token&) {
-    const PassEnds::Watched watched(ends_, begin + slice + kSlowRay);
+    const PassInterrupter::Watched watched(interrupter_, begin + slice + kSlowRay);
     // A turn between two urgent ones is short but not interrupted, so it makes progress however fast edits
     // come.
-    part_->render(*renderer_, context_.now, ends_.flag(urgent || othersWait));
+    part_->render(*renderer_, context_.now, interrupter_.flag(urgent || othersWait));
   };
   perform(nullptr, render, &ProgressiveRender::partRendered, result);
 }
@@ -264,7 +267,7 @@ void ProgressiveRender::partRendered(PassResult& result) {
   const bool slow = part->seconds >= std::chrono::duration<double>(part->slice + kSlowRay).count();
   if (slow) slowUntil_ = context_.now() + kSlowTime;
   quick_ = !slow;
-  result.cancelled = part->ended && !slow;
+  result.cancelled = part->interrupted && !slow;
   film_.passSeconds += part->seconds;
   film_.unfinished = !part->complete;
   if (!part->complete) return;

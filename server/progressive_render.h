@@ -11,7 +11,7 @@
 #include "server/background.h"
 #include "server/film_state.h"
 #include "server/parked_renderers.h"
-#include "server/pass_ends.h"
+#include "server/pass_interrupter.h"
 #include "server/resolution.h"
 #include "server/session.h"
 
@@ -64,8 +64,9 @@ class ProgressiveRender {
     still,   ///< the picture at rest
     urgent   ///< the first picture after an edit, or a pick
   };
-  /// Passes that `ends` has ended early continue in their next turn.
-  ProgressiveRender(std::shared_ptr<Session> session, const RenderContext& context, PassEnds& ends);
+  /// Passes that `interrupter` has interrupted continue in their next turn.
+  ProgressiveRender(std::shared_ptr<Session> session, const RenderContext& context,
+                    PassInterrupter& interrupter);
   ~ProgressiveRender();
   ProgressiveRender(const ProgressiveRender&) = delete;
   ProgressiveRender& operator=(const ProgressiveRender&) = delete;
@@ -118,7 +119,7 @@ class ProgressiveRender {
 
   const std::shared_ptr<Session> session_;
   const RenderContext& context_;
-  PassEnds& ends_;
+  PassInterrupter& interrupter_;
 
   std::shared_ptr<Background::Job> job_;    ///< while it exists, it owns the renderer, except for picks
   Next next_ = nullptr;                     ///< to be called when the job is done

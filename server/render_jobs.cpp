@@ -25,10 +25,10 @@ Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive
   return scene;
 }
 
-void PassPart::render(Renderer& renderer, const Now& now, const std::atomic<bool>& ends) {
+void PassPart::render(Renderer& renderer, const Now& now, const std::atomic<bool>& interrupt) {
   const TimePoint begin = now();
-  complete = renderer.renderPixels(ends, slice);
-  ended = !complete && ends;
+  complete = renderer.renderPixels(interrupt, slice);
+  interrupted = !complete && interrupt;
   seconds = std::chrono::duration<double>(now() - begin).count();
 }
 

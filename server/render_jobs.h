@@ -40,18 +40,18 @@ struct SceneTaking {
   }
 };
 
-/// A part of a pass: what one turn renders of it.
+/// The part of a pass that one turn renders.
 struct PassPart {
   std::chrono::microseconds slice{};
   bool inBackground = false;
   std::atomic<bool> cancel{false};  ///< ends the part early, if it is in the background
   bool complete = false;            ///< the pass is complete
-  bool ended = false;               ///< it is not, because it was ended early
-  double seconds = 0;               ///< that it took
+  bool interrupted = false;         ///< the pass was interrupted
+  double seconds = 0;               ///< time it took
 
-  /// Ends early once `ends` is true, even in the middle of a ray.
-  void render(Renderer& renderer, const Now& now, const std::atomic<bool>& ends);
-  /// In the background: once `stop` is requested.
+  /// Stops early once `interrupt` is true, even in the middle of a ray.
+  void render(Renderer& renderer, const Now& now, const std::atomic<bool>& interrupt);
+  /// The same in the background, once `stop` is requested.
   void render(Renderer& renderer, const Now& now, const std::stop_token& stop);
 };
 

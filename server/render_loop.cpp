@@ -22,7 +22,7 @@ RenderLoop::RenderLoop(SessionStore& store, RenderContext context, OnPass onPass
     : store_(store),
       context_(std::move(context)),
       onPass_(std::move(onPass)),
-      ends_(context_.now, context_.wakeWatch) {
+      interrupter_(context_.now, context_.wakeWatch) {
   if (!context_.memory) return;
   context_.memory->setRelease([kept = std::weak_ptr(context_.parked)] {
     const auto parked = kept.lock();
@@ -40,7 +40,8 @@ void RenderLoop::followStore() {
     return std::find(sessions.begin(), sessions.end(), render->session()) == sessions.end();
   });
   for (const auto& session : sessions)
-    if (!known(session)) renders_.push_back(std::make_unique<ProgressiveRender>(session, context_, ends_));
+    if (!known(session))
+      renders_.push_back(std::make_unique<ProgressiveRender>(session, context_, interrupter_));
 }
 
 RenderLoop::Renders::iterator RenderLoop::nextTurn() {
@@ -65,7 +66,7 @@ std::optional<TimePoint> RenderLoop::step() {
   std::optional<TimePoint> next = store_.expire();
   followStore();
   for (const auto& render : renders_) render->supervise();
-  ends_.reset();  // an edit from here on interrupts the pass; nextTurn() sees those before
+  interrupter_.reset();  // an edit from here on interrupts the pass; nextTurn() sees those before
   const auto turn = nextTurn();
   if (turn != renders_.end()) {
     // Moved behind all others before it runs: a session with slow passes gets one turn per round as well.

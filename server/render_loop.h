@@ -23,14 +23,14 @@ class RenderLoop {
   /// Runs one turn of the next session that has work. First pictures after edits take precedence; between two
   /// of them, a session at rest gets a short turn, so that no session starves.
   std::optional<TimePoint> step();
-  /// Ends the running pass early, unless it makes the first picture after an edit or is a short turn between
+  /// Interrupts the running pass, unless it makes the first picture after an edit or is a short turn between
   /// two of those. From any thread.
-  void interrupt() { ends_.interrupt(); }
-  /// Ends the running pass early, whatever it is, and all later ones at once. From any thread.
-  void stop() { ends_.stop(); }
-  /// Ends the running pass if a ray of it takes too long; it will be continued in the background. A step of a
-  /// loop of its own, which RenderContext::wakeWatch wakes.
-  std::optional<TimePoint> watch() { return ends_.watch(); }
+  void interrupt() { interrupter_.interrupt(); }
+  /// Interrupts the running pass and all later ones. From any thread.
+  void stop() { interrupter_.stop(); }
+  /// Interrupts the running pass if one of its rays takes too long; the pass then continues in the
+  /// background. A step of a loop of its own, which RenderContext::wakeWatch wakes.
+  std::optional<TimePoint> watch() { return interrupter_.watch(); }
 
  private:
   using Renders = std::vector<std::unique_ptr<ProgressiveRender>>;
@@ -41,7 +41,7 @@ class RenderLoop {
   const RenderContext context_;
   const OnPass onPass_;
   Renders renders_;  ///< in the order of their next turns
-  PassEnds ends_;
+  PassInterrupter interrupter_;
   bool othersUrgent_ = false;  ///< the chosen turn is not urgent, but another session's is
   bool lastUrgent_ = false;    ///< the last turn was urgent
 };
