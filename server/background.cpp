@@ -120,12 +120,12 @@ std::shared_ptr<Background::Job> BackgroundThreads::start(const std::string& flo
 void BackgroundThreads::startThreadIfNeeded() {
   if (idle_ >= waiting_.waiting() || threads_.size() >= maxJobs_ + paused_) return;
   try {
-    threads_.emplace_back([this] { work(); });
+    threads_.emplace_back([this] { runJobs(); });
   } catch (const std::exception&) {  // the threads that there are do the work
   }
 }
 
-void BackgroundThreads::work() {
+void BackgroundThreads::runJobs() {
   lowerThreadPriority();
   std::unique_lock lock(mutex_);
   for (;;) {

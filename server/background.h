@@ -85,7 +85,7 @@ class BackgroundThreads : public Background {
   class Place;
   bool mayBegin() const { return waiting_.ready() && working_ < maxJobs_ && returning_ == 0; }
   void startThreadIfNeeded();
-  void work();
+  void runJobs();
   void skip(const std::string& flow, const Job& job);
 
   const std::size_t maxJobs_;

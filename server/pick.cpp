@@ -80,8 +80,8 @@ json pickedJson(const ResolvedScene& scene, std::uint32_t revision, const PickQu
   return answer;
 }
 
-void PickTurn::run(const PendingPick& pick, const ResolvedScene& scene, std::uint32_t revision,
-                   const Renderer& renderer, std::chrono::nanoseconds slice, Session& session) {
+void CurrentPick::run(const PendingPick& pick, const ResolvedScene& scene, std::uint32_t revision,
+                      const Renderer& renderer, std::chrono::nanoseconds slice, Session& session) {
   PickAnswer answer;
   try {
     if (!picking_ || id_ != pick.id) {

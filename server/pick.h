@@ -52,7 +52,7 @@ struct PendingPick {
 };
 
 /// The pick that a session's renderer is working on.
-class PickTurn {
+class CurrentPick {
  public:
   /// Begins or continues a pick for at most `slice`, and gives the session the answer when it is complete.
   /// The renderer must have the scene.

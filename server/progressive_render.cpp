@@ -76,7 +76,7 @@ RenderRequest ProgressiveRender::request() const {
 
 /// Whether there is a pick and the renderer has its scene and is not building another.
 bool ProgressiveRender::pickable(const RenderRequest& request) const {
-  return request.pick && film_.scene && !taking_ && film_.revision == request.revision;
+  return request.pick && film_.scene && !build_ && film_.revision == request.revision;
 }
 
 bool ProgressiveRender::finished(const RenderRequest& request) const {
@@ -91,19 +91,19 @@ ProgressiveRender::Step ProgressiveRender::step(const RenderRequest& request) co
   if (!request.wanted) return Step::none;
   if ((film_.stale(request) && !film_.shieldsPass(request, context_.policy, context_.now())) ||
       film_.lateForEdit(request, context_.policy))
-    return Step::takeScene;
+    return Step::buildScene;
   if (!finished(request)) return Step::addSample;
   return showDue(request) ? Step::show : Step::none;
 }
 
-ProgressiveRender::Work ProgressiveRender::work() const {
+ProgressiveRender::Urgency ProgressiveRender::urgency() const {
   const RenderRequest request = this->request();
-  if (pickable(request)) return Work::urgent;
-  if (parked_) return !request.wanted ? Work::none : film_.firstOfEdit(request) ? Work::urgent : Work::still;
-  if (job_ && !job_->done()) return Work::none;
-  if (job_) return film_.firstOfEdit(request) ? Work::urgent : Work::still;
-  if (step(request) == Step::none) return Work::none;
-  return film_.firstOfEdit(request) ? Work::urgent : request.interactive ? Work::refine : Work::still;
+  if (pickable(request)) return Urgency::urgent;
+  const Urgency toShow = film_.firstOfEdit(request) ? Urgency::urgent : Urgency::atRest;
+  if (parked_) return request.wanted ? toShow : Urgency::none;
+  if (job_) return job_->done() ? toShow : Urgency::none;
+  if (step(request) == Step::none) return Urgency::none;
+  return request.interactive && toShow != Urgency::urgent ? Urgency::refine : toShow;
 }
 
 bool ProgressiveRender::edited() const {
@@ -115,7 +115,7 @@ std::optional<TimePoint> ProgressiveRender::dueAt() const {
   if (job_) return std::nullopt;  // its end wakes the loop
   const RenderRequest request = this->request();
   if (!request.wanted || request.retryAt) return request.retryAt;
-  // Even if the end has just passed, between work() and here: it is then due at once.
+  // Even if the end has just passed, between urgency() and here: it is then due at once.
   if (request.interactive || film_.shown.interactive) return request.interactiveEnd;
   return std::nullopt;
 }
@@ -153,10 +153,10 @@ void ProgressiveRender::collect(PassResult& result) {
     job->rethrow();
   } catch (const Error& error) {
     if (error.code() != ErrorCode::cancelled) throw;
-    result.abandoned = taking_ != nullptr;
-    taking_.reset();
+    result.abandoned = build_ != nullptr;
+    build_.reset();
     part_.reset();
-    showing_.reset();
+    picture_.reset();
     return;
   }
   (this->*next_)(result);
@@ -167,13 +167,14 @@ void ProgressiveRender::supervise() {
   if (!job_ && renderer_ && !request.wanted) park();
   if (!job_ || job_->done()) return;
   const bool useless =
-      taking_ ? taking_->uselessFor(request)
+      build_  ? build_->uselessFor(request)
       : part_ ? film_.stale(request) && !film_.shieldsPass(request, context_.policy, context_.now())
-              : showing_ && film_.stale(request);
+              : picture_ && film_.stale(request);
   if (!request.wanted || useless) job_->cancel();
 }
 
-void ProgressiveRender::takeScene(const RenderRequest& request, const Others& others, PassResult& result) {
+void ProgressiveRender::buildScene(const RenderRequest& request, const OtherSessions& others,
+                                   PassResult& result) {
   pick_.forget();
   if (film_.begunInteractive && film_.unfinished && film_.scene)
     resolution_.passGivenUp(true, filmSize(), film_.passSeconds);
@@ -186,44 +187,44 @@ void ProgressiveRender::takeScene(const RenderRequest& request, const Others& ot
   volume_ = volume;
   film_.abandoned = film_.unfinished;
   film_.unfinished = false;
-  taking_ = std::make_shared<SceneTaking>();
-  taking_->request = request;
-  taking_->begin = context_.now();
-  taking_->divisor = wantedDivisor(request, others.edited);
-  taking_->scene = drawnScene(*request.scene, taking_->divisor, request.interactive);
-  taking_->record = request.aovs && !film_.recording;
-  taking_->renderer = renderer_;
+  build_ = std::make_shared<SceneBuild>();
+  build_->request = request;
+  build_->begin = context_.now();
+  build_->divisor = wantedDivisor(request, others.edited);
+  build_->scene = drawnScene(*request.scene, build_->divisor, request.interactive);
+  build_->record = request.aovs && !film_.recording;
+  build_->renderer = renderer_;
   // Beginning to record clears memory.
-  taking_->inBackground = !renderer_ || taking_->record || renderer_->takesLong(taking_->scene);
-  Scene chosen = taking_->scene;
+  build_->inBackground = !renderer_ || build_->record || renderer_->takesLong(build_->scene);
+  Scene chosen = build_->scene;
   if (chosen.method == Method::automatic) chosen.method = Method::hybrid;
-  taking_->onlyChooses =
-      taking_->inBackground && renderer_ && !taking_->record && !renderer_->takesLong(chosen);
-  const auto build = [taking = taking_, volume, make = context_.makeRenderer](const std::stop_token& stop) {
-    if (!taking->renderer) taking->renderer = make(volume);
-    taking->stats = taking->renderer->setScene(taking->scene, stop);
-    if (taking->record) taking->renderer->recordAovs();
+  build_->onlyChooses = build_->inBackground && renderer_ && !build_->record && !renderer_->takesLong(chosen);
+  const auto setScene = [build = build_, volume, make = context_.makeRenderer](const std::stop_token& stop) {
+    if (!build->renderer) build->renderer = make(volume);
+    build->stats = build->renderer->setScene(build->scene, stop);
+    if (build->record) build->renderer->recordAovs();
   };
-  perform(taking_->inBackground ? &context_.builds : nullptr, build, &ProgressiveRender::sceneTaken, result);
+  perform(build_->inBackground ? &context_.builds : nullptr, setScene, &ProgressiveRender::sceneBuilt,
+          result);
 }
 
-void ProgressiveRender::sceneTaken(PassResult& result) {
-  const auto taking = std::exchange(taking_, nullptr);
-  const RenderRequest& request = taking->request;
-  renderer_ = taking->renderer;
-  if (taking->record) {
+void ProgressiveRender::sceneBuilt(PassResult& result) {
+  const auto build = std::exchange(build_, nullptr);
+  const RenderRequest& request = build->request;
+  renderer_ = build->renderer;
+  if (build->record) {
     film_.recording = true;
     film_.shown = {};  // the frames so far do not count: they have no AOVs
   }
-  if (taking->stats.filmReset || taking->record) filmSeconds_ = 0;
+  if (build->stats.filmReset || build->record) filmSeconds_ = 0;
   if (request.interactive || film_.revision != request.revision) reduced_.reset();
   film_.scene = request.scene;
   film_.revision = request.revision;
-  film_.divisor = taking->divisor;
+  film_.divisor = build->divisor;
   film_.begunInteractive = request.interactive;
   film_.restShown = false;
-  result.built = taking->inBackground;
-  result.rebuildSeconds = secondsBetween(taking->begin, context_.now());
+  result.built = build->inBackground;
+  result.rebuildSeconds = secondsBetween(build->begin, context_.now());
   rebuildUs_ = microseconds(result.rebuildSeconds);
 }
 
@@ -237,7 +238,8 @@ std::chrono::microseconds ProgressiveRender::urgentSlice(int editedOthers) const
   return std::chrono::duration_cast<std::chrono::microseconds>(kMargin * targetOfPass(policy, editedOthers));
 }
 
-void ProgressiveRender::addSample(const RenderRequest& request, const Others& others, PassResult& result) {
+void ProgressiveRender::addSample(const RenderRequest& request, const OtherSessions& others,
+                                  PassResult& result) {
   const bool urgent = film_.firstOfEdit(request), othersWait = others.urgent || request.pick;
   const RenderPolicy& policy = context_.policy;
   const auto slice = urgent ? urgentSlice(others.edited) : othersWait ? policy.politeSlice : policy.slice;
@@ -292,8 +294,8 @@ void ProgressiveRender::sampleAdded(PassResult& result) {
 
 void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
   film_.shownFailures = request.failures;
-  showing_ = std::make_shared<PictureMaking>();
-  FrameInfo& info = showing_->frame.info;
+  picture_ = std::make_shared<PictureJob>();
+  FrameInfo& info = picture_->frame.info;
   info.revision = film_.revision;
   info.samples = renderer_->samples();
   info.method = renderer_->choice().method;
@@ -302,14 +304,14 @@ void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
   info.reduced = film_.divisor != 1;
   info.interactive = request.interactive || info.reduced;
   info.final = !info.interactive && finished(request);
-  showing_->frame.background = film_.scene->render.background;
-  showing_->interactive = request.interactive;
-  showing_->aovs = film_.recording && !request.interactive;
+  picture_->frame.background = film_.scene->render.background;
+  picture_->interactive = request.interactive;
+  picture_->aovs = film_.recording && !request.interactive;
   // The reduced picture on screen is blended into the one that replaces it.
-  if (!request.interactive && !info.final && request.pollSamples.empty()) showing_->reduced = reduced_;
-  showing_->sampleError = sampleError_;
-  const auto make = [showing = showing_, renderer = renderer_, pixels = filmSize(), memory = context_.memory](
-                        const std::stop_token& stop) { showing->make(*renderer, pixels, memory, stop); };
+  if (!request.interactive && !info.final && request.pollSamples.empty()) picture_->reduced = reduced_;
+  picture_->sampleError = sampleError_;
+  const auto make = [picture = picture_, renderer = renderer_, pixels = filmSize(), memory = context_.memory](
+                        const std::stop_token& stop) { picture->make(*renderer, pixels, memory, stop); };
   Background* const background = renderer_->errorTakesLong() ? &context_.passes
                                  : renderer_->filmIsLarge()  ? &context_.pictures
                                                              : nullptr;
@@ -317,18 +319,18 @@ void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
 }
 
 void ProgressiveRender::pictureMade(PassResult&) {
-  const auto showing = std::exchange(showing_, nullptr);
-  const FrameInfo& info = showing->frame.info;
-  if (info.mixed && showing->share > 0.98) reduced_.reset();
+  const auto picture = std::exchange(picture_, nullptr);
+  const FrameInfo& info = picture->frame.info;
+  if (info.mixed && picture->share > 0.98) reduced_.reset();
   if (info.reduced) {
-    reduced_ = showing->frame.image;
-    if (showing->interactive)
+    reduced_ = picture->frame.image;
+    if (picture->interactive)
       sampleError_ = info.samples > 1 ? double(info.error) * std::sqrt(info.samples) : 0;
   }
-  film_.restShown = !showing->interactive;
+  film_.restShown = !picture->interactive;
   film_.shown = info;
   film_.shownAt = context_.now();
-  session_->submit(std::move(showing->frame));
+  session_->submit(std::move(picture->frame));
 }
 
 /// Runs a slice of a pick, if there is one and the last turn was not a pick's.
@@ -340,22 +342,22 @@ bool ProgressiveRender::pickIn(const RenderRequest& request) {
   return pickedLast_;
 }
 
-void ProgressiveRender::turn(const RenderRequest& request, const Others& others, PassResult& result) {
+void ProgressiveRender::turn(const RenderRequest& request, const OtherSessions& others, PassResult& result) {
   if (request.wanted) unpark();
   if (pickIn(request)) return;
   if (job_ && !job_->done()) return;
   const bool collected = job_ != nullptr;
-  bool took = taking_ != nullptr;
+  bool built = build_ != nullptr;
   if (collected) collect(result);
   if (!request.wanted || job_) return;
   Step next = step(request);
-  if (next == Step::takeScene) {
-    takeScene(request, others, result);
+  if (next == Step::buildScene) {
+    buildScene(request, others, result);
     if (job_ || !film_.scene) return;
-    took = true;
+    built = true;
     next = step(request);
   }
-  if (took && pickIn(request)) return;  // so the pick need not wait for a pass
+  if (built && pickIn(request)) return;  // so the pick need not wait for a pass
   const auto mayShow = [&] { return !job_ && !film_.unfinished && showDue(request); };
   // A sample added in the background is shown before the next pass begins.
   if (collected && mayShow()) return show(request, result);
@@ -363,7 +365,7 @@ void ProgressiveRender::turn(const RenderRequest& request, const Others& others,
   if (mayShow()) show(request, result);
 }
 
-PassResult ProgressiveRender::run(const Others& others) {
+PassResult ProgressiveRender::run(const OtherSessions& others) {
   PassResult result;
   const RenderRequest request = this->request();
   try {
@@ -382,14 +384,14 @@ PassResult ProgressiveRender::run(const Others& others) {
 
 void ProgressiveRender::fail(const RenderRequest& request, const Error& error) {
   // The failure may concern a scene that an edit has replaced in the meantime.
-  const std::uint32_t revision = taking_       ? taking_->request.revision
+  const std::uint32_t revision = build_        ? build_->request.revision
                                  : film_.scene ? film_.revision
                                                : request.revision;
   session_->fail(revision, error);
   // The state that an error leaves behind is not worth keeping.
-  taking_.reset();
+  build_.reset();
   part_.reset();
-  showing_.reset();
+  picture_.reset();
   dropRenderer();
 }
 

@@ -46,22 +46,22 @@ struct RenderContext {
   std::shared_ptr<ParkedRenderers> parked = std::make_shared<ParkedRenderers>();
 };
 
-struct SceneTaking;
+struct SceneBuild;
 struct PassPart;
-struct PictureMaking;
+struct PictureJob;
 
 class ProgressiveRender {
  public:
   /// What the other sessions need, which limits this session's pass.
-  struct Others {
+  struct OtherSessions {
     int edited = 0;       ///< number of those at which edits arrive
     bool urgent = false;  ///< one of them has urgent work
   };
   /// Kinds of work, the least important first.
-  enum class Work {
+  enum class Urgency {
     none,
     refine,  ///< a better picture while edits arrive, which the next edit will replace
-    still,   ///< the picture at rest
+    atRest,  ///< the picture at rest
     urgent   ///< the first picture after an edit, or a pick
   };
   /// Passes that `interrupter` has interrupted continue in their next turn.
@@ -73,7 +73,7 @@ class ProgressiveRender {
 
   const std::shared_ptr<Session>& session() const { return session_; }
   /// What run() would do now; none while a background job is running, unless a pick can be answered.
-  Work work() const;
+  Urgency urgency() const;
   /// Whether edits arrive.
   bool edited() const;
   /// When there may be work again even if nothing wakes the loop.
@@ -84,12 +84,12 @@ class ProgressiveRender {
   /// One turn: a slice of a pick, or at most one sample pass with the rebuild before it and the submission
   /// after it. Steps that take long run in the background and are completed in a later turn. Never throws:
   /// failures to render are reported to the session.
-  PassResult run(const Others& others);
+  PassResult run(const OtherSessions& others);
 
  private:
   using Next = void (ProgressiveRender::*)(PassResult&);
   /// What a turn does, if no background job is running and it is not a pick's.
-  enum class Step { none, takeScene, addSample, show };
+  enum class Step { none, buildScene, addSample, show };
 
   RenderRequest request() const;
   Step step(const RenderRequest& request) const;
@@ -104,14 +104,14 @@ class ProgressiveRender {
   void unpark();
 
   bool pickIn(const RenderRequest& request);
-  void turn(const RenderRequest& request, const Others& others, PassResult& result);
+  void turn(const RenderRequest& request, const OtherSessions& others, PassResult& result);
   /// Runs `work`, on this thread if `background` is null, and then `next` on this thread.
   void perform(Background* background, Background::Work work, Next next, PassResult& result);
   void collect(PassResult& result);
-  void takeScene(const RenderRequest& request, const Others& others, PassResult& result);
-  void sceneTaken(PassResult& result);
+  void buildScene(const RenderRequest& request, const OtherSessions& others, PassResult& result);
+  void sceneBuilt(PassResult& result);
   std::chrono::microseconds urgentSlice(int editedOthers) const;
-  void addSample(const RenderRequest& request, const Others& others, PassResult& result);
+  void addSample(const RenderRequest& request, const OtherSessions& others, PassResult& result);
   void partRendered(PassResult& result);
   void sampleAdded(PassResult& result);
   void show(const RenderRequest& request, PassResult& result);
@@ -121,13 +121,13 @@ class ProgressiveRender {
   const RenderContext& context_;
   PassInterrupter& interrupter_;
 
-  std::shared_ptr<Background::Job> job_;    ///< while it exists, it owns the renderer, except for picks
-  Next next_ = nullptr;                     ///< to be called when the job is done
-  std::shared_ptr<SceneTaking> taking_;     ///< the scene that is being built; else null
-  std::shared_ptr<PassPart> part_;          ///< the part of a pass that is being rendered; else null
-  std::shared_ptr<PictureMaking> showing_;  ///< the picture that is being made; else null
+  std::shared_ptr<Background::Job> job_;  ///< while it exists, it owns the renderer, except for picks
+  Next next_ = nullptr;                   ///< to be called when the job is done
+  std::shared_ptr<SceneBuild> build_;     ///< the scene that is being built; else null
+  std::shared_ptr<PassPart> part_;        ///< the part of a pass that is being rendered; else null
+  std::shared_ptr<PictureJob> picture_;   ///< the picture that is being made; else null
 
-  PickTurn pick_;
+  CurrentPick pick_;
   bool pickedLast_ = false;  ///< the last turn was a pick's, so the next is the picture's
 
   std::shared_ptr<const Volume> volume_;

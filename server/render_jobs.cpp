@@ -37,8 +37,8 @@ void PassPart::render(Renderer& renderer, const Now& now, const std::stop_token&
   render(renderer, now, cancel);
 }
 
-void PictureMaking::make(const Renderer& renderer, std::uint64_t pixels,
-                         const std::shared_ptr<MemoryBudget>& memory, const std::stop_token& stop) {
+void PictureJob::make(const Renderer& renderer, std::uint64_t pixels,
+                      const std::shared_ptr<MemoryBudget>& memory, const std::stop_token& stop) {
   FrameInfo& info = frame.info;
   info.error = float(renderer.estimatedError(stop));
   const auto take = [&](std::size_t pixelBytes) {

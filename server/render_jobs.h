@@ -21,7 +21,7 @@ namespace scolopax::server {
 Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive);
 
 /// A scene being brought into the renderer.
-struct SceneTaking {
+struct SceneBuild {
   RenderRequest request;
   TimePoint begin;
   double divisor = 1;
@@ -56,7 +56,7 @@ struct PassPart {
 };
 
 /// A picture being made from the film.
-struct PictureMaking {
+struct PictureJob {
   RenderedFrame frame;
   bool interactive = false;              ///< made while edits arrive
   bool aovs = false;                     ///< includes AOVs

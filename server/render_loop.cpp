@@ -45,20 +45,20 @@ void RenderLoop::followStore() {
 }
 
 RenderLoop::Renders::iterator RenderLoop::nextTurn() {
-  using Work = ProgressiveRender::Work;
-  auto urgent = renders_.end(), still = renders_.end(), any = renders_.end();
-  int urgents = 0;
+  using Urgency = ProgressiveRender::Urgency;
+  auto urgent = renders_.end(), atRest = renders_.end(), any = renders_.end();
+  int urgentCount = 0;
   for (auto render = renders_.begin(); render != renders_.end(); ++render) {
-    const Work work = (*render)->work();
-    if (work == Work::none) continue;
+    const Urgency urgency = (*render)->urgency();
+    if (urgency == Urgency::none) continue;
     if (any == renders_.end()) any = render;
-    if (work == Work::still && still == renders_.end()) still = render;
-    if (work == Work::urgent && urgents++ == 0) urgent = render;
+    if (urgency == Urgency::atRest && atRest == renders_.end()) atRest = render;
+    if (urgency == Urgency::urgent && urgentCount++ == 0) urgent = render;
   }
-  const bool stillsTurn = lastUrgent_ && still != renders_.end();
-  const auto turn = urgents == 0 ? any : stillsTurn ? still : urgent;
-  lastUrgent_ = urgents > 0 && turn == urgent;
-  othersUrgent_ = urgents > 0 && turn != urgent;
+  const bool turnOfAtRest = lastUrgent_ && atRest != renders_.end();
+  const auto turn = urgentCount == 0 ? any : turnOfAtRest ? atRest : urgent;
+  lastUrgent_ = urgentCount > 0 && turn == urgent;
+  othersUrgent_ = urgentCount > 0 && turn != urgent;
   return turn;
 }
 
@@ -71,7 +71,7 @@ std::optional<TimePoint> RenderLoop::step() {
   if (turn != renders_.end()) {
     // Moved behind all others before it runs: a session with slow passes gets one turn per round as well.
     std::rotate(turn, turn + 1, renders_.end());
-    ProgressiveRender::Others others;
+    ProgressiveRender::OtherSessions others;
     others.urgent = othersUrgent_;
     for (const auto& render : renders_) {
       if (render == renders_.back()) continue;
