@@ -127,47 +127,47 @@ void patchStruct(nlohmann::json& target, const nlohmann::json& patch, const Path
 }
 
 template <Described T>
-nlohmann::json between(const T& from, const T& to);
+nlohmann::json structPatchBetween(const T& from, const T& to);
 
 /// The patch of a member that differs.
 template <class T>
-struct Between {
-  static nlohmann::json of(const T&, const T& to) { return writeValue(to); }
+struct MemberPatch {
+  static nlohmann::json between(const T&, const T& to) { return writeValue(to); }
 };
 
 template <Described T>
-struct Between<T> {
-  static nlohmann::json of(const T& from, const T& to) { return between(from, to); }
+struct MemberPatch<T> {
+  static nlohmann::json between(const T& from, const T& to) { return structPatchBetween(from, to); }
 };
 
 template <Described T>
-struct Between<std::optional<T>> {
-  static nlohmann::json of(const std::optional<T>& from, const std::optional<T>& to) {
-    return from && to ? between(*from, *to) : writeValue(to);
+struct MemberPatch<std::optional<T>> {
+  static nlohmann::json between(const std::optional<T>& from, const std::optional<T>& to) {
+    return from && to ? structPatchBetween(*from, *to) : writeValue(to);
   }
 };
 
 template <Described T>
-struct Between<std::vector<T>> {
-  static nlohmann::json of(const std::vector<T>& from, const std::vector<T>& to) {
+struct MemberPatch<std::vector<T>> {
+  static nlohmann::json between(const std::vector<T>& from, const std::vector<T>& to) {
     if (to.size() < from.size()) return writeValue(to);  // only a whole list can shorten a list
     nlohmann::json patch = nlohmann::json::object();
     for (std::size_t i = 0; i < to.size(); ++i) {
       if (i >= from.size())
         patch[std::to_string(i)] = writeValue(to[i]);
       else if (from[i] != to[i])
-        patch[std::to_string(i)] = between(from[i], to[i]);
+        patch[std::to_string(i)] = structPatchBetween(from[i], to[i]);
     }
     return patch;
   }
 };
 
 template <Described T>
-nlohmann::json between(const T& from, const T& to) {
+nlohmann::json structPatchBetween(const T& from, const T& to) {
   nlohmann::json patch = nlohmann::json::object();
   forEachField<T>([&]<class Value>(const Field<T, Value>& field) {
     const Value &before = from.*field.member, &after = to.*field.member;
-    if (before != after) patch[std::string(field.name)] = Between<Value>::of(before, after);
+    if (before != after) patch[std::string(field.name)] = MemberPatch<Value>::between(before, after);
   });
   // A partner that stays must be named in the patch, or applying it would remove the partner.
   const auto keep = [&](std::string_view partner) {
@@ -195,6 +195,6 @@ nlohmann::json applyPatch(nlohmann::json sparse, const nlohmann::json& patch, st
   return sparse;
 }
 
-nlohmann::json patchBetween(const Scene& from, const Scene& to) { return between(from, to); }
+nlohmann::json patchBetween(const Scene& from, const Scene& to) { return structPatchBetween(from, to); }
 
 }  // namespace scolopax::protocol

@@ -18,10 +18,10 @@ std::string shortened(std::string_view text, std::size_t most = 200);
 struct ProtocolError : std::runtime_error {
   /// Both texts are shortened: they may quote parts of a request, which can be long.
   ProtocolError(int statusCode, std::string_view jsonPointer, std::string_view detail)
-      : std::runtime_error(shortened(detail, kMostDetail)),
+      : std::runtime_error(shortened(detail, kMaxDetail)),
         status(statusCode),
-        pointer(shortened(jsonPointer, kMostPointer)) {}
-  static constexpr std::size_t kMostDetail = 1000, kMostPointer = 400;
+        pointer(shortened(jsonPointer, kMaxPointer)) {}
+  static constexpr std::size_t kMaxDetail = 1000, kMaxPointer = 400;
   int status;  ///< HTTP status; from protocol/ itself 400 (not JSON), 413 (too large) or 422 (not a scene,
                ///< patch or message)
   std::string pointer;  ///< RFC 6901 pointer to the bad field; "" for the whole document

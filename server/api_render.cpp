@@ -43,17 +43,17 @@ std::string textOf(const std::vector<Choice::Correction>& corrections) {
 
 /// One of the places for renders that run at once; the constructor throws ProtocolError(503) if all are
 /// taken.
-class RenderPlace {
+class RenderSlot {
  public:
-  RenderPlace(std::atomic<int>& running, int limit) : running_(running) {
+  RenderSlot(std::atomic<int>& running, int limit) : running_(running) {
     if (++running_ <= limit) return;
     --running_;
     throw ProtocolError(503, "",
                         "the limit of " + std::to_string(limit) + " renders at once is reached; retry later");
   }
-  ~RenderPlace() { --running_; }
-  RenderPlace(const RenderPlace&) = delete;
-  RenderPlace& operator=(const RenderPlace&) = delete;
+  ~RenderSlot() { --running_; }
+  RenderSlot(const RenderSlot&) = delete;
+  RenderSlot& operator=(const RenderSlot&) = delete;
 
  private:
   std::atomic<int>& running_;
@@ -62,9 +62,9 @@ class RenderPlace {
 using Clock = std::chrono::steady_clock;
 
 /// Ends a render early: when its client disconnects, the server stops, or its time is over.
-class Ending {
+class AbortSignal {
  public:
-  Ending(const std::stop_token& gone, const std::stop_token& abort, double seconds)
+  AbortSignal(const std::stop_token& gone, const std::stop_token& abort, double seconds)
       : gone_(gone, Request{this}),
         abort_(abort, Request{this}),
         timer_([this, seconds](const std::stop_token& over) { endAfter(seconds, over); }) {}
@@ -73,10 +73,10 @@ class Ending {
 
  private:
   struct Request {
-    Ending* ending;
+    AbortSignal* signal;
     void operator()() const {
-      ending->flag_ = true;
-      ending->source_.request_stop();
+      signal->flag_ = true;
+      signal->source_.request_stop();
     }
   };
   void endAfter(double seconds, const std::stop_token& over) {
@@ -127,8 +127,8 @@ ProtocolError tooLate(double limit, std::uint32_t samples) {
 /// The scene of the body, after measuring the data that it needs, which may take no longer than a render.
 std::shared_ptr<const ResolvedScene> sceneOf(const ApiContext& context, const net::Request& request) {
   const auto body = jsonBody(request, context.config);
-  const Ending ending(request.gone, context.abortRequests, context.config.maxRenderSeconds);
-  const auto scene = unlessStopped([&] { return context.renderResolver.replace(body, ending.token()); });
+  const AbortSignal signal(request.gone, context.abortRequests, context.config.maxRenderSeconds);
+  const auto scene = unlessStopped([&] { return context.renderResolver.replace(body, signal.token()); });
   if (scene) return *scene;
   throwIfUnwanted(context, request);
   throw tooLate(context.config.maxRenderSeconds, 0);
@@ -156,12 +156,12 @@ struct Rendered {
 Rendered renderPicture(const ApiContext& context, std::atomic<int>& running, const net::Request& request,
                        const std::shared_ptr<const ResolvedScene>& scene) {
   const double limit = context.config.maxRenderSeconds;
-  const RenderPlace place(running, context.config.maxRenders);
+  const RenderSlot slot(running, context.config.maxRenders);
   const auto begin = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   const auto renderer = context.makeRenderer(scene->dataset->volume);
-  const Ending ending(request.gone, context.abortRequests, limit);
-  const auto rebuild = unlessStopped([&] { return renderer->setScene(scene->render, ending.token()); });
+  const AbortSignal signal(request.gone, context.abortRequests, limit);
+  const auto rebuild = unlessStopped([&] { return renderer->setScene(scene->render, signal.token()); });
   if (!rebuild) {
     throwIfUnwanted(context, request);
     throw tooLate(limit, 0);
@@ -174,8 +174,8 @@ Rendered renderPicture(const ApiContext& context, std::atomic<int>& running, con
     // In this order, because only a short duration fits into whole nanoseconds.
     const auto budget = std::chrono::duration<double>(std::clamp(until - seconds(), 0.0, kSlice));
     const auto slice = std::chrono::duration_cast<std::chrono::nanoseconds>(budget);
-    if (renderer->renderSample(ending.flag(), slice)) {
-      unlessStopped([&] { return measureFor(scene->stop, *renderer, ending.token()), true; });
+    if (renderer->renderSample(signal.flag(), slice)) {
+      unlessStopped([&] { return measureFor(scene->stop, *renderer, signal.token()), true; });
       continue;
     }
     throwIfUnwanted(context, request);
@@ -184,7 +184,7 @@ Rendered renderPicture(const ApiContext& context, std::atomic<int>& running, con
     throw tooLate(limit, renderer->samples());
   }
   const auto milliseconds = std::int64_t(seconds() * 1000);
-  const std::string error = nlohmann::json(errorOf(*renderer, ending.token())).dump();
+  const std::string error = nlohmann::json(errorOf(*renderer, signal.token())).dump();
   throwIfUnwanted(context, request);
   auto memory = MemoryBudget::take(context.memory, MemoryUse::pictures, pixelsOf(*scene) * sizeof(glm::vec4));
   const Choice choice = renderer->choice();

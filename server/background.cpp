@@ -43,15 +43,15 @@ void Background::run(const std::string& flow, const std::stop_token& stop, Work 
 }
 
 /// What a job has while it works, and gives up while it waits for a build.
-class BackgroundThreads::Place final : public WaitHooks {
+class BackgroundThreads::RunningSlot final : public WaitHooks {
  public:
-  Place(BackgroundThreads& pool, const std::string& flow, const Job& job)
+  RunningSlot(BackgroundThreads& pool, const std::string& flow, const Job& job)
       : pool_(pool), flow_(flow), job_(job) {
     waitHooks = this;
   }
-  ~Place() override { waitHooks = nullptr; }
-  Place(const Place&) = delete;
-  Place& operator=(const Place&) = delete;
+  ~RunningSlot() override { waitHooks = nullptr; }
+  RunningSlot(const RunningSlot&) = delete;
+  RunningSlot& operator=(const RunningSlot&) = delete;
 
   void beforeWait() override {
     const std::lock_guard lock(pool_.mutex_);
@@ -138,7 +138,7 @@ void BackgroundThreads::runJobs() {
     lock.unlock();
     entry->onCancel.reset();
     {
-      const Place place(*this, flow, *entry->job);
+      const RunningSlot slot(*this, flow, *entry->job);
       entry->job->run();
     }
     entry->ended();

@@ -82,7 +82,7 @@ class BackgroundThreads : public Background {
     std::optional<std::stop_callback<std::function<void()>>> onCancel = {};
   };
   using Turns = net::TurnQueue<std::unique_ptr<Entry>>;
-  class Place;
+  class RunningSlot;
   bool mayBegin() const { return waiting_.ready() && working_ < maxJobs_ && returning_ == 0; }
   void startThreadIfNeeded();
   void runJobs();

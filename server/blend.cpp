@@ -9,14 +9,14 @@ namespace scolopax::server {
 namespace {
 
 /// Two neighbouring pixels along an axis, and the weight of the second.
-struct Between {
+struct Neighbours {
   int first, second;
   float share;
 };
 
 /// The position of pixel `i` of `full` among `count` pixels, each `1 / scale` times as large as the full
 /// ones.
-Between between(int i, int full, int count, double scale) {
+Neighbours neighboursOf(int i, int full, int count, double scale) {
   const double at = std::clamp((i + 0.5 - 0.5 * full) * scale + 0.5 * count - 0.5, 0.0, double(count - 1));
   const int first = std::min(int(at), std::max(0, count - 2));
   return {first, std::min(first + 1, count - 1), float(at - first)};
@@ -29,11 +29,11 @@ Image enlarged(const Image& image, int width, int height) {
   result.pixels.reserve(std::size_t(width) * std::size_t(height));
   const double scale = double(image.height) / height;
   for (int y = 0; y < height; ++y) {
-    const Between row = between(y, height, image.height, scale);
+    const Neighbours row = neighboursOf(y, height, image.height, scale);
     const glm::vec4* above = &image.pixels[std::size_t(row.first) * std::size_t(image.width)];
     const glm::vec4* below = &image.pixels[std::size_t(row.second) * std::size_t(image.width)];
     for (int x = 0; x < width; ++x) {
-      const Between column = between(x, width, image.width, scale);
+      const Neighbours column = neighboursOf(x, width, image.width, scale);
       const auto mix = [&](const glm::vec4* line) {
         return line[column.first] * (1 - column.share) + line[column.second] * column.share;
       };

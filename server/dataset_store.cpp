@@ -98,7 +98,7 @@ DatasetStore::Gradients DatasetStore::measuredGradients(const Dataset& dataset, 
   const std::lock_guard lock(mutex_);
   if (Gradients known = kept(dataset, channel)) return known;  // another thread measured the same
   gradients_.push_front({&dataset, channel, measured});
-  if (gradients_.size() > kMostGradients) gradients_.pop_back();
+  if (gradients_.size() > kMaxGradients) gradients_.pop_back();
   return measured;
 }
 
@@ -157,20 +157,20 @@ json histogramJson(const Dataset& dataset, int channel) {
 json gradientHistogramJson(const Dataset& dataset, int channel, const GradientHistogram& gradients,
                            bool joint) {
   const Channel& measured = channelOf(dataset, channel);
-  json told = {{"channel", channel},
-               {"name", measured.name},
-               {"unit", measured.unit},
-               {"maximum", gradients.maximum},
-               {"finiteCount", gradients.finiteCount},
-               {"nonFiniteCount", gradients.nonFiniteCount},
-               {"bins", gradients.bins()}};
+  json answer = {{"channel", channel},
+                 {"name", measured.name},
+                 {"unit", measured.unit},
+                 {"maximum", gradients.maximum},
+                 {"finiteCount", gradients.finiteCount},
+                 {"nonFiniteCount", gradients.nonFiniteCount},
+                 {"bins", gradients.bins()}};
   if (joint) {
-    json& rows = told["joint"] = json::array();
+    json& rows = answer["joint"] = json::array();
     constexpr auto kBins = std::ptrdiff_t(GradientHistogram::kBins);
     for (auto row = gradients.counts.begin(); row != gradients.counts.end(); row += kBins)
       rows.push_back(std::vector<std::uint64_t>(row, row + kBins));
   }
-  return told;
+  return answer;
 }
 
 json valuesJson(const Volume& volume, const glm::dvec3& voxel,

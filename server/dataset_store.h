@@ -36,11 +36,11 @@ class DatasetStore {
 
   using Gradients = std::shared_ptr<const GradientHistogram>;
   /// Histograms kept: 64 MiB, enough for several scenes of 32 channels at once.
-  static constexpr std::size_t kMostGradients = 128;
+  static constexpr std::size_t kMaxGradients = 128;
   /// The gradient histogram of a channel of one of the store's data sets; nullptr if it has not been measured
   /// yet. Throws ProtocolError(422) if there is no such channel.
   Gradients gradients(const Dataset& dataset, int channel) const;
-  /// The same, but measures it first if necessary. The kMostGradients histograms requested last are kept.
+  /// The same, but measures it first if necessary. The kMaxGradients histograms requested last are kept.
   /// Also throws Error: cancelled once `stop` is requested, busy and tooLarge when there is not enough
   /// memory.
   Gradients measuredGradients(const Dataset& dataset, int channel, const std::stop_token& stop) const;

@@ -26,7 +26,7 @@ bool FilmState::firstOfEdit(const RenderRequest& request) const {
 }
 
 bool FilmState::lateForEdit(const RenderRequest& request, const RenderPolicy& policy) const {
-  return unfinished && begunInteractive && firstOfEdit(request) && divisor < kMostDivisor &&
+  return unfinished && begunInteractive && firstOfEdit(request) && divisor < kMaxDivisor &&
          passSeconds >= std::chrono::duration<double>(policy.tooLate).count();
 }
 

@@ -8,7 +8,7 @@
 namespace scolopax::server {
 namespace {
 
-constexpr double kDivisors[] = {1, 1.5, 2, 2.5, 3, 4, 6, 8, 12, kMostDivisor};
+constexpr double kDivisors[] = {1, 1.5, 2, 2.5, 3, 4, 6, 8, 12, kMaxDivisor};
 /// The first divisor while edits arrive, when nothing is known: a small pass is quick and gives a
 /// measurement.
 constexpr double kProbeDivisor = 4;
@@ -27,7 +27,7 @@ double secondsOf(std::chrono::microseconds time) { return std::chrono::duration<
 }  // namespace
 
 std::chrono::microseconds targetOfPass(const RenderPolicy& policy, int editedOthers) {
-  return std::max(2 * policy.frameTarget / std::max(2, 1 + editedOthers), policy.leastTarget);
+  return std::max(2 * policy.frameTarget / std::max(2, 1 + editedOthers), policy.minTarget);
 }
 
 double divisorForTarget(std::uint64_t pixels, const PassCost& cost, double targetSeconds, double current) {
@@ -54,14 +54,14 @@ Scene atDivisor(Scene scene, double divisor) {
 void ResolutionPolicy::forget() {
   cost_[false] = cost_[true] = {};
   current_ = 0;
-  untilProbe_ = probeWait_ = kLeastWait;
+  untilProbe_ = probeWait_ = kMinWait;
 }
 
 /// Passes of a single size do not show what part of their cost is fixed. A finer picture now and then does;
 /// these trials become rarer while they turn out not to fit.
 bool ResolutionPolicy::probes(const PassCost& cost) {
   if (current_ <= 1 || !cost.oneSize() || --untilProbe_ > 0) return false;
-  untilProbe_ = probeWait_ = std::min(2 * probeWait_, kMostWait);
+  untilProbe_ = probeWait_ = std::min(2 * probeWait_, kMaxWait);
   return true;
 }
 
@@ -70,7 +70,7 @@ double ResolutionPolicy::whileEdited(std::uint64_t pixels, int editedOthers) {
   if (!cost.known()) return kProbeDivisor;
   const double target = secondsOf(targetOfPass(policy_, editedOthers));
   const double divisor = divisorForTarget(pixels, cost, target, current_);
-  if (divisor < current_) untilProbe_ = probeWait_ = kLeastWait;
+  if (divisor < current_) untilProbe_ = probeWait_ = kMinWait;
   if (divisor == current_ && probes(cost)) return finerThan(current_);
   return current_ = divisor;
 }

@@ -14,7 +14,7 @@ namespace scolopax::server {
 /// The time limits of rendering.
 struct RenderPolicy {
   std::chrono::microseconds frameTarget{25'000};      ///< for one pass while edits arrive
-  std::chrono::microseconds leastTarget{4'000};       ///< least target when many sessions are edited
+  std::chrono::microseconds minTarget{4'000};         ///< least target when many sessions are edited
   std::chrono::milliseconds interactiveInterval{33};  ///< between frames while edits arrive
   std::chrono::milliseconds stillInterval{500};       ///< between frames at rest, once there are many samples
   std::chrono::milliseconds tooLate{75};              ///< an edit's first picture is then restarted, coarser
@@ -29,7 +29,7 @@ struct RenderPolicy {
 std::chrono::microseconds targetOfPass(const RenderPolicy& policy, int editedOthers);
 
 /// The largest divisor of width and height.
-inline constexpr double kMostDivisor = 16;
+inline constexpr double kMaxDivisor = 16;
 
 /// The smallest of 1, 1.5, 2, 2.5, 3, 4, 6, 8, ... by which width and height must be divided so that a pass
 /// meets the target. `current` is the divisor of the previous pass (0: none). It is kept until another fits
@@ -72,11 +72,11 @@ class ResolutionPolicy {
 
   const RenderPolicy& policy_;
   PassCost cost_[2];
-  static constexpr int kLeastWait = 8,
-                       kMostWait = 64;  ///< pictures between two trials of a finer one
+  static constexpr int kMinWait = 8,
+                       kMaxWait = 64;  ///< pictures between two trials of a finer one
 
   double current_ = 0;  ///< the last divisor while edits arrived, without trials; 0 before
-  int untilProbe_ = kLeastWait, probeWait_ = kLeastWait;
+  int untilProbe_ = kMinWait, probeWait_ = kMinWait;
 };
 
 }  // namespace scolopax::server

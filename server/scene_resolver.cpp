@@ -197,8 +197,8 @@ void resolveLights(const protocol::Scene& scene, Scene& render) {
 }
 
 /// Small macrocells of a large volume cost much and gain little. The default size is always accepted.
-void checkMacrocell(int size, const Volume& volume, std::size_t mostIntervals) {
-  const auto tooMany = [&](int one) { return intervalCount(volume, one) > mostIntervals; };
+void checkMacrocell(int size, const Volume& volume, std::size_t maxIntervals) {
+  const auto tooMany = [&](int one) { return intervalCount(volume, one) > maxIntervals; };
   int least = size;
   while (least < Scene().macrocell && tooMany(least)) ++least;
   if (least == size) return;
@@ -259,13 +259,13 @@ SceneResolver::SceneResolver(std::shared_ptr<const DatasetStore> datasets, Optio
 }
 
 void SceneResolver::frame(const protocol::Scene& scene, ResolvedScene& result) const {
-  if (result.chosen.framed || (scene.camera.eye && scene.camera.target)) return;
+  if (result.automatic.framed || (scene.camera.eye && scene.camera.target)) return;
   std::vector<glm::vec3> hull;
   try {
     hull = visibleHull(*result.dataset->volume, coarse_.at(result.dataset.get()), result.render.channels);
   } catch (const Error&) {  // rendering reports what cannot be rendered
   }
-  result.chosen.framed = std::make_shared<const std::vector<glm::vec3>>(std::move(hull));
+  result.automatic.framed = std::make_shared<const std::vector<glm::vec3>>(std::move(hull));
 }
 
 std::array<double, 2> SceneResolver::gradientRange(const ResolvedScene& scene, int channel) const {
@@ -283,7 +283,7 @@ std::array<double, 2> SceneResolver::gradientRange(const ResolvedScene& scene, i
 }
 
 void SceneResolver::resolveGradientOpacity(protocol::Scene& scene, ResolvedScene& result) const {
-  auto& ranges = result.chosen.gradientRanges;
+  auto& ranges = result.automatic.gradientRanges;
   ranges.resize(scene.channels.size());
   for (std::size_t i = 0; i < scene.channels.size(); ++i) {
     std::optional<protocol::GradientOpacity>& wire = scene.channels[i].gradientOpacity;
@@ -325,11 +325,11 @@ SceneResolver::Resolved SceneResolver::patchNow(const ResolvedScene& base, const
   const bool namesDataset = patch.is_object() && patch.contains("dataset");
   const auto count = datasetOf(namesDataset ? patch : base.sparse.rest())->volume->channels().size();
   SparseScene sparse = base.sparse.patched(patch, count);
-  Chosen chosen = base.chosen;
-  if (resetsView(patch)) chosen.framed.reset();
-  for (std::size_t i = 0; i < chosen.gradientRanges.size(); ++i)
-    if (resetsGradientRange(patch, i)) chosen.gradientRanges[i].reset();
-  return resolve(std::move(sparse), chosen);
+  AutomaticValues automatic = base.automatic;
+  if (resetsView(patch)) automatic.framed.reset();
+  for (std::size_t i = 0; i < automatic.gradientRanges.size(); ++i)
+    if (resetsGradientRange(patch, i)) automatic.gradientRanges[i].reset();
+  return resolve(std::move(sparse), automatic);
 }
 
 SceneResolver::Resolved SceneResolver::replace(const json& scene, const std::stop_token& stop) const {
@@ -360,14 +360,14 @@ std::optional<std::string> SceneResolver::tooLarge(const Scene& scene, bool aovs
   return std::nullopt;
 }
 
-SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const Chosen& chosen) const {
+SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const AutomaticValues& automatic) const {
   protocol::Scene scene = sparse.parsed(lists_);
   auto result = std::make_shared<ResolvedScene>();
   if (const std::uint64_t bytes = curveBytes(scene); bytes > MemoryBudget::kFreeBytes)
     result->memory = MemoryBudget::take(options_.memory, MemoryUse::scenes, bytes);
   result->dataset = datasetOf(sparse.rest());
-  if (chosen.dataset == result->dataset) result->chosen = chosen;
-  result->chosen.dataset = result->dataset;
+  if (automatic.dataset == result->dataset) result->automatic = automatic;
+  result->automatic.dataset = result->dataset;
   const Volume& volume = *result->dataset->volume;
   protocol::checkChannelCount(scene, volume.channels().size());
   if (std::uint64_t(scene.image.width) * scene.image.height > options_.maxPixels)
@@ -381,7 +381,7 @@ SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const Chosen&
   resolveChannels(scene, render, volume);
   if (const auto reason = tooLarge(render, false)) throw ProtocolError(422, "/image", *reason);
   frame(scene, *result);
-  const auto& framed = result->chosen.framed;
+  const auto& framed = result->automatic.framed;
   resolveCamera(scene, render, volume.grid(), framed ? *framed : std::span<const glm::vec3>());
   resolveClipping(scene, render, volume);
   resolveLights(scene, render);

@@ -27,7 +27,7 @@ namespace scolopax::server {
 
 /// Values that were chosen automatically from a scene's curves. They stay while the curves are edited, so
 /// that nothing jumps.
-struct Chosen {
+struct AutomaticValues {
   std::shared_ptr<const Dataset> dataset;  ///< the data set that they were chosen for
   /// What the automatic view frames (renderer/data/visible_hull.h); null: not needed so far.
   std::shared_ptr<const std::vector<glm::vec3>> framed;
@@ -43,7 +43,7 @@ struct ResolvedScene {
   Scene render;
   StopRule stop;
   std::shared_ptr<const Dataset> dataset;
-  Chosen chosen = {};
+  AutomaticValues automatic = {};
   MemoryBudget::Share memory = {};
 };
 
@@ -86,7 +86,7 @@ class SceneResolver {
   const protocol::Lists& lists() const { return lists_; }
 
  private:
-  Resolved resolve(SparseScene sparse, const Chosen& chosen) const;
+  Resolved resolve(SparseScene sparse, const AutomaticValues& automatic) const;
   void frame(const protocol::Scene& scene, ResolvedScene& result) const;
   void resolveGradientOpacity(protocol::Scene& scene, ResolvedScene& result) const;
   std::array<double, 2> gradientRange(const ResolvedScene& scene, int channel) const;

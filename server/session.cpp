@@ -19,7 +19,7 @@ constexpr std::size_t kMaxPendingPatches = 1024;
 
 /// Calls a function of a client. A failure there must not disturb the other clients, nor end a loop's thread.
 template <class Call, class... Arguments>
-void tell(const Call& call, Arguments&&... arguments) noexcept {
+void notify(const Call& call, Arguments&&... arguments) noexcept {
   try {
     std::invoke(call, std::forward<Arguments>(arguments)...);
   } catch (...) {
@@ -72,11 +72,12 @@ Session::SceneState Session::edit(const EditOrigin& origin, const Resolve& resol
   // For other viewers; most sessions have only one. A query for AOVs may begin a revision meanwhile.
   std::string change;
   std::shared_ptr<const std::string> message;
-  for (std::uint32_t told = 0; told != revision_ + 1 && viewers_.size() > viewers_.count(origin.viewer);) {
-    told = revision_ + 1;
+  for (std::uint32_t announced = 0;
+       announced != revision_ + 1 && viewers_.size() > viewers_.count(origin.viewer);) {
+    announced = revision_ + 1;
     lock.unlock();
     if (change.empty()) change = protocol::jsonText(protocol::patchBetween(before->resolved, next->resolved));
-    message = std::make_shared<const std::string>(protocol::sceneText(told, change));
+    message = std::make_shared<const std::string>(protocol::sceneText(announced, change));
     lock.lock();
   }
   checkRevision(origin);  // a query for AOVs may have begun one, or the session have ended
@@ -92,7 +93,7 @@ Session::SceneState Session::edit(const EditOrigin& origin, const Resolve& resol
   }
   for (auto& [id, viewer] : viewers_) {
     if (id != origin.viewer) {
-      tell(&ViewerSink::sceneChanged, *viewer.sink, message);
+      notify(&ViewerSink::sceneChanged, *viewer.sink, message);
       continue;
     }
     viewer.pending.push_back({origin.patchId, revision_});
@@ -108,7 +109,7 @@ ViewerId Session::addViewer(std::shared_ptr<ViewerSink> sink) {
   if (closed_) throw protocol::ProtocolError(404, "", "the session has ended");
   const ViewerId id = nextViewer_++;
   retryIfBusy();
-  if (failedRevision_ == revision_) tell(&ViewerSink::renderFailed, *sink, *failure_);
+  if (failedRevision_ == revision_) notify(&ViewerSink::renderFailed, *sink, *failure_);
   viewers_[id].sink = std::move(sink);
   lastUsed_ = hooks_.now();
   hooks_.wakeRender();
@@ -159,7 +160,7 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
     aovs_ = true;
     ++revision_;
     const auto message = std::make_shared<const std::string>(protocol::sceneText(revision_, "{}"));
-    for (auto& [id, viewer] : viewers_) tell(&ViewerSink::sceneChanged, *viewer.sink, message);
+    for (auto& [id, viewer] : viewers_) notify(&ViewerSink::sceneChanged, *viewer.sink, message);
   }
   retryIfBusy();
   const std::uint32_t revision = revision_;
@@ -226,7 +227,7 @@ void Session::close(const std::string& reason) {
   const std::lock_guard lock(mutex_);
   if (std::exchange(closed_, true)) return;
   hooks_.interruptRender();
-  for (auto& [id, viewer] : viewers_) tell(&ViewerSink::sessionClosed, *viewer.sink, reason);
+  for (auto& [id, viewer] : viewers_) notify(&ViewerSink::sessionClosed, *viewer.sink, reason);
   viewers_.clear();
   picks_.clear();
   frameCame_.notify_all();
@@ -276,14 +277,14 @@ void Session::fail(std::uint32_t revision, const Error& error) {
   const bool busy = error.code() == ErrorCode::busy;
   const bool known = busy && retryAt_ && failedRevision_ == revision;  // a retry that failed again
   if (!known)
-    for (auto& [id, viewer] : viewers_) tell(&ViewerSink::renderFailed, *viewer.sink, error);
+    for (auto& [id, viewer] : viewers_) notify(&ViewerSink::renderFailed, *viewer.sink, error);
   if (revision != revision_) return;  // the current scene may well render
   failedRevision_ = revision;
   failure_ = error;
   retryAt_.reset();
   if (busy) retryAt_ = hooks_.now() + kRetryTime;
   for (const WaitingPick& pick : std::exchange(picks_, {}))
-    tell(pick.answered, PickAnswer{{}, std::make_exception_ptr(error)});
+    notify(pick.answered, PickAnswer{{}, std::make_exception_ptr(error)});
   frameCame_.notify_all();
 }
 
@@ -291,7 +292,7 @@ void Session::answerPick(PickId id, const PickAnswer& answer) {
   const std::lock_guard lock(mutex_);
   const auto pick = std::find_if(picks_.begin(), picks_.end(), [&](const auto& p) { return p.id == id; });
   if (pick == picks_.end()) return;
-  tell(pick->answered, answer);
+  notify(pick->answered, answer);
   picks_.erase(pick);
   lastUsed_ = hooks_.now();
   frameCame_.notify_all();
@@ -336,7 +337,7 @@ std::optional<TimePoint> Session::deliver() {
     }
     viewer.lastOffer = now;
     viewer.lastNumber = frame_->info.number;
-    tell(&ViewerSink::offerFrame, *viewer.sink, *frame_, viewer.containedPatch);
+    notify(&ViewerSink::offerFrame, *viewer.sink, *frame_, viewer.containedPatch);
   }
   return next;
 }

@@ -40,7 +40,7 @@ std::optional<Reached> reach(double target, const std::vector<const Point*>& poi
         samples = std::max(1.0, std::ceil(samples * std::max(0.0, point->mse() - bias) / (wanted - bias)));
       else if (point->mse() > wanted)
         continue;
-      if (samples > kLongestReach * point->samples) continue;
+      if (samples > kMaxReach * point->samples) continue;
     }
     const double seconds = point->time() * samples / point->samples;
     if (!best || seconds < best->seconds) best = {seconds, samples, point->step};

@@ -41,11 +41,11 @@ double squaredBias(const Point& point, const Image& truth);
 /// time to an RMSE of 1e-2 and of 1e-3, and the samples and step that reach it; null if the measurements do
 /// not tell. For methods without a step, this is extrapolated by the law of their noise from the most samples
 /// measured. For the others it is the best step's, extrapolated by that law above the bias and to at most
-/// kLongestReach times the samples measured, since a bias well below the noise cannot be seen. Without
+/// kMaxReach times the samples measured, since a bias well below the noise cannot be seen. Without
 /// `truth`, times and counts only.
 nlohmann::ordered_json report(const std::vector<Point>& points, const std::optional<Image>& truth,
                               std::size_t pixels);
-inline constexpr double kLongestReach = 16;
+inline constexpr double kMaxReach = 16;
 
 /// Prints the result of report() as a table.
 void print(const nlohmann::ordered_json& result);

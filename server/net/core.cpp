@@ -16,7 +16,7 @@ Core::Core(Options given)
       workers(std::max(1, options.workers)),
       bulkWorkers(kBulkThreads),
       longWorkers(static_cast<std::size_t>(std::max(1, options.longRequests))),
-      places(options.longRequests, options.waitingRequests) {}
+      slots(options.longRequests, options.waitingRequests) {}
 
 Response Core::problem(int status, const std::string& detail) const {
   if (options.problem) return options.problem(status, detail);

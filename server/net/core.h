@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "server/net/fair_pool.h"
-#include "server/net/request_places.h"
+#include "server/net/request_slots.h"
 #include "server/net/router.h"
 #include "server/net/server.h"
 #include "server/net/static_files.h"
@@ -90,7 +90,7 @@ class Core {
   /// The pool for quick work on so many bytes: large requests queue only behind each other.
   FairPool& workersFor(std::size_t bytes) { return bytes > kBulkBytes ? bulkWorkers : workers; }
   asio::thread_pool longWorkers;
-  RequestPlaces places;
+  RequestSlots slots;
 
  private:
   struct Entry {

@@ -225,8 +225,8 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
   awaitable<Response> handle(const Route& route, Request& request) {
     if (route.kind == RouteKind::waiting) {
-      const RequestPlaces::Place place = core_.places.takeWaiting(request.flow);
-      if (!place) co_return tooMany();
+      const RequestSlots::Slot slot = core_.slots.takeWaiting(request.flow);
+      if (!slot) co_return tooMany();
       const ClientWatch watch(transport_.socket(), mayBeAsked(), request);
       co_return co_await runAlone<Response>(core_.longWorkers,
                                             [&] { return core_.guarded(route.handler, request); });
@@ -245,8 +245,8 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
                                                    [&] { return core_.guarded(quick, request); });
       if (!takesLong) co_return response;
     }
-    const RequestPlaces::Place place = core_.places.takeLong(route.kind == RouteKind::quick);
-    if (!place) co_return tooMany();
+    const RequestSlots::Slot slot = core_.slots.takeLong(route.kind == RouteKind::quick);
+    if (!slot) co_return tooMany();
     const ClientWatch watch(transport_.socket(), mayBeAsked(), request);
     co_return co_await runOn<Response>(core_.longWorkers,
                                        [&] { return core_.guarded(route.handler, request); });
@@ -329,7 +329,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
   /// Time for the next piece of an answer of which so many bytes have been sent: a client may take long over
   /// a large answer, but it may neither stall nor read so slowly that the answer's memory is held for hours.
   Milliseconds patienceFor(std::size_t sent, std::chrono::steady_clock::time_point begin) const {
-    const Milliseconds earned(std::int64_t(sent) * 1000 / std::int64_t(core_.options.leastAnswerRate));
+    const Milliseconds earned(std::int64_t(sent) * 1000 / std::int64_t(core_.options.minAnswerRate));
     const auto used = std::chrono::duration_cast<Milliseconds>(std::chrono::steady_clock::now() - begin);
     const Milliseconds most = core_.options.bodyTimeout;
     return std::clamp(most + earned - used, Milliseconds(0), most);

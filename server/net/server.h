@@ -42,7 +42,7 @@ struct Options {
   std::chrono::milliseconds bodyTimeout{30'000};  ///< to read a whole body; to write a piece of a response
   /// Bytes per second of a response that a client must read on average, after bodyTimeout; a slower one is
   /// cut.
-  std::size_t leastAnswerRate = 64 << 10;
+  std::size_t minAnswerRate = 64 << 10;
   std::chrono::milliseconds pingTimeout{20'000};  ///< a WebSocket client silent for this long is cut
 
   std::vector<std::string> allowedOrigins;  ///< in addition to the server's own, e.g. "https://lab.example"

@@ -73,18 +73,18 @@ TEST(DatasetStore, KeepsTheGradientsThatItHasMeasured) {
 TEST(DatasetStore, KeepsOnlyTheGradientsThatWereAskedForLast) {
   const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(1) << 30);
   std::vector<Dataset> datasets;
-  for (std::size_t i = 0; i <= DatasetStore::kMostGradients; ++i)
+  for (std::size_t i = 0; i <= DatasetStore::kMaxGradients; ++i)
     datasets.push_back({std::to_string(i), "", {}, testing::smallVolume()});
   const DatasetStore store(std::move(datasets), memory);
   const std::size_t bytes = store.measuredGradients(*store.all()[0], 0, {})->sizeBytes();
-  for (std::size_t i = 1; i < DatasetStore::kMostGradients; ++i)
+  for (std::size_t i = 1; i < DatasetStore::kMaxGradients; ++i)
     store.measuredGradients(*store.all()[i], 0, {});
   EXPECT_NE(store.gradients(*store.all()[0], 0), nullptr);  // used last, so it is not the one evicted
   store.measuredGradients(*store.all().back(), 0, {});
   EXPECT_NE(store.gradients(*store.all()[0], 0), nullptr);
   EXPECT_EQ(store.gradients(*store.all()[1], 0), nullptr);
   EXPECT_NE(store.gradients(*store.all().back(), 0), nullptr);
-  EXPECT_EQ(memory->used(MemoryUse::grids), DatasetStore::kMostGradients * bytes);
+  EXPECT_EQ(memory->used(MemoryUse::grids), DatasetStore::kMaxGradients * bytes);
 }
 
 TEST(DatasetStore, ProbesBetweenVoxelCentres) {

@@ -67,7 +67,7 @@ TEST(FilmState, IsLateOnceThePassOfAnEditHasTakenTooLong) {
   EXPECT_FALSE(e.film.lateForEdit(e.request, kPolicy));
   e.film.passSeconds = 0.076;
   EXPECT_TRUE(e.film.lateForEdit(e.request, kPolicy));
-  e.film.divisor = kMostDivisor;
+  e.film.divisor = kMaxDivisor;
   EXPECT_FALSE(e.film.lateForEdit(e.request, kPolicy));
   e.film.divisor = 1;
   e.film.shown.revision = 1;

@@ -348,7 +348,7 @@ TEST_F(HttpTest, CutsAClientThatDoesNotReadItsAnswer) {
 TEST_F(HttpTest, CutsAClientThatReadsItsAnswerTooSlowly) {
   Options options = quickOptions();
   options.bodyTimeout = milliseconds(500);
-  options.leastAnswerRate = std::size_t(1) << 30;
+  options.minAnswerRate = std::size_t(1) << 30;
   Server server(options);
   constexpr std::size_t kBytes = 64 << 20;
   server.route("GET", "/huge", [](const Request&) {
