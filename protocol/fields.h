@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The table of the scene's fields: the single source of validation, serialisation, JSON Schema, patches and
-// documentation. A new field is one line here and one in scene.h, which also holds its default.
+// The table of the scene's fields: the single source for validation, serialisation, JSON Schema, patches and
+// documentation. A new field is one line here and one in scene.h, which also has its default.
 #pragma once
 #include <cstddef>
 #include <optional>

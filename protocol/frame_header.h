@@ -14,7 +14,7 @@ inline constexpr std::uint16_t kProtocolVersion = 1;
 
 enum class Codec : std::uint8_t { jpeg = 1, png = 2 };
 inline constexpr std::uint8_t kFlagInteractive = 1;  ///< lower resolution or quality while edits arrive
-inline constexpr std::uint8_t kFlagFinal = 2;  ///< the stop condition is met: nothing follows unprompted
+inline constexpr std::uint8_t kFlagFinal = 2;  ///< the stop condition is met: no frame follows until an edit
 
 struct FrameHeader {
   std::uint16_t headerBytes = kFrameHeaderBytes;  ///< the image starts here
@@ -31,7 +31,7 @@ struct FrameHeader {
   bool operator==(const FrameHeader&) const = default;
 };
 
-/// Little-endian on every machine; headerBytes is written as kFrameHeaderBytes.
+/// Little-endian on every machine. headerBytes is written as kFrameHeaderBytes.
 std::array<std::byte, kFrameHeaderBytes> encodeFrameHeader(const FrameHeader& header);
 
 /// Reads the header at the start of a message. nullopt if the magic or version differs, if the codec is

@@ -9,8 +9,8 @@
 namespace scolopax::protocol {
 namespace {
 
-/// Deepest nesting of brackets outside strings. For text that is not JSON, at least the depth that a parser
-/// reaches before it fails.
+/// Maximum nesting of brackets outside strings. If the text is not JSON, this is at least the depth that a
+/// parser reaches before it fails.
 std::size_t nestingDepth(std::string_view text) {
   std::size_t depth = 0, deepest = 0;
   bool inString = false;

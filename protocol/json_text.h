@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON as text. All JSON text from clients comes in here; the limits are checked before it is parsed.
+// Reads and writes JSON text. All JSON from clients passes through here; limits are checked before it is
+// parsed.
 #pragma once
 #include <cstddef>
 #include <nlohmann/json_fwd.hpp>
@@ -15,7 +16,7 @@ struct Limits {
 
 /// Throws only ProtocolError: 413 for more than `bytes` bytes; 400 for nesting deeper than `depth`, for text
 /// that is not JSON in UTF-8, and for a number outside the range of a double. If an object repeats a key, the
-/// last value counts.
+/// last value is used.
 nlohmann::json parseJson(std::string_view text, const Limits& limits = {});
 /// Compact text. Bytes that are not UTF-8 are replaced.
 std::string jsonText(const nlohmann::json& json);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The names an enumerated field may take. The caller fills them in (the server from the renderer's lists):
-// the protocol does not depend on the renderer.
+// The allowed names of enumerated fields. The server fills them in from the renderer's lists, because the
+// protocol does not depend on the renderer.
 #pragma once
 #include <string>
 #include <vector>
@@ -9,7 +9,7 @@ namespace scolopax::protocol {
 
 struct EnumEntry {
   std::string name;  ///< as on the wire
-  std::string doc;   ///< what it is, one line
+  std::string doc;   ///< description, one line
 };
 
 struct Lists {

@@ -14,7 +14,7 @@ void readValue(const nlohmann::json& json, const Path& path, const Traits&, Read
   out = json;
 }
 
-// Messages have a `type` and required fields; everything else works as in a scene.
+// Messages have a `type` and required fields; otherwise they are read like a scene.
 template <>
 struct Table<PatchMessage> {
   static constexpr std::string_view type = "patch";
@@ -79,7 +79,7 @@ Message readMessage(nlohmann::json json) {
   return message;
 }
 
-/// Reads the message as the alternative of the variant that has this `type`.
+/// Reads the message as the variant's alternative with this `type`.
 template <class... Messages>
 ClientMessage readAny(const nlohmann::json& json, const std::string& type, std::variant<Messages...>*) {
   std::optional<ClientMessage> message;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The text messages of a session's WebSocket: parses the client's and writes the server's.
+// The text messages of a session's WebSocket: parses the client's messages and writes the server's.
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -23,7 +23,7 @@ struct AckMessage {
 struct PingMessage {
   std::uint32_t id = 0;  ///< returned in the pong
 };
-/// What the client can display; each of these messages replaces the one before it.
+/// The client's limits for pictures. Each of these messages replaces the previous one.
 struct ViewMessage {
   bool visible = true;  ///< false: no frames
   std::optional<std::uint32_t> maxWidth, maxHeight;
@@ -47,8 +47,8 @@ using ClientMessage =
 ClientMessage parseClientMessage(std::string_view text, const Limits& limits = {});
 
 std::string helloText(const nlohmann::json& capabilities, std::string_view session, std::string_view token);
-/// For the viewers that did not send the edit: `patch`, as JSON text, turns the resolved scene before the
-/// edit into the one after it.
+/// For the viewers that did not send the edit. `patch`, as JSON text, turns the resolved scene before the
+/// edit into the scene after it.
 std::string sceneText(std::uint32_t revision, std::string_view patch);
 /// `patchId`: id of the refused patch; 0 if the error is about something else.
 std::string errorText(const ProtocolError& error, std::uint32_t patchId = 0);

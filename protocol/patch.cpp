@@ -26,7 +26,7 @@ std::size_t indexBelow(const std::string& key, std::size_t count, const Path& li
   return *index;
 }
 
-/// Patches a value without a table: replaces it or, in a list, replaces single entries that already exist.
+/// Patches a value that has no table: replaces it or, in a list, replaces single existing entries.
 void patchLeaf(nlohmann::json& target, const nlohmann::json& patch, const Path& path) {
   if (!patch.is_object()) {
     target = patch;
@@ -60,7 +60,7 @@ struct PatchValue<T> {
   }
 };
 
-/// An object that may be absent; patchStruct has already handled null.
+/// An object that may be absent. patchStruct has already handled null.
 template <Described T>
 struct PatchValue<std::optional<T>> : PatchValue<T> {};
 
@@ -95,7 +95,7 @@ struct PatchValue<std::vector<T>> {
   }
 };
 
-/// Of two fields that exclude each other, a patch that sets only one removes the other.
+/// If a patch sets only one of two fields that exclude each other, removes the other one.
 template <Described T>
 void removeExcluded(nlohmann::json& target, const nlohmann::json& patch) {
   const auto sets = [&](std::string_view key) {
@@ -129,7 +129,7 @@ void patchStruct(nlohmann::json& target, const nlohmann::json& patch, const Path
 template <Described T>
 nlohmann::json structPatchBetween(const T& from, const T& to);
 
-/// The patch of a member that differs.
+/// The patch for a member that differs.
 template <class T>
 struct MemberPatch {
   static nlohmann::json between(const T&, const T& to) { return writeValue(to); }
@@ -150,7 +150,7 @@ struct MemberPatch<std::optional<T>> {
 template <Described T>
 struct MemberPatch<std::vector<T>> {
   static nlohmann::json between(const std::vector<T>& from, const std::vector<T>& to) {
-    if (to.size() < from.size()) return writeValue(to);  // only a whole list can shorten a list
+    if (to.size() < from.size()) return writeValue(to);  // only a new list can be shorter
     nlohmann::json patch = nlohmann::json::object();
     for (std::size_t i = 0; i < to.size(); ++i) {
       if (i >= from.size())
@@ -169,7 +169,8 @@ nlohmann::json structPatchBetween(const T& from, const T& to) {
     const Value &before = from.*field.member, &after = to.*field.member;
     if (before != after) patch[std::string(field.name)] = MemberPatch<Value>::between(before, after);
   });
-  // A partner that stays must be named in the patch, or applying it would remove the partner.
+  // Of two fields that exclude each other, one that remains must be in the patch, or applying it would remove
+  // the field.
   const auto keep = [&](std::string_view partner) {
     forEachField<T>([&](const auto& field) {
       if (field.name != partner) return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A position in a document, as a linked list on the stack that becomes a JSON pointer only when there is an
-// error to report; and the functions that throw such errors. Internal to protocol/.
+// A position in a document, as a linked list on the stack, which is converted to a JSON pointer only to
+// report an error; and the functions that throw such errors. Internal to protocol/.
 #pragma once
 #include <cstddef>
 #include <nlohmann/json_fwd.hpp>

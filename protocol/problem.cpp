@@ -61,7 +61,7 @@ std::string_view statusTitle(int status) {
 }
 
 std::string problemJson(int status, std::string_view detail, std::string_view pointer) {
-  // In the order that suits a reader, not in alphabetical order.
+  // ordered_json, because alphabetical order would be hard to read.
   nlohmann::ordered_json body{
       {"type", "about:blank"}, {"title", statusTitle(status)}, {"status", status}, {"detail", detail}};
   if (!pointer.empty()) body["pointer"] = pointer;

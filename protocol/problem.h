@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The protocol's one exception, and its form on the wire (RFC 9457).
+// The exception of the protocol, and its form on the wire (RFC 9457).
 #pragma once
 #include <stdexcept>
 #include <string>
@@ -9,14 +9,14 @@ namespace scolopax::protocol {
 
 inline constexpr std::string_view kProblemType = "application/problem+json";
 
-/// Untrusted text made fit for a message: at most `most` bytes, cut between two UTF-8 characters and ended by
-/// "..." if it is longer. Every part of a request that a detail quotes goes through this.
+/// Untrusted text, shortened for a message: longer text is cut between two UTF-8 characters and ends with
+/// "...", `most` bytes in all. To be used for every part of a request that a message quotes.
 std::string shortened(std::string_view text, std::size_t most = 200);
 
-/// A request or message that the server refuses. `what()` is the detail: one line with what was expected and
-/// what was found.
+/// A request or message that the server refuses. `what()` is the detail, one line that says what was expected
+/// and what was found.
 struct ProtocolError : std::runtime_error {
-  /// Both texts are shortened: they may quote parts of a request, which can be long.
+  /// Both texts are shortened, because they may quote long parts of a request.
   ProtocolError(int statusCode, std::string_view jsonPointer, std::string_view detail)
       : std::runtime_error(shortened(detail, kMaxDetail)),
         status(statusCode),
@@ -31,7 +31,7 @@ struct ProtocolError : std::runtime_error {
 std::string_view statusTitle(int status);
 
 /// Body of type kProblemType with the members type, title, status, detail and, unless empty, pointer. Bytes
-/// that are not UTF-8 are replaced, so whatever `detail` holds, this does not throw because of it.
+/// that are not UTF-8 are replaced, so that no `detail` makes this throw.
 std::string problemJson(int status, std::string_view detail, std::string_view pointer = "");
 std::string problemJson(const ProtocolError& error);
 

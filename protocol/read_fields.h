@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads and writes any struct that has a table of fields (fields.h): one overload per type that a field can
-// have. Internal to protocol/; scene_json.cpp and messages.cpp instantiate it.
+// Reads and writes structs that have a table of fields (fields.h), with one overload for each type of field.
+// Internal to protocol/; scene_json.cpp and messages.cpp instantiate it.
 #pragma once
 #include <array>
 #include <cmath>
@@ -16,7 +16,7 @@
 
 namespace scolopax::protocol {
 
-/// What readValue needs besides the JSON: the lists to look names up in.
+/// The lists in which readValue looks up names.
 struct ReadContext {
   const Lists& lists;
 };
@@ -152,7 +152,7 @@ nlohmann::json writeValue(const std::vector<T>& value) {
   return list;
 }
 
-/// Omits fields without a value: the result contains no null.
+/// Omits fields without a value, so the result contains no null.
 template <Described T>
 nlohmann::json writeValue(const T& value) {
   nlohmann::json object = nlohmann::json::object();

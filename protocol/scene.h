@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scene in its wire form: everything that a client can edit. It is read from JSON (scene_json.h,
-// described by fields.h), and the server resolves it into the renderer's scene. An empty optional means
+// The scene in its wire form: everything that a client can edit. It is read from JSON (scene_json.h) as
+// fields.h describes, and the server resolves it into the renderer's scene. An empty optional means
 // "automatic" or "none".
 #pragma once
 #include <array>
@@ -49,7 +49,7 @@ struct GradientOpacity {
 struct Isovalue {
   std::optional<double> value;
   double opacity = 1;
-  std::optional<std::string> color;  ///< "#rrggbb"; none: the channel's at the value
+  std::optional<std::string> color;  ///< "#rrggbb"; none: the channel's colour at the value
   bool operator==(const Isovalue&) const = default;
 };
 

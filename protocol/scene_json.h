@@ -9,9 +9,9 @@
 
 namespace scolopax::protocol {
 
-/// Validates and reads a whole scene. Fields that are absent, or null where null means automatic, take their
-/// defaults. Throws ProtocolError(422) with the pointer of the first bad or unknown field, what was expected
-/// and what was found.
+/// Validates and reads a whole scene. Fields that are absent, or null where null means automatic, have their
+/// defaults. Throws ProtocolError(422) with the pointer of the first invalid or unknown field, and what was
+/// expected and found.
 Scene parseScene(const nlohmann::json& json, const Lists& lists);
 
 /// Reads one entry of a scene's channels, in the same way.
@@ -21,7 +21,7 @@ Channel parseChannel(const nlohmann::json& json, std::size_t index, const Lists&
 /// parseScene(toJson(scene)) is the same scene.
 nlohmann::json toJson(const Scene& scene);
 
-/// Throws ProtocolError(422) when the scene has more channels than the data set.
+/// Throws ProtocolError(422) if the scene has more channels than the data set.
 void checkChannelCount(const Scene& scene, std::size_t channelCount);
 
 }  // namespace scolopax::protocol

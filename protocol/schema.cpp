@@ -11,7 +11,7 @@ using Json = nlohmann::ordered_json;
 template <class T>
 struct Tag {};
 
-/// What the functions below share: the definitions collected so far, and the names for enums.
+/// Shared by the functions below: the definitions collected so far, and the names of enums.
 struct Writer {
   const Lists& lists;
   Json definitions = Json::object();
@@ -57,7 +57,8 @@ Json pointList(std::string_view title, const Traits& traits) {
   return {{"type", "array"}, {"items", reference(title)}, {"minItems", 1}, {"maxItems", traits.maxItems}};
 }
 
-// One overload per type of field: first its schema, further below its description in words.
+// One overload for each type of field. The overloads of valueWords further below describe the same types in
+// words.
 Json valueSchema(Tag<bool>, const Traits&, Writer&) { return {{"type", "boolean"}}; }
 Json valueSchema(Tag<double>, const Traits& traits, Writer&) { return numberSchema("number", traits); }
 Json valueSchema(Tag<std::uint32_t>, const Traits& traits, Writer&) {
@@ -120,7 +121,7 @@ Json valueSchema(Tag<std::optional<T>>, const Traits& traits, Writer& writer) {
   return schema;
 }
 
-/// What the field means, its unit and its names, in one text.
+/// The field's meaning, unit and names in one text.
 std::string description(std::string_view doc, const Traits& traits, const Lists& lists) {
   std::string words = text(doc);
   if (!traits.unit.empty()) words += " Unit: " + text(traits.unit) + '.';
@@ -135,7 +136,7 @@ Json structSchema(Writer& writer) {
   Json properties = Json::object();
   forEachField<T>([&]<class Value>(const Field<T, Value>& field) {
     Json schema = valueSchema(Tag<Value>{}, field.traits, writer);
-    // A $ref stands alone: the definition that it refers to has its own description, and its default is {}.
+    // A $ref has no other keywords: the referenced definition has its own description, and the default is {}.
     if (!schema.contains("$ref")) {
       schema["description"] = description(field.doc, field.traits, writer.lists);
       schema["default"] = tidy(writeValue(T{}.*field.member));
@@ -149,8 +150,7 @@ Json structSchema(Writer& writer) {
               {"properties", properties}};
   forEachExclusive<T>([&](const Exclusive& pair) {
     if (!pair.bothAreAnError) return;
-    // In this form because generators of types understand only that there is a `not`, and ignore what it
-    // holds.
+    // In this form, because generators of types ignore the contents of a `not`.
     const Json isSet{{"not", {{"type", "null"}}}};
     schema["not"] = {{"required", Json::array({pair.first, pair.second})},
                      {"properties", {{text(pair.first), isSet}, {text(pair.second), isSet}}}};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two more things made from the table of fields: the JSON Schema, which is checked in as schema.json and
+// Generates two texts from the table of fields: the JSON Schema, which is checked in as schema.json and
 // served to clients, and the section of PROTOCOL.md about fields.
 #pragma once
 #include <string>
