@@ -64,7 +64,8 @@ struct ClientWatch::State {
     pollfd polled{socket.native_handle(), POLLRDHUP, 0};
     if (poll(&polled, 1, 0) <= 0) return false;
     if (polled.revents != POLLRDHUP || !mayAsk) return true;
-    // Whoever has closed the connection resets it when an interim response arrives; others ignore that.
+    // A client that has closed the connection resets it when an interim response arrives; other clients
+    // ignore it.
     if (std::exchange(asked, true)) return false;
     return send(socket.native_handle(), kContinue.data(), kContinue.size(), MSG_NOSIGNAL | MSG_DONTWAIT) !=
            ssize_t(kContinue.size());

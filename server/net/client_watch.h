@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What HttpConnection knows of a client while it waits: whether its time is up, and whether it has gone.
+// Watches a client while HttpConnection waits: whether its time is up, and whether it has disconnected.
 #pragma once
 #include <utility>  // Asio 1.74 needs it first under C++20
 
@@ -14,8 +14,8 @@ namespace scolopax::net {
 
 inline constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
 
-/// While this object lives and its time is up, cancels whatever the socket waits for. It does so repeatedly:
-/// a composed operation may be just between two steps when the time is up.
+/// Cancels the operations of the socket when the time is up. It repeats this while it exists, because a
+/// composed operation may be between two steps at that moment.
 class Deadline {
  public:
   Deadline(boost::asio::ip::tcp::socket& socket, std::chrono::milliseconds time);
@@ -29,9 +29,9 @@ class Deadline {
   std::shared_ptr<State> state_;
 };
 
-/// Lets a request wait, and notices soon that its client has closed the connection, or the server has. It
-/// polls the system, since reading would consume bytes of the next request. A client may also close only its
-/// sending side and wait for the answer. `mayAsk`: plain HTTP/1.1, where the two can be told apart.
+/// Lets a request wait, and detects soon that the client or the server has closed the connection. It polls
+/// the system, since reading would consume bytes of the next request. A client may also close only its
+/// sending side and wait for the answer. `mayAsk`: with plain HTTP/1.1, the two cases can be distinguished.
 class ClientWatch {
  public:
   ClientWatch(boost::asio::ip::tcp::socket& socket, bool mayAsk, Request& request);

@@ -55,7 +55,7 @@ void Core::enter(const std::shared_ptr<Connection>& connection, const std::strin
 void Core::leave(Connection* connection) {
   const std::lock_guard lock(mutex_);
   connections_.erase(connection);
-  // Notifies under the lock: as soon as the waiter holds it, this core may be destroyed.
+  // Notifies under the lock: as soon as the waiting thread holds the lock, this core may be destroyed.
   left_.notify_all();
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all connections of one server share: options, routes, threads, and the list of connections.
+// Everything that the connections of a server share: options, routes, threads, and the list of connections.
 #pragma once
 #include <utility>  // Asio 1.74 needs it first under C++20
 
@@ -29,11 +29,11 @@ namespace scolopax::net {
 
 namespace asio = boost::asio;
 
-/// A connection, which must end before the server does. Both functions may be called from any thread.
+/// A connection. It must end before the server does. Both functions may be called from any thread.
 class Connection {
  public:
   virtual ~Connection() = default;
-  virtual void beginStop() = 0;  ///< finish in order, but soon
+  virtual void beginStop() = 0;  ///< finish soon, in an orderly way
   virtual void cut() = 0;        ///< close the socket now
 };
 
@@ -44,7 +44,7 @@ class Core {
   /// A refusal by the server itself, in the format of Options::problem.
   Response problem(int status, const std::string& detail) const;
   void log(const std::string& line) const;
-  /// Runs a handler and turns an exception into a log line and a 500.
+  /// Runs a handler; turns an exception into a log line and a 500.
   Response guarded(const Handler& handler, const Request& request) const;
 
   /// See Request::flow.
@@ -53,17 +53,17 @@ class Core {
     return flow.empty() ? request.remoteAddress : flow;
   }
 
-  /// From here until leave() the server waits for this connection when it stops. `address`: the client's, for
+  /// A server that stops waits for this connection until it calls leave(). `address`: the client's, for
   /// makeRoom().
   void enter(const std::shared_ptr<Connection>& connection, const std::string& address);
-  /// The connection's client is known: the connection is no longer cut to make room.
+  /// The connection's client is known. The connection is no longer cut to make room.
   void trust(Connection* connection);
-  /// Whether there is room for one more connection. Strangers, whose client is not known yet, have at most
-  /// half of the places: when they fill that half, or all places are taken, one of them is cut, at random
-  /// among those of the address that has the most. So a flood from one address cuts only itself, and one from
-  /// many cannot choose whom it cuts.
+  /// Whether there is room for one more connection. Strangers, whose client is not known yet, may be at most
+  /// half of the connections. When they are half, or when there are as many connections as allowed, one
+  /// stranger is cut: at random among those of the address that has the most. So a flood from one address
+  /// cuts only itself, and a flood from many addresses cannot choose whom it cuts.
   bool makeRoom();
-  /// Must be a connection's last call to its core.
+  /// Must be a connection's last call to the core.
   void leave(Connection* connection);
   std::size_t connectionCount() const;
 
@@ -80,14 +80,15 @@ class Core {
   UpgradeHandler upgradeHandler;
   /// Shared with WebSocket handles, which may outlive the server.
   std::shared_ptr<asio::io_context> io = std::make_shared<asio::io_context>();
-  /// Bytes of texts that wait to be sent; shared as well.
+  /// Bytes of texts that wait to be sent; also shared with WebSocket handles.
   std::shared_ptr<std::atomic<std::size_t>> unsentTexts = std::make_shared<std::atomic<std::size_t>>(0);
-  /// Bytes of request bodies that are being received or handled. One of unknown length counts as bodyLimit
+  /// Bytes of request bodies that are being received or handled. A body of unknown length counts as bodyLimit
   /// until it has been received.
   std::atomic<std::size_t> bodyBytes{0};
   FairPool workers;
   FairPool bulkWorkers;
-  /// The pool for quick work on so many bytes: large requests queue only behind each other.
+  /// The pool for quick work on so many bytes. Large requests have their own pool and wait only for each
+  /// other.
   FairPool& workersFor(std::size_t bytes) { return bytes > kBulkBytes ? bulkWorkers : workers; }
   asio::thread_pool longWorkers;
   RequestSlots slots;
@@ -97,7 +98,7 @@ class Core {
     std::weak_ptr<Connection> connection;
     std::string address;
     bool stranger = true;
-    bool leaving = false;  ///< was cut to make room
+    bool leaving = false;  ///< it has been cut to make room
   };
   static constexpr std::size_t kBulkBytes = 64 << 10;
   std::vector<std::shared_ptr<Connection>> connections() const;
@@ -110,8 +111,8 @@ class Core {
   bool cutting_ = false;
 };
 
-/// Runs `work` in a job that `post` hands to another thread, and resumes the awaiting coroutine on its own
-/// executor with the result.
+/// Runs `work` on another thread, to which `post` passes it, and resumes the awaiting coroutine with the
+/// result on the coroutine's own executor.
 template <typename Result, typename Post, typename Work>
 asio::awaitable<Result> runBy(Post post, Work work) {
   return asio::async_initiate<const asio::use_awaitable_t<>, void(Result)>(
@@ -131,10 +132,10 @@ asio::awaitable<Result> runOn(asio::thread_pool& pool, Work work) {
   return runBy<Result>([&pool](auto job) { asio::post(pool, std::move(job)); }, std::move(work));
 }
 
-/// Runs `work` on a thread that is made for it or, if the system has none left, on the pool.
+/// Runs `work` on a new thread or, if the system cannot create one, on the pool.
 template <typename Result, typename Work>
 asio::awaitable<Result> runAlone(asio::thread_pool& pool, Work work) {
-  std::jthread thread;  // joined, without a wait, when its result is there
+  std::jthread thread;  // joined when its result has arrived, so joining does not wait
   co_return co_await runBy<Result>(
       [&](auto job) {
         const auto shared = std::make_shared<decltype(job)>(std::move(job));

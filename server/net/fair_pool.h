@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Threads with fair queuing: jobs belong to flows, and flows take turns. However many jobs one flow has, and
-// however long they take, another flow waits for at most one job of it.
+// A thread pool with fair queuing. Jobs belong to flows, and flows take turns. However many jobs a flow has,
+// and however long they take, another flow waits for at most one of them.
 #pragma once
 #include <future>
 #include <memory>
@@ -10,7 +10,7 @@ namespace scolopax::net {
 
 class FairPool {
  public:
-  /// Like std::function<void()>, but may hold what cannot be copied.
+  /// Like std::function<void()>, but may hold objects that cannot be copied.
   using Job = std::packaged_task<void()>;
 
   explicit FairPool(int threads);
@@ -18,9 +18,9 @@ class FairPool {
   FairPool(const FairPool&) = delete;
   FairPool& operator=(const FairPool&) = delete;
 
-  /// From any thread. The jobs of a flow begin in the order in which they were posted, one at a time.
+  /// The jobs of a flow run in the order in which they were posted, one at a time. From any thread.
   void post(const std::string& flow, Job job);
-  /// Runs all jobs, including those that they post meanwhile, and ends the threads. Safe to call twice.
+  /// Runs all jobs, including jobs that they post, and ends the threads. May be called twice.
   void join();
 
  private:

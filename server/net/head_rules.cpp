@@ -13,7 +13,7 @@ namespace {
 
 namespace http = boost::beast::http;
 
-/// Paths are matched by regular expressions, whose recursion grows with the length of the text.
+/// Limited because regular expressions match the path, and their recursion grows with its length.
 constexpr std::size_t kPathLimit = 2048;
 constexpr std::array<std::string_view, 7> kMethods{"GET",   "HEAD",   "POST",   "PUT",
                                                    "PATCH", "DELETE", "OPTIONS"};

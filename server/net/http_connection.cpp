@@ -38,7 +38,7 @@ bool isSafeHeader(const std::string& name, const std::string& value) {
   return !name.empty() && (name + value).find_first_of(std::string("\r\n\0", 3)) == std::string::npos;
 }
 
-/// Counts a request's body among those that the server holds.
+/// Counts a request's body among the bodies that the server holds.
 class HeldBody {
  public:
   explicit HeldBody(std::atomic<std::size_t>& all) : all_(all) {}
@@ -86,7 +86,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
   }
 
  private:
-  /// The TLS handshake, if there is TLS. False if it fails.
+  /// The TLS handshake, if the server uses TLS. False if it fails.
   awaitable<bool> secure() {
     if (!transport_.tls()) co_return true;
     idle_ = true;
@@ -103,8 +103,8 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     if (!co_await waitForByte(patience)) co_return false;
     Parser parser;
     parser.header_limit(static_cast<std::uint32_t>(core_.options.headerLimit));
-    // Disables the parser's limit on bodies, which would refuse before the request has been authorised.
-    // readHead() and readBody() check it.
+    // Disables the parser's own limit on bodies, which would refuse a request before it is authorised.
+    // readHead() and readBody() check the limit.
     parser.body_limit(std::numeric_limits<std::uint64_t>::max());
     error_code error;
     {
@@ -127,7 +127,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     if (const auto refusal = readHead(parser.get(), core_.options.bodyLimit, request)) {
       co_return co_await refuse(refusal->status, refusal->detail);
     }
-    // From here on, only an unread body can stand between this request and the next.
+    // From here on the next request can be found, unless a body has not been read.
     const bool keepAlive = keepAlive_;
     keepAlive_ = keepAlive_ && !hasBody;
     if (full_)
@@ -156,7 +156,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     keepAlive_ = keepAlive;
     request.matches = std::move(match.matches);
     Response response = co_await handle(*match.route, request);
-    std::string().swap(request.body);  // not kept by a client that reads its answer slowly
+    std::string().swap(request.body);  // a client that reads slowly must not keep it in memory
     held.set(0);
     co_return co_await write(std::move(response), keepAlive_);
   }
@@ -288,7 +288,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     co_return false;
   }
 
-  /// For requests after which the byte stream cannot be trusted: always ends the connection.
+  /// Refuses a request after which the byte stream cannot be trusted: always ends the connection.
   awaitable<bool> refuse(int status, std::string_view detail) {
     Response response = core_.problem(status, std::string(detail));
     co_return co_await write(std::move(response), false);
@@ -326,8 +326,8 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     co_return !error && keepAlive;
   }
 
-  /// Time for the next piece of an answer of which so many bytes have been sent: a client may take long over
-  /// a large answer, but it may neither stall nor read so slowly that the answer's memory is held for hours.
+  /// Time for sending the next piece of an answer, after `sent` bytes. A client may take long for a large
+  /// answer, but it may neither stall nor read so slowly that the answer stays in memory for hours.
   Milliseconds patienceFor(std::size_t sent, std::chrono::steady_clock::time_point begin) const {
     const Milliseconds earned(std::int64_t(sent) * 1000 / std::int64_t(core_.options.minAnswerRate));
     const auto used = std::chrono::duration_cast<Milliseconds>(std::chrono::steady_clock::now() - begin);
@@ -335,7 +335,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     return std::clamp(most + earned - used, Milliseconds(0), most);
   }
 
-  /// Reads on after the last answer, so that the client receives it.
+  /// Continues to read after the last answer, so that the client receives it.
   awaitable<void> linger() {
     idle_ = true;
     if (core_.stopping()) co_return;
@@ -348,11 +348,11 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
   Core& core_;
   Transport transport_;
-  asio::any_io_executor executor_;  ///< a copy: cut() may come after the socket has been moved away
+  asio::any_io_executor executor_;  ///< a copy, because cut() may be called after the socket has been moved
   boost::beast::flat_buffer buffer_;
   const std::string remoteAddress_;
   bool full_;
-  bool idle_ = false;  ///< between requests: a server that stops need not wait
+  bool idle_ = false;  ///< between requests: a server that stops does not wait
   bool linger_ = false;
   bool head_ = false;
   bool keepAlive_ = false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One accepted socket while it speaks HTTP: reads a head, checks it, reads the body, calls the handler, sends
-// the answer, and repeats. An upgrade passes the socket on to a WebSocketConnection.
+// An HTTP connection: repeatedly reads a head, checks it, reads the body, calls the handler and sends the
+// answer. An upgrade passes the socket to a WebSocketConnection.
 #pragma once
 #include "server/net/core.h"
 

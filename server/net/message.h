@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One HTTP request as handlers see it, already checked and decoded, and the response they return.
+// An HTTP request as handlers get it, checked and decoded, and the response that they return.
 #pragma once
 #include <functional>
 #include <map>
@@ -28,11 +28,12 @@ struct Request {
   std::string body;                  ///< whole and within the limit; empty in authorize and upgrades
   std::vector<std::string> matches;  ///< regex groups of the route; [0] is the whole path
   std::string remoteAddress;         ///< numeric, without the port
-  std::string flow;                  ///< what Options::flowOf says; if that is nothing, remoteAddress
-  /// Whether the handler may wait: unless in a RouteKind::quick route, or when called again after TakesLong.
+  std::string flow;                  ///< Options::flowOf of the request or, if that is "", remoteAddress
+  /// Whether the handler may wait. False in RouteKind::quick routes, except when called again after
+  /// TakesLong.
   bool mayWait = false;
-  /// If the handler may wait: requested when the client closes the connection before it has the answer, or
-  /// the server does.
+  /// If the handler may wait: requested when the client or the server closes the connection before the answer
+  /// is sent.
   std::stop_token gone;
 
   /// First header (query value) of that name, or nullptr.
@@ -48,14 +49,14 @@ struct Response {
   std::shared_ptr<const void> heldUntilSent = {};            ///< released once the answer has been sent
 };
 
-/// Why requests are refused and streams closed while the server stops.
+/// The message with which requests are refused and streams closed while the server stops.
 inline constexpr const char* kStopping = "the server is stopping";
 
-/// Thrown by the handler of a quick route, before it has changed anything, for a request that takes long: the
-/// handler is called again where it may wait.
+/// Thrown by the handler of a quick route, before it changes anything, for a request that takes long. The
+/// handler is then called again where it may wait.
 struct TakesLong {};
 
-/// Runs on a worker thread. An exception becomes a log line and a 500 that does not tell the cause.
+/// Runs on a worker thread. An exception becomes a log line and a 500 that does not mention the cause.
 using Handler = std::function<Response(const Request&)>;
 
 }  // namespace scolopax::net

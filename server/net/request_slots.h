@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How many requests may take long or wait at once. HttpConnection takes a slot before it calls the handler.
+// Limits how many requests may take long or wait at once. HttpConnection takes a slot before it calls the
+// handler.
 #pragma once
 #include <map>
 #include <memory>
@@ -15,11 +16,11 @@ class RequestSlots {
   RequestSlots(int longRequests, int waitingRequests)
       : mostLong_(longRequests), mostWaiting_(waitingRequests) {}
 
-  /// Released by its last owner; null: none was free.
+  /// Released by its last owner; null if none was free.
   using Slot = std::shared_ptr<const void>;
-  /// A slot for a long request. Requests of quick routes get at most a quarter of the slots: what such a
-  /// request waits for is computed once for all clients, and a client that sends many of them must not keep
-  /// others out.
+  /// A slot for a long request. Requests of quick routes get at most a quarter of the slots: their results
+  /// are computed once for all clients, and a client that sends many of them must not keep other requests
+  /// out.
   Slot takeLong(bool ofQuickRoute);
   /// A slot for a request that waits.
   Slot takeWaiting(const std::string& flow);
@@ -29,7 +30,7 @@ class RequestSlots {
 
   const int mostLong_, mostWaiting_;
   std::mutex mutex_;                    ///< guards the members below
-  int long_ = 0, quick_ = 0;            ///< taken slots; of these, by quick routes
+  int long_ = 0, quick_ = 0;            ///< taken slots; of these, the ones of quick routes
   std::map<std::string, int> waiting_;  ///< requests that wait, by flow
 };
 

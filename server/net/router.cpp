@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that uses cpp-httplib. It opens no socket with it: the request line is read from memory.
+// The only file that uses cpp-httplib. It opens no socket: the request line is read from memory.
 #include "server/net/router.h"
 
 #include <httplib.h>
@@ -16,7 +16,7 @@
 namespace scolopax::net {
 namespace {
 
-// process_request is a protected function: its behaviour was checked for this version.
+// process_request is a protected function, whose behaviour was checked for this version only.
 static_assert(std::string_view(CPPHTTPLIB_VERSION) == "0.11.4");
 
 constexpr std::array<const char*, 6> kMethods{"GET", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"};
@@ -66,13 +66,13 @@ struct Found {
   std::vector<std::string> groups;
 };
 
-// process_request runs on the calling thread: the pattern that fits stores its result here.
+// The matching pattern stores its result here. process_request runs on the calling thread.
 thread_local Found* current = nullptr;
 
 }  // namespace
 
-/// The matcher knows every pattern once, whatever methods it has: trying them one after another would match
-/// each path many times.
+/// The matcher has every pattern once, whatever its methods: one pattern per method would match each path
+/// many times.
 struct Router::Impl {
   Matcher matcher;
   std::map<std::string, Methods> patterns;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the handler for a method and path. cpp-httplib does the matching; bodies, queries and headers never
-// reach it, so none of its limits and conversions apply to them.
+// Finds the handler for a method and path. cpp-httplib matches the path; it never gets bodies, queries and
+// headers, so its limits and conversions do not apply to them.
 #pragma once
 #include <memory>
 #include <string>
@@ -25,8 +25,8 @@ class Router {
  public:
   Router();
   ~Router();
-  /// Of the patterns that fit a path, the one that was added first decides, whatever methods it has. Throws
-  /// NetError for an unknown method or an invalid regex.
+  /// Of the patterns that match a path, the first one added is used, whatever methods it has. Throws NetError
+  /// for an unknown method or an invalid regex.
   void add(const std::string& method, const std::string& pattern, const Route& route);
   /// `path` is decoded. Thread-safe once all routes are added.
   RouteMatch find(const std::string& method, const std::string& path) const;

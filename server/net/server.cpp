@@ -20,7 +20,7 @@ using asio::ip::tcp;
 using boost::system::error_code;
 
 constexpr int kIoThreads = 2;
-/// Connections beyond the limit that still get a 503; further ones are closed without an answer.
+/// Number of connections beyond the limit that get a 503. Further ones are closed without an answer.
 constexpr std::size_t kRefusedAtOnce = 32;
 constexpr std::chrono::milliseconds kAcceptPause{50};
 
@@ -43,8 +43,8 @@ struct Server::Impl {
     if (error || found.empty()) throw NetError("cannot listen on " + where + ": no such host");
     const tcp::endpoint endpoint = found.begin()->endpoint();
     acceptor.open(endpoint.protocol(), error);
-    // Lets a restarted server bind the port at once. Unlike SO_REUSEPORT, it never lets two servers share the
-    // port.
+    // Lets a restarted server bind the port at once. Unlike SO_REUSEPORT, it does not let two servers share
+    // the port.
     if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
     if (!error) acceptor.bind(endpoint, error);
     if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
@@ -122,7 +122,7 @@ void Server::stop(std::chrono::milliseconds grace) {
     impl_->core.waitUntilEmpty();
   }
   impl_->work.reset();
-  // Without io->stop(): only cancelled timers are left to run, and running them frees them.
+  // io->stop() is not called: only cancelled timers are left, and running them frees them.
   for (std::thread& thread : impl_->threads) thread.join();
   impl_->core.workers.join();
   impl_->core.bulkWorkers.join();

@@ -14,7 +14,7 @@ namespace {
 
 namespace ssl = boost::asio::ssl;
 
-/// OpenSSL's own message does not say that a file is missing.
+/// Checked here because OpenSSL's message does not say that a file is missing.
 void requireReadable(const std::string& what, const std::string& file) {
   errno = 0;
   std::ifstream in(file, std::ios::binary);
@@ -33,7 +33,7 @@ std::unique_ptr<ssl::context> loadTls(const std::string& certificateFile, const 
   context->set_options(ssl::context::default_workarounds | ssl::context::no_tlsv1 | ssl::context::no_tlsv1_1);
   SSL_CTX_set_mode(context->native_handle(), SSL_MODE_RELEASE_BUFFERS);
   boost::system::error_code error;
-  // Refuses a key with a password; OpenSSL would ask for it on the terminal.
+  // Refuses a key with a password, for which OpenSSL would ask on the terminal.
   context->set_password_callback([](std::size_t, ssl::context::password_purpose) { return std::string(); });
   context->use_certificate_chain_file(certificateFile, error);
   if (error)

@@ -9,7 +9,7 @@
 
 namespace scolopax::net {
 
-/// From PEM files; null when both names are empty. Throws NetError naming the file at fault.
+/// Loads PEM files; null if both names are empty. Throws NetError, which names the faulty file.
 std::unique_ptr<boost::asio::ssl::context> loadTls(const std::string& certificateFile,
                                                    const std::string& keyFile);
 

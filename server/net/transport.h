@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A connected socket, plain or under TLS: what HttpConnection and WebSocketConnection read from and write to.
+// A connected socket, plain or with TLS. HttpConnection and WebSocketConnection read from it and write to it.
 #pragma once
 #include <utility>  // Asio 1.74 needs it first under C++20
 
@@ -14,7 +14,8 @@ namespace scolopax::net {
 
 namespace asio = boost::asio;
 
-/// Models Beast's AsyncStream. To be used only on the socket's strand; a moved-from one may only be closed.
+/// Models Beast's AsyncStream. To be used only on the socket's strand. A moved-from transport may only be
+/// closed.
 class Transport {
  public:
   using executor_type = asio::ip::tcp::socket::executor_type;
@@ -47,9 +48,9 @@ class Transport {
     return socket_->async_write_some(buffers, std::forward<Token>(token));
   }
 
-  /// To be called after the last write: ends sending, and reads on until the peer ends, kDiscardLimit bytes
-  /// have come, or reading fails. Closing with unread bytes would reset the connection, and the client might
-  /// never get what was sent.
+  /// To be called after the last write. Ends sending and continues to read until the peer closes,
+  /// kDiscardLimit bytes have arrived, or reading fails. Closing a socket with unread bytes would reset the
+  /// connection, and the client might lose the last answer.
   template <class Token>
   auto async_discard(Token&& token) {
     return asio::async_compose<Token, void(ErrorCode)>(Discard(*this), token, *socket_);

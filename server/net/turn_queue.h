@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Jobs that wait for a thread, and whose turn it is. Used by what has the threads: FairPool, and the server's
-// background.
+// A queue of jobs that wait for a thread, in which flows take turns. Used by FairPool and BackgroundThreads,
+// which have the threads.
 #pragma once
 #include <algorithm>
 #include <cstddef>
@@ -14,13 +14,12 @@
 
 namespace scolopax::net {
 
-/// Jobs belong to flows, and flows take turns: however many jobs a flow has, another waits for at most one
-/// job of it at each place. The jobs of a flow begin in the order in which they were pushed. Not to be used
-/// by several threads at once.
+/// However many jobs a flow has, another flow waits for at most one of them on each thread. The jobs of a
+/// flow begin in the order in which they were pushed. Not thread-safe.
 template <class Job>
 class TurnQueue {
  public:
-  /// `perFlow`: number of jobs of a flow that may run at once, from 1.
+  /// `perFlow`: number of jobs of a flow that may run at once, at least 1.
   explicit TurnQueue(std::size_t perFlow) : perFlow_(perFlow) {}
   TurnQueue(const TurnQueue&) = delete;
   TurnQueue& operator=(const TurnQueue&) = delete;
@@ -42,7 +41,7 @@ class TurnQueue {
   std::size_t waiting() const { return waiting_; }
   /// Whether no job waits, runs or is paused.
   bool idle() const { return flows_.empty(); }
-  /// The next job, which begins. Needs ready().
+  /// Takes the next job, which counts as running from then on. Requires ready().
   Turn take() {
     const auto at = turns_.front();
     turns_.pop_front();
@@ -62,8 +61,8 @@ class TurnQueue {
     lineUp(at);
     forgetIfEmpty(at);
   }
-  /// A running job of the flow waits for something; others of its flow may begin meanwhile. To be followed by
-  /// resume().
+  /// A running job of the flow waits for something. Other jobs of the flow may begin meanwhile. Must be
+  /// followed by resume().
   void pause(const std::string& flow) {
     const auto at = flows_.find(flow);
     --at->second.running;
@@ -75,7 +74,7 @@ class TurnQueue {
     --resumed.paused;
     ++resumed.running;
   }
-  /// Takes out the first job of the flow that waits and for which `is` is true.
+  /// Removes and returns the flow's first waiting job for which `is` is true.
   std::optional<Job> withdraw(const std::string& flow, const std::function<bool(const Job&)>& is) {
     const auto at = flows_.find(flow);
     if (at == flows_.end()) return std::nullopt;

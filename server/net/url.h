@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Request targets, origins and header values: decoding and comparing, nothing else.
+// Decodes and compares request targets, origins and header values.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -31,10 +31,10 @@ struct Authority {
 /// nullopt for anything but a host and an optional port (RFC 3986, 3.2.2): no user, no path.
 std::optional<Authority> parseAuthority(std::string_view text);
 
-/// Whether an Origin header names the host that the request was sent to. http and https both match: a proxy
-/// in front may speak TLS. False for "null" and other schemes.
+/// Whether an Origin header names the host that the request was sent to. Both http and https match, because a
+/// proxy may add TLS. False for "null" and other schemes.
 bool sameOrigin(std::string_view origin, std::string_view host);
-/// The rule for upgrades: no Origin (not a browser), the server's own, or one of `allowed`.
+/// Whether an upgrade is allowed: it has no Origin (not a browser), the server's own, or one of `allowed`.
 bool originAllowed(const Request& request, const std::vector<std::string>& allowed);
 
 /// The text without spaces and tabs around it.

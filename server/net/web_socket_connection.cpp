@@ -19,24 +19,23 @@ namespace websocket = boost::beast::websocket;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-/// Compression is left out at compile time: pictures are compressed already, and it would cost memory per
-/// client.
+/// Without compression: pictures are compressed already, and it would cost memory for each client.
 using Stream = websocket::stream<Transport, false>;
 
 constexpr std::chrono::seconds kHandshakeTimeout{5};
 constexpr int kSendBufferBytes = 128 << 10;  ///< a large one hides stale frames in the kernel
 constexpr std::size_t kReasonLimit = 123;    ///< RFC 6455, 5.5
 
-/// The first kReasonLimit bytes at most, cut between two UTF-8 characters.
+/// At most the first kReasonLimit bytes, cut between two UTF-8 characters.
 websocket::reason_string reasonString(const std::string& text) {
   std::size_t size = std::min(text.size(), kReasonLimit);
   while (size < text.size() && size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0) == 0x80) --size;
   return {text.data(), size};
 }
 
-/// The stream and the members after it are used only on the strand, the outbox only under the mutex. There is
-/// always one read in progress (the handshake counts) and at most one write; when both have ended, so has the
-/// connection.
+/// The stream and the members after it are used only on the strand, and the outbox only under the mutex.
+/// There is always one read in progress (the handshake counts as one) and at most one write. When both have
+/// ended, so has the connection.
 class WebSocketConnection : public PreparedWebSocket,
                             public Connection,
                             public std::enable_shared_from_this<WebSocketConnection> {
@@ -123,7 +122,7 @@ class WebSocketConnection : public PreparedWebSocket,
   }
 
  private:
-  /// Requires the mutex. Makes the strand check the outbox.
+  /// Makes the strand check the outbox. Requires the mutex.
   void wake() {
     if (!strand_ || ended_ || woken_) return;
     woken_ = true;
@@ -205,11 +204,11 @@ class WebSocketConnection : public PreparedWebSocket,
     writing_ = false;
     current_ = Outbox::Item();  // releases the text or picture
     if (readEnded_) return end();
-    if (error) return closeSocket();  // then the read fails as well
+    if (error) return closeSocket();  // which makes the read fail, too
     pump();
   }
 
-  /// The close message to a client that does not read would wait behind the current write for ever.
+  /// If a client does not read, the close message would wait behind the current write for ever.
   void startCloseTimer() {
     if (closeTimerStarted_) return;
     closeTimerStarted_ = true;
@@ -223,7 +222,7 @@ class WebSocketConnection : public PreparedWebSocket,
     if (stream_) stream_->next_layer().close();
   }
 
-  /// The read has ended. The connection ends as soon as the write has, too.
+  /// The read has ended. The connection ends when the write has ended, too.
   void finish() {
     readEnded_ = true;
     closeSocket();
@@ -250,7 +249,7 @@ class WebSocketConnection : public PreparedWebSocket,
   }
 
   std::shared_ptr<asio::io_context>
-      io_;      ///< first: handles outlive the server, and timers need it for their destruction
+      io_;      ///< first member: handles outlive the server, and timers need it in their destructors
   Core& core_;  ///< valid until leave()
   const std::string flow_;
 

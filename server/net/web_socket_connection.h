@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A socket after the upgrade: one write at a time from the outbox, one message at a time to the handler.
+// A socket after the upgrade. Writes the outbox's items one at a time, and passes messages to the handler one
+// at a time.
 #pragma once
 #include "server/net/core.h"
 
@@ -13,10 +14,10 @@ namespace scolopax::net {
 
 using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_body>;
 
-/// The handle exists before the handshake, so that the upgrade handler can keep it.
+/// The handle of the connection. It exists before the handshake, so that the upgrade handler can keep it.
 class PreparedWebSocket : public WebSocket {
  public:
-  /// Answers the handshake and takes over. Exactly one of start and abandon is called.
+  /// Answers the handshake and serves the connection. Exactly one of start and abandon is called.
   virtual void start(Transport transport, UpgradeRequest request, WebSocketEvents events) = 0;
   /// The upgrade was refused.
   virtual void abandon() = 0;
