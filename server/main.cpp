@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// scolopax: the program. Each command is a file in commands/; this file maps failures to exit statuses.
+// The program scolopax. Each command is a file in commands/; this file maps failures to exit statuses.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -21,7 +21,7 @@ namespace {
 constexpr int kFailed = 1;    // the command failed
 constexpr int kBadUsage = 2;  // the command line is invalid
 
-/// The word that stands where a command is expected; empty if something else is wrong.
+/// The word in the place of a command; empty if the error is a different one.
 std::string unknownCommand(const CLI::App& app) {
   const CLI::App* last = &app;
   while (!last->get_subcommands().empty()) last = last->get_subcommands().front();
@@ -29,7 +29,7 @@ std::string unknownCommand(const CLI::App& app) {
   return last->get_require_subcommand_min() == 0 || words.empty() ? "" : words.front();
 }
 
-/// The environment variable that a bad value came from; empty if it came from elsewhere.
+/// The environment variable that has the invalid value; empty if the value has another origin.
 std::string variableAtFault(const CLI::App& app, const std::string& message) {
   for (const CLI::App* command : app.get_subcommands()) {
     for (const CLI::Option* option : command->get_options()) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Speed and accuracy mean nothing without each other: every method becomes a list of points (time, error).
-// All are measured in turns, in one run, against the double-precision reference.
+// Speed and accuracy are meaningful only together, so every method gives a list of points (time, error). All
+// are measured in turns, in one run, against the double-precision reference.
 #include "server/commands/bench.h"
 
 #include <fmt/core.h>
@@ -62,14 +62,14 @@ std::vector<Number> ordered(std::vector<Number> numbers) {
   return numbers;
 }
 
-/// All settings requested, without numbers of samples; those of one method are adjacent.
+/// All requested settings, without numbers of samples. Those of one method are adjacent.
 std::vector<Setting> settingsOf(const BenchOptions& options) {
   std::vector<Setting> settings;
   for (std::size_t i = 0; i < std::size(kMethods); ++i) {
     const auto method = Method(i);
     const bool named =
         std::find(options.methods.begin(), options.methods.end(), nameOf(method)) != options.methods.end();
-    // `auto` chooses one of the others, and is measured only on request.
+    // `auto` chooses one of the other methods, so it is measured only on request.
     if (options.methods.empty() ? method == Method::automatic : !named) continue;
     for (const int macrocell : ordered(options.macrocells))
       for (const int threads : ordered(options.threads))
@@ -97,8 +97,8 @@ Renderers renderersFor(const std::shared_ptr<const Volume>& volume, const BenchO
 }
 
 /// The settings with every number of samples that stays within the longest time, as predicted by one sample,
-/// which also warms up. The smallest number is always kept. Costs are counted by separate renderers, since
-/// counting slows them down.
+/// which also warms up the renderer. The smallest number is always kept. Separate renderers count costs,
+/// since counting is slow.
 std::vector<Point> pointsOf(const BenchOptions& options, const Renderers& renderers,
                             const Renderers& counting, const Scene& scene) {
   std::vector<Point> points;
@@ -159,7 +159,7 @@ std::size_t heapBytes() {
   return info.uordblks + info.hblkhd;
 }
 
-/// Bytes of the data and of what is made from it, measured by the growth of the heap.
+/// Bytes of the data and of the structures made from it, measured by the growth of the heap.
 ordered_json memoryOf(const std::shared_ptr<const Volume>& volume, Scene scene, int macrocell) {
   std::size_t data = 0;
   for (const Channel& channel : volume->channels())
@@ -214,19 +214,19 @@ void run(BenchOptions options) {
   const auto resolved = resolveScene(options.scene);
   const auto volume = resolved->dataset->volume;
   Scene scene = resolved->render;
-  scene.filter = PixelFilter::point;  // where the reference has no noise
+  scene.filter = PixelFilter::point;  // there the reference has no noise
   if (options.macrocells.empty()) options.macrocells = {scene.macrocell};
   const std::optional<Image> truth = truthOf(options, *volume, scene);
 
   ordered_json memory = ordered_json::array();
   for (const int macrocell : ordered(options.macrocells))
     memory.push_back(memoryOf(volume, scene, macrocell));
-  std::vector<std::shared_ptr<const MacrocellGrid>> held;  // so that only majorants are rebuilt
+  std::vector<std::shared_ptr<const MacrocellGrid>> held;  // so that macrocells are not rebuilt
   for (const int macrocell : options.macrocells) held.push_back(sharedMacrocells(volume, macrocell));
   const Renderers renderers = renderersFor(volume, options), counting = renderersFor(volume, options);
   for (const auto& [threads, renderer] : counting) renderer->countCosts();
   std::vector<Point> points = pointsOf(options, renderers, counting, scene);
-  // A separate seed for every picture, so that none continues the samples of the previous one.
+  // Every picture has its own seed, so that no picture continues the samples of the previous one.
   scene.seed = resolved->render.seed;
   for (int repetition = 0; repetition < options.repetitions; ++repetition)
     for (Point& point : points) {

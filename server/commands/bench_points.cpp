@@ -17,14 +17,14 @@ using nlohmann::ordered_json;
 
 constexpr double kTargets[] = {1e-2, 1e-3};  // RMSE
 
-/// Whether an error remains however many samples are taken; `auto` may choose a method that has one.
+/// Whether an error remains after any number of samples. `auto` may choose a biased method.
 bool isBiased(Method method) { return hasStep(method) || method == Method::automatic; }
 
 struct Reached {
   double seconds, samples, step;
 };
 
-/// The quickest way in which this method's points reach the target, if any does.
+/// The fastest way to the target among one method's points, if any reaches it.
 std::optional<Reached> reach(double target, const std::vector<const Point*>& points,
                              const std::optional<Image>& truth) {
   std::optional<Reached> best;
@@ -33,7 +33,7 @@ std::optional<Reached> reach(double target, const std::vector<const Point*>& poi
     double samples = point->samples;
     if (!isBiased(point->method)) {
       samples = std::max(1.0, samples * point->mse() / wanted);
-      best.reset();  // the last has the most samples
+      best.reset();  // the last point has the most samples
     } else {
       const double bias = squaredBias(*point, *truth);
       if (bias < 0.5 * wanted)

@@ -32,17 +32,17 @@ struct Point : Setting {
   double efficiency() const { return 1 / (mse() * time()); }
 };
 
-/// The squared error that remains when pictures of independent seeds are averaged. One picture's squared
-/// error is bias^2 + noise; that of the mean of k pictures is bias^2 + noise / k. 0 if the noise hides the
+/// The squared error that remains when pictures with independent seeds are averaged. The squared error of one
+/// picture is bias^2 + noise, that of the mean of k pictures is bias^2 + noise / k. 0 if the noise hides the
 /// bias.
 double squaredBias(const Point& point, const Image& truth);
 
 /// Rows "points", one per point, and "timeToError", one per method, macrocell size and number of threads: the
 /// time to an RMSE of 1e-2 and of 1e-3, and the samples and step that reach it; null if the measurements do
-/// not tell. For methods without a step, this is extrapolated by the law of their noise from the most samples
-/// measured. For the others it is the best step's, extrapolated by that law above the bias and to at most
-/// kMaxReach times the samples measured, since a bias well below the noise cannot be seen. Without
-/// `truth`, times and counts only.
+/// not show it. For methods without a step, it is extrapolated by the law of their noise from the most
+/// samples measured. For methods with a step, it is that of the best step, extrapolated by the same law above
+/// the bias and to at most kMaxReach times the samples measured, since a bias well below the noise cannot be
+/// seen. Without `truth`, times and counts only.
 nlohmann::ordered_json report(const std::vector<Point>& points, const std::optional<Image>& truth,
                               std::size_t pixels);
 inline constexpr double kMaxReach = 16;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// `scolopax reference SCENE`: the double-precision picture that "error" is measured against.
+// scolopax reference: the double-precision picture against which errors are measured.
 #pragma once
 #include <CLI/CLI.hpp>
 
 namespace scolopax {
 
-/// Throws Error or ProtocolError when run.
+/// Adds `reference [SCENE.json] --data PATH... -o OUT ...`. Its callback throws Error or ProtocolError on
+/// failure.
 CLI::App* addReferenceCommand(CLI::App& root);
 
 }  // namespace scolopax

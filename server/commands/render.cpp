@@ -116,7 +116,7 @@ void writeStats(const std::filesystem::path& path, const Renderer& renderer, con
 }
 
 void render(const RenderOptions& options) {
-  // Checked before minutes are spent on a picture that cannot be written.
+  // Checked first, so that no minutes are spent on a picture that cannot be written.
   io::checkImageName(options.out);
   io::checkWritable(options.out);
   if (!options.stats.empty()) io::checkWritable(options.stats);
@@ -132,7 +132,7 @@ void render(const RenderOptions& options) {
   checkOutputs(outputs, options.scene);
   const auto resolved = resolveScene(options.scene);
   server::StopRule stop = resolved->stop;
-  // A stop rule on the command line replaces the scene's as a whole.
+  // A stop rule on the command line replaces the scene's stop rule as a whole.
   if (options.samples || options.seconds || options.error)
     stop = {options.samples.value_or(0), options.seconds.value_or(0), options.error.value_or(0)};
   const Scene& scene = resolved->render;
@@ -149,7 +149,7 @@ void render(const RenderOptions& options) {
   const auto start = Clock::now();
   double seconds = 0;
   while (true) {
-    // In slices, so that the bar moves and --seconds holds even if one sample takes long.
+    // In slices, so that the bar moves and --seconds is met even if one sample takes long.
     renderer->renderSample(cancel, std::chrono::milliseconds(100));
     seconds = std::chrono::duration<double>(Clock::now() - start).count();
     bar.show(renderer->samples(), seconds);
@@ -205,8 +205,8 @@ CLI::App* addRenderCommand(CLI::App& root) {
       "Ctrl-C and SIGTERM stop it as well: the picture is written as it is, and the status is 130 or 143. "
       "A "
       "second one ends the program at once.");
-  // With a callback here, CLI11 reads the environment when this command is parsed; without one, whichever
-  // command runs.
+  // With this callback, CLI11 reads the environment only when this command is parsed, and not for every
+  // command.
   command->parse_complete_callback([] {});
   command->callback([o] { render(*o); });
   return command;

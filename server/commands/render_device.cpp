@@ -29,7 +29,7 @@ std::optional<int> indexOf(const std::string& device) {
   return error == std::errc() && parsed == end && index >= 0 ? std::optional(index) : std::nullopt;
 }
 
-/// The CUDA devices that `device` asks for; none if the CPU is to render.
+/// The CUDA devices that `device` names; empty if the CPU shall render.
 std::vector<int> cudaDevices(const std::string& device) {
   if (device == "cpu") return {};
   std::string why;

@@ -68,7 +68,7 @@ std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& 
   const server::SceneResolver resolver(store, {});
   auto resolved = resolver.replace(scene);
   for (const json& patch : patches) resolved = resolver.patch(*resolved, patch);
-  // Resolved again as one scene, so that the automatic view fits the final curves.
+  // Resolved again as a whole, so that the automatic view fits the final curves.
   return patches.empty() ? resolved : resolver.replace(resolved->sparse.whole());
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The arguments that say what is rendered: SCENE, --data and --set.
+// The arguments that define the scene to render: SCENE, --data and --set.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <filesystem>
@@ -17,14 +17,14 @@ struct SceneArguments {
   std::vector<std::string> assignments;  ///< "channels.0.density=0.1"
 };
 
-/// Adds SCENE, --data and --set, which fill `arguments`; these must live as long as the command.
+/// Adds SCENE, --data and --set, which fill `arguments`. `arguments` must live as long as the command.
 void addSceneArguments(CLI::App& command, SceneArguments& arguments);
 
-/// Loads the data, reads the scene and applies the assignments in order. Throws Error or ProtocolError, and,
-/// before anything is loaded, CLI::ValidationError for a malformed assignment.
+/// Loads the data, reads the scene and applies the assignments in order. Throws Error or ProtocolError.
+/// Throws CLI::ValidationError for a malformed assignment, before anything is loaded.
 std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& arguments);
 
-/// Throws CLI::ValidationError if two outputs are the same file, or if one would overwrite an input.
+/// Throws CLI::ValidationError if two outputs are the same file or if an output would overwrite an input.
 void checkOutputs(const std::vector<std::filesystem::path>& outputs, const SceneArguments& arguments);
 
 }  // namespace scolopax

@@ -41,7 +41,7 @@ struct ServeOptions {
   std::uint64_t maxMemoryMebibytes = io::defaultMemoryLimitBytes() / 2 >> 20;
 };
 
-/// The folder of the built page: where the build left it, or relative to the program; empty if there is none.
+/// The folder of the built page: where the build put it, or relative to the program; empty if there is none.
 std::string findWebRoot() {
   std::error_code error;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
@@ -51,7 +51,7 @@ std::string findWebRoot() {
   return "";
 }
 
-// A signal may be delivered to any thread, so its handler only writes to a pipe that the main thread reads.
+// A signal may be delivered to any thread, so its handler only writes to a pipe, which the main thread reads.
 int signalPipe[2] = {-1, -1};
 
 extern "C" void onSignal(int) {
@@ -65,7 +65,7 @@ void catchSignals() {
   if (pipe2(signalPipe, O_CLOEXEC) != 0) throw Error(ErrorCode::io, "cannot make a pipe for signals");
   struct sigaction action = {};
   action.sa_handler = onSignal;
-  action.sa_flags = int(SA_RESETHAND | SA_RESTART);  // a second one of its kind ends the program
+  action.sa_flags = int(SA_RESETHAND | SA_RESTART);  // a second signal of the same kind ends the program
   for (const int signal : {SIGTERM, SIGINT}) sigaction(signal, &action, nullptr);
 }
 
@@ -194,8 +194,8 @@ CLI::App* addServeCommand(CLI::App& root) {
       "the command line takes precedence over the environment, the environment over the file.\n"
       "The ready line on standard output contains the address of the page, with its token.\n"
       "SIGTERM and Ctrl-C shut the server down in order.");
-  // With a callback here, CLI11 reads the environment when this command is parsed; without one, whichever
-  // command runs.
+  // With this callback, CLI11 reads the environment only when this command is parsed, and not for every
+  // command.
   command->parse_complete_callback([] {});
   command->callback([options, command] {
     if (!options->configFile.empty()) applyConfigFile(*command, options->configFile);

@@ -5,8 +5,8 @@
 
 namespace scolopax {
 
-/// Adds the subcommand; its callback serves until SIGTERM or SIGINT and throws scolopax::Error, or CLI::Error
-/// for bad usage.
+/// Adds `serve`. Its callback serves until SIGTERM or SIGINT. It throws scolopax::Error, or CLI::Error for
+/// bad usage.
 CLI::App* addServeCommand(CLI::App& root);
 
 }  // namespace scolopax

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Validators of options that CLI11 lacks: its own ranges accept NaN.
+// Validators of options that CLI11 does not have: its own ranges accept NaN.
 #pragma once
 #include <fmt/core.h>
 
@@ -8,7 +8,7 @@
 
 namespace scolopax {
 
-/// Accepts a number up to `highest` and above 0 or, with `zeroToo`, at least 0.
+/// Accepts a number above 0 (with `zeroToo`, also 0) and up to `highest`.
 inline CLI::Validator numberUpTo(double highest, bool zeroToo) {
   return {[highest, zeroToo](std::string& text) {
             double value = 0;
