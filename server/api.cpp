@@ -41,7 +41,7 @@ int statusOf(ErrorCode code) {
   return 500;
 }
 
-/// Wraps every handler: what it throws becomes a problem, and the cause of a 500 only goes into the log.
+/// Wraps a handler: its exceptions become problems, and the cause of a 500 goes only into the log.
 net::Handler guarded(const ApiContext& context, const net::Handler& handler) {
   return [handler, &context](const net::Request& request) -> net::Response {
     try {

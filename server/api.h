@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The HTTP interface: one table of routes, from which the server's routing and openapi.json are made. It
-// connects net::Server with the data sets, the sessions and the renderer.
+// The HTTP interface: a table of routes, from which the server's routing and openapi.json are made. Connects
+// net::Server with the data sets, the sessions and the renderer.
 #pragma once
 #include <atomic>
 #include <exception>
@@ -24,7 +24,7 @@
 
 namespace scolopax::server {
 
-/// What the handlers work with. Must outlive the server.
+/// Everything that the handlers use. Must outlive the server.
 struct ApiContext {
   const Config& config;
   const DatasetStore& datasets;
@@ -32,7 +32,7 @@ struct ApiContext {
   SessionStore& sessions;
   StreamHub& streams;
   Metrics& metrics;
-  Background& encoders;  ///< for the pictures of answers
+  Background& encoders;  ///< encode the pictures in answers
   MakeRenderer makeRenderer;
   std::shared_ptr<MemoryBudget> memory;  ///< also charged by the renderers that makeRenderer returns
   const UnsentAnswers& answers;
@@ -71,37 +71,37 @@ std::vector<Route> operationRoutes(ApiContext& context);
 /// OpenAPI 3.1 description of the routes.
 nlohmann::json openApi(const std::vector<Route>& routes);
 
-/// net::Options::flowOf: a session's id for all requests and streams at its address, else "". A name that no
-/// session has makes no flow, so that a client cannot make more flows than there are sessions.
+/// For net::Options::flowOf: the session's id for requests and streams at its address, else "". An unknown id
+/// gives no flow of its own, so clients cannot create more flows than there are sessions.
 std::string flowOf(const SessionStore& sessions, const net::Request& request);
 
-/// Registers all routes and the stream's upgrade.
+/// Registers all routes and the upgrade to streams.
 void addApi(net::Server& server, ApiContext& context);
 
 // --- for the handlers ---
 
-/// What tells a client of an error.
+/// The error in the form in which a client gets it.
 protocol::ProtocolError problemOf(const Error& error);
-/// Rethrows what is neither a ProtocolError nor an Error.
+/// Rethrows any other exception than ProtocolError and Error.
 protocol::ProtocolError problemOf(const std::exception_ptr& failure);
 protocol::ProtocolError stoppingProblem();  ///< 503, the server is stopping
-/// Why a request ends that takes long: its client has gone, or else the server is stopping.
+/// Why a long request was aborted: its client has disconnected or, otherwise, the server is stopping.
 protocol::ProtocolError unwantedProblem(const net::Request& request);
 net::Response jsonResponse(int status, const nlohmann::json& body);
 net::Response errorResponse(const protocol::ProtocolError& error);
-/// The body as JSON. Throws ProtocolError: 415 unless Content-Type is application/json or `alsoType`, and
-/// what parseJson throws.
+/// The body as JSON. Throws ProtocolError: 415 unless Content-Type is application/json or `alsoType`, and as
+/// parseJson.
 nlohmann::json jsonBody(const net::Request& request, const Config& config, std::string_view alsoType = "");
-/// A whole number from the query, `fallback` if absent. Throws ProtocolError(422) for anything else.
+/// A whole number from the query, or `fallback` if it is absent. Throws ProtocolError(422) for anything else.
 std::uint32_t queryUnsigned(const net::Request& request, std::string_view name, std::uint32_t fallback);
-/// A finite number from the query. Throws ProtocolError(422) for anything else, and if absent.
+/// A finite number from the query. Throws ProtocolError(422) for anything else, and if it is absent.
 double queryNumber(const net::Request& request, std::string_view name);
-/// true or false from the query, false if absent. Throws ProtocolError(422) for anything else.
+/// true or false from the query, false if it is absent. Throws ProtocolError(422) for anything else.
 bool queryFlag(const net::Request& request, std::string_view name);
 
-/// Returns work(stop), which may take long; throws net::TakesLong where the handler may not wait. `stop` is
-/// requested when the client has disconnected or the server aborts its requests; Error(cancelled) then
-/// becomes ProtocolError(503).
+/// Returns work(stop), which may take long. Throws net::TakesLong if the handler may not wait. `stop` is
+/// requested when the client disconnects or the server aborts its requests; an Error(cancelled) becomes a
+/// ProtocolError(503).
 template <class Work>
 auto inLongRequest(const ApiContext& context, const net::Request& request, Work&& work) {
   if (!request.mayWait) throw net::TakesLong();
@@ -116,8 +116,8 @@ auto inLongRequest(const ApiContext& context, const net::Request& request, Work&
     throw unwantedProblem(request);
   }
 }
-/// Returns work(). If it throws Unmeasured, measures what is missing in a long request and calls work()
-/// again.
+/// Returns work(). If work() throws Unmeasured, measures the missing statistics in a long request and calls
+/// it again.
 template <class Work>
 auto measuredIn(const ApiContext& context, const net::Request& request, Work&& work) {
   try {
@@ -128,9 +128,9 @@ auto measuredIn(const ApiContext& context, const net::Request& request, Work&& w
   }
 }
 
-/// Sets the body to encode(stop), run by the encoders when it is the turn of the request's flow, and charges
-/// `bytes` of memory for that. Throws what encode(), MemoryBudget::take and UnsentAnswers::take throw, and
-/// ProtocolError(503) if the client disconnects or the server stops.
+/// Sets the body to encode(stop), which the encoders run when it is the turn of the request's flow. `bytes`
+/// is the memory that encoding takes; it is charged to the budget. Throws what encode(), MemoryBudget::take
+/// and UnsentAnswers::take throw, and ProtocolError(503) if the client disconnects or the server stops.
 void setEncodedBody(const ApiContext& context, const net::Request& request, std::uint64_t bytes,
                     const std::function<std::string(const std::stop_token&)>& encode,
                     net::Response& response);

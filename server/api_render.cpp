@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// POST /render: takes a scene, returns a picture, and keeps nothing.
+// POST /render: returns a picture of a scene and keeps nothing.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -24,12 +24,12 @@ namespace {
 
 using protocol::ProtocolError;
 
-/// Seconds that a pass runs before the next check whether the picture is still wanted.
+/// Seconds for which a pass runs before it is checked whether the picture is still wanted.
 constexpr double kSlice = 0.1;
-/// A number of seconds that can safely be added to a clock's time.
+/// Seconds; can be added to a clock's time without overflow.
 constexpr double kForever = 1e9;
 
-/// As the header Scolopax-Corrections has it.
+/// The value of the header Scolopax-Corrections.
 std::string textOf(const std::vector<Choice::Correction>& corrections) {
   std::string text;
   for (const Choice::Correction& level : corrections) {
@@ -41,8 +41,7 @@ std::string textOf(const std::vector<Choice::Correction>& corrections) {
   return text;
 }
 
-/// One of the places for renders that run at once; the constructor throws ProtocolError(503) if all are
-/// taken.
+/// One of the slots for renders that run at once. The constructor throws ProtocolError(503) if none is free.
 class RenderSlot {
  public:
   RenderSlot(std::atomic<int>& running, int limit) : running_(running) {
@@ -61,7 +60,7 @@ class RenderSlot {
 
 using Clock = std::chrono::steady_clock;
 
-/// Ends a render early: when its client disconnects, the server stops, or its time is over.
+/// Aborts a render when its client disconnects, the server stops, or its time is over.
 class AbortSignal {
  public:
   AbortSignal(const std::stop_token& gone, const std::stop_token& abort, double seconds)
@@ -115,8 +114,8 @@ void throwIfUnwanted(const ApiContext& context, const net::Request& request) {
   if (request.gone.stop_requested() || context.abortRequests.stop_requested()) throw unwantedProblem(request);
 }
 
-/// The render is too slow. A picture that depends on the machine's speed is returned only if the scene asks
-/// for it.
+/// The error for a render that is too slow. An incomplete picture, which depends on the machine's speed, is
+/// returned only if the scene asks for it.
 ProtocolError tooLate(double limit, std::uint32_t samples) {
   return ProtocolError(
       422, "/stop",
@@ -124,7 +123,7 @@ ProtocolError tooLate(double limit, std::uint32_t samples) {
           " samples were done by then; request fewer samples or pixels, or set stop.seconds");
 }
 
-/// The scene of the body, after measuring the data that it needs, which may take no longer than a render.
+/// The scene in the body. The data that it needs is measured first, which may take no longer than a render.
 std::shared_ptr<const ResolvedScene> sceneOf(const ApiContext& context, const net::Request& request) {
   const auto body = jsonBody(request, context.config);
   const AbortSignal signal(request.gone, context.abortRequests, context.config.maxRenderSeconds);
@@ -138,7 +137,7 @@ std::uint64_t pixelsOf(const ResolvedScene& scene) {
   return std::uint64_t(scene.render.width) * std::uint64_t(scene.render.height);
 }
 
-/// FNV-1a, 64 bits, of the resolved scene's canonical text: equal pictures have equal hashes.
+/// FNV-1a hash, 64 bits, of the resolved scene's canonical text. Equal pictures have equal hashes.
 std::string sceneHash(const ResolvedScene& scene) {
   std::uint64_t hash = 0xcbf29ce484222325u;
   for (const char c : pictureJson(scene.resolved).dump()) hash = (hash ^ std::uint8_t(c)) * 0x100000001b3u;
@@ -149,10 +148,10 @@ std::string sceneHash(const ResolvedScene& scene) {
 
 struct Rendered {
   std::shared_ptr<const Image> image;        ///< charged to the budget
-  decltype(net::Response::headers) headers;  ///< that tell how it was made
+  decltype(net::Response::headers) headers;  ///< state how it was made
 };
 
-/// The picture of the scene. The place, and the memory of the film, are free again when this returns.
+/// The picture of the scene. The slot and the memory of the film are free again when this returns.
 Rendered renderPicture(const ApiContext& context, std::atomic<int>& running, const net::Request& request,
                        const std::shared_ptr<const ResolvedScene>& scene) {
   const double limit = context.config.maxRenderSeconds;
@@ -167,11 +166,11 @@ Rendered renderPicture(const ApiContext& context, std::atomic<int>& running, con
     throw tooLate(limit, 0);
   }
   while (!stopMet(scene->stop, *renderer, seconds())) {
-    // A time limit may end a pass in the middle, but not the first sample: that may take up to the server's
-    // own limit.
+    // The scene's time limit may end a pass in the middle, except the first one, which may take up to the
+    // server's limit.
     const bool timed = scene->stop.seconds > 0 && renderer->samples() > 0;
     const double until = timed ? std::min(scene->stop.seconds, limit) : limit;
-    // In this order, because only a short duration fits into whole nanoseconds.
+    // Clamped before the conversion, because a long duration would overflow nanoseconds.
     const auto budget = std::chrono::duration<double>(std::clamp(until - seconds(), 0.0, kSlice));
     const auto slice = std::chrono::duration_cast<std::chrono::nanoseconds>(budget);
     if (renderer->renderSample(signal.flag(), slice)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Routes of sessions, with which a script can do everything that a stream can.
+// Routes of sessions. With them a script can do everything that a stream can.
 #include <algorithm>
 #include <charconv>
 #include <nlohmann/json.hpp>
@@ -49,8 +49,8 @@ json sceneJson(const Session::SceneState& state) {
   return {{"revision", state.revision}, {"scene", protocol::toJson(state.scene->resolved)}};
 }
 
-/// The answer to a request that has changed something: without the scene if there is no memory for so long an
-/// answer, since a refusal would say that nothing has changed.
+/// The answer to a request that has changed something. If there is no memory for such a long answer, the
+/// scene is left out; a refusal would mean that nothing has changed.
 net::Response changedResponse(const ApiContext& context, const net::Request& request, int status, json body) {
   auto response = jsonResponse(status, body);
   try {
@@ -62,7 +62,7 @@ net::Response changedResponse(const ApiContext& context, const net::Request& req
   return response;
 }
 
-/// Makes the edit, after measuring the data that it needs.
+/// Makes the edit. The data that it needs is measured first.
 template <class Edit>
 net::Response edited(const ApiContext& context, const net::Request& request, Edit&& edit) {
   const auto session = sessionOf(context, request);

@@ -83,7 +83,7 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
 
 }  // namespace
 
-// Members are in the order of their construction: what is used comes before what uses it.
+// Members are constructed in this order, each after the ones that it uses.
 struct Application::Impl {
   Config config;
   Log log;
@@ -93,9 +93,9 @@ struct Application::Impl {
   std::stop_source abortRequests;
   const Now now = [] { return std::chrono::steady_clock::now(); };
   LoopThread renderThread, watchThread, encodeThread;
-  // Apart, so that what is soon done does not wait for what takes long.
+  // Separate, so that short jobs do not wait for long ones.
   BackgroundThreads pictures, passes{std::max<std::size_t>(1, processors() / 2)}, builds;
-  // Few, so that others' frames are not delayed.
+  // Few threads, so that encoding for one client does not delay the frames of others.
   BackgroundThreads encoders{std::min<std::size_t>(2, processors())};
   Metrics metrics;
   std::shared_ptr<const DatasetStore> datasets;
@@ -220,8 +220,8 @@ std::string Application::url() const {
 
 void Application::stop() {
   impl_->stopping = true;
-  // Requests that wait are released at once. Those that render get part of the grace to end by themselves,
-  // since the network waits for its last handler.
+  // Requests that wait are ended at once. Those that render get part of the grace period to finish, because
+  // the network waits for its last handler.
   std::jthread cut([this](const std::stop_token& stopped) {
     std::mutex mutex;
     std::unique_lock lock(mutex);

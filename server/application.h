@@ -15,8 +15,8 @@ namespace scolopax::server {
 
 class Application {
  public:
-  /// An empty token in `config` is replaced by a new random one. `memory` must be the budget that the
-  /// renderers of `makeRenderer` charge as well.
+  /// An empty token in `config` is replaced by a new random one. The renderers of `makeRenderer` must use the
+  /// budget `memory`, too.
   Application(Config config, std::vector<Dataset> datasets, MakeRenderer makeRenderer,
               std::shared_ptr<MemoryBudget> memory, Log log);
   ~Application();  ///< stops at once
@@ -26,8 +26,8 @@ class Application {
   std::uint16_t port() const;
   /// Address of the page, including the token that opens it.
   std::string url() const;
-  /// Accepts no more connections, ends requests that wait and, after a grace period, those that render,
-  /// closes streams, then returns. Safe to call twice.
+  /// Stops accepting connections, ends requests that wait and, after a grace period, those that render,
+  /// closes the streams and returns. May be called twice.
   void stop();
 
  private:

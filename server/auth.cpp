@@ -26,7 +26,7 @@ bool isTokenCharacter(char c) {
          std::string_view("-._~+/=").find(c) != std::string_view::npos;
 }
 
-/// An IPv4 loopback address, and not a name that only begins like one.
+/// An IPv4 loopback address; false for a name that begins like one.
 bool isLoopbackAddress(std::string_view host) {
   return host.substr(0, 4) == "127." && host.find_first_not_of("0123456789.") == std::string_view::npos;
 }
@@ -165,8 +165,8 @@ std::optional<net::Response> Authorizer::operator()(const net::Request& request)
     return std::nullopt;
   }
   if (hasCookie(request)) {
-    // The browser adds the cookie by itself, so a write must also prove that it comes from the server's own
-    // page.
+    // The browser adds the cookie to every request. A write must therefore also prove that it comes from the
+    // server's page.
     if (reading || (request.header("Origin") && net::originAllowed(request, allowedOrigins_)))
       return std::nullopt;
     return problemResponse(403, "A write that is authorised by the cookie needs the Origin of this page.");

@@ -13,20 +13,19 @@
 
 namespace scolopax {
 
-/// A token file that cannot be used, or a token that cannot be created: the message says why, and names the
-/// file.
+/// The token file cannot be used, or no token can be created. The message says why and names the file.
 class TokenError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// 256 random bits, encoded as 43 URL-safe characters. Throws TokenError when the system has no random
+/// 256 random bits, encoded as 43 URL-safe characters. Throws TokenError if the system provides no random
 /// numbers.
 std::string createToken();
-/// The single line of the file. Throws TokenError unless it consists of 16 to 512 letters, digits and -._~+/=
-/// (RFC 6750).
+/// The line that the file consists of. Throws TokenError unless it has 16 to 512 characters: letters, digits
+/// and -._~+/= (RFC 6750).
 std::string readTokenFile(const std::string& path);
-/// Compares in a time that depends only on the lengths.
+/// Compares in a time that depends only on the lengths of the texts.
 bool sameToken(std::string_view a, std::string_view b);
 
 /// A refusal as application/problem+json (RFC 9457).
@@ -36,12 +35,12 @@ net::Response problemResponse(int status, const std::string& detail);
 class Authorizer {
  public:
   /// `loopback`: the server can be reached from this machine only. A Host header that names neither this
-  /// machine nor an allowed origin (of a proxy in front) is then taken for DNS rebinding and refused. `tls`:
-  /// the cookie is sent over https only.
+  /// machine nor an allowed origin (of a proxy) is then refused as DNS rebinding. `tls`: the cookie is sent
+  /// over https only.
   Authorizer(std::string token, bool loopback, std::vector<std::string> allowedOrigins = {},
              bool tls = false);
 
-  /// nullopt: the request may proceed. Otherwise the answer: 401, 403 or 421, or, to `GET /?token=`, a 303
+  /// nullopt if the request may proceed. Otherwise the answer: 401, 403 or 421 or, to `GET /?token=`, a 303
   /// that sets the cookie.
   std::optional<net::Response> operator()(const net::Request& request) const;
 
@@ -64,7 +63,7 @@ class Authorizer {
   bool tls_;
 };
 
-/// Whether a server bound to `host` (an option's value) can be reached only from this machine.
+/// Whether a server bound to `host` (the value of the option) can be reached only from this machine.
 bool isLoopback(std::string_view host);
 /// The URL that opens the page, for the ready line. A wildcard address is replaced by 127.0.0.1.
 std::string tokenUrl(std::string_view host, std::uint16_t port, std::string_view token, bool tls);

@@ -42,7 +42,7 @@ void Background::run(const std::string& flow, const std::stop_token& stop, Work 
   job->rethrow();
 }
 
-/// What a job has while it works, and gives up while it waits for a build.
+/// The slot of a running job, which the job gives up while it waits for a build.
 class BackgroundThreads::RunningSlot final : public WaitHooks {
  public:
   RunningSlot(BackgroundThreads& pool, const std::string& flow, const Job& job)
@@ -64,7 +64,7 @@ class BackgroundThreads::RunningSlot final : public WaitHooks {
   void afterWait() noexcept override {
     std::unique_lock lock(pool_.mutex_);
     ++pool_.returning_;
-    // A job that is cancelled needs no place to end.
+    // A cancelled job may end without a slot.
     pool_.changed_.wait(lock, job_.cancelled(), [&] { return pool_.working_ < pool_.maxJobs_; });
     --pool_.returning_;
     --pool_.paused_;
@@ -115,13 +115,12 @@ std::shared_ptr<Background::Job> BackgroundThreads::start(const std::string& flo
   return job;
 }
 
-/// Starts a thread for a job that waits, unless one is idle or there are as many as may work. Requires the
-/// mutex.
+/// Starts a thread for a waiting job, unless a thread is idle or the limit is reached. Requires the mutex.
 void BackgroundThreads::startThreadIfNeeded() {
   if (idle_ >= waiting_.waiting() || threads_.size() >= maxJobs_ + paused_) return;
   try {
     threads_.emplace_back([this] { runJobs(); });
-  } catch (const std::exception&) {  // the threads that there are do the work
+  } catch (const std::exception&) {  // the existing threads do the work
   }
 }
 
@@ -152,7 +151,7 @@ void BackgroundThreads::runJobs() {
   }
 }
 
-/// Ends a job that waits.
+/// Ends a waiting job.
 void BackgroundThreads::skip(const std::string& flow, const Job& job) {
   std::optional<std::unique_ptr<Entry>> skipped;
   {

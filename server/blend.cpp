@@ -14,8 +14,7 @@ struct Neighbours {
   float share;
 };
 
-/// The position of pixel `i` of `full` among `count` pixels, each `1 / scale` times as large as the full
-/// ones.
+/// The neighbours of pixel `i` of `full` pixels, among `count` pixels that are `1 / scale` times as large.
 Neighbours neighboursOf(int i, int full, int count, double scale) {
   const double at = std::clamp((i + 0.5 - 0.5 * full) * scale + 0.5 * count - 0.5, 0.0, double(count - 1));
   const int first = std::min(int(at), std::max(0, count - 2));

@@ -50,7 +50,8 @@ double interpolateTrilinearly(const Channel& channel, const glm::ivec3& dims, co
       index += std::size_t(std::min(int(low) + upper, dims[axis] - 1)) * stride;
       stride *= std::size_t(dims[axis]);
     }
-    // Even with weight 0, as in the renderer: one corner that is not finite makes the sample not finite.
+    // Corners with weight 0 are included: as in the renderer, one corner that is not finite makes the sample
+    // not finite.
     sum += weight * voxelValue(channel, index);
   }
   return sum;

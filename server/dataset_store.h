@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The data sets named on the command line, which are loaded once, and the answers to requests about them.
+// The data sets named on the command line. They are loaded once. Also makes the answers to requests about
+// them.
 #pragma once
 #include <filesystem>
 #include <list>
@@ -35,18 +36,17 @@ class DatasetStore {
   const std::vector<std::shared_ptr<const Dataset>>& all() const { return datasets_; }
 
   using Gradients = std::shared_ptr<const GradientHistogram>;
-  /// Histograms kept: 64 MiB, enough for several scenes of 32 channels at once.
+  /// Number of histograms kept: 64 MiB, enough for several scenes of 32 channels at once.
   static constexpr std::size_t kMaxGradients = 128;
-  /// The gradient histogram of a channel of one of the store's data sets; nullptr if it has not been measured
-  /// yet. Throws ProtocolError(422) if there is no such channel.
+  /// The gradient histogram of a channel of one of the store's data sets; nullptr if it has not been
+  /// measured. Throws ProtocolError(422) if there is no such channel.
   Gradients gradients(const Dataset& dataset, int channel) const;
-  /// The same, but measures it first if necessary. The kMaxGradients histograms requested last are kept.
-  /// Also throws Error: cancelled once `stop` is requested, busy and tooLarge when there is not enough
-  /// memory.
+  /// The same, but measures the histogram if necessary. The kMaxGradients histograms requested last are kept.
+  /// Also throws Error: cancelled once `stop` is requested, busy and tooLarge if there is not enough memory.
   Gradients measuredGradients(const Dataset& dataset, int channel, const std::stop_token& stop) const;
 
  private:
-  /// Requires the mutex. nullptr if this histogram is not kept.
+  /// nullptr if the histogram is not kept. Requires the mutex.
   Gradients kept(const Dataset& dataset, int channel) const;
 
   std::vector<std::shared_ptr<const Dataset>> datasets_;
@@ -60,8 +60,8 @@ class DatasetStore {
   mutable std::list<Measured> gradients_;  ///< the most recently requested first
 };
 
-/// The files to load: each path unchanged or, with a data root, relative to and below it. Throws Error if a
-/// path leads outside the root.
+/// The files to load: the paths as they are or, with a root, relative to it. Throws Error if a path leads
+/// outside the root.
 std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesystem::path>& paths,
                                                   const std::filesystem::path& root);
 
@@ -69,14 +69,14 @@ std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesys
 nlohmann::json describeJson(const Dataset& dataset);
 /// Histogram with 256 bins over the finite values. Throws ProtocolError(422) if there is no such channel.
 nlohmann::json histogramJson(const Dataset& dataset, int channel);
-/// The same for |gradient|, from 0 up; with `joint`, additionally for every bin of values.
+/// The same for |gradient|, beginning at 0; with `joint`, also for every bin of values.
 nlohmann::json gradientHistogramJson(const Dataset& dataset, int channel, const GradientHistogram& gradients,
                                      bool joint);
-/// Data values of all channels at a voxel position inside the box, interpolated as the renderer does for
-/// these appearances, one per channel, or trilinearly if there are none; null where a value is not finite.
+/// Data values of all channels at a voxel position inside the box, interpolated as `appearances` (one per
+/// channel) say, or trilinearly if there are none; null where a value is not finite.
 nlohmann::json valuesJson(const Volume& volume, const glm::dvec3& voxel,
                           std::span<const ChannelAppearance> appearances = {});
-/// The same, trilinearly, at a world point; outside the box all values are null.
+/// The same, trilinearly, at a world point. Outside the box all values are null.
 nlohmann::json probeJson(const Dataset& dataset, double x, double y, double z);
 
 }  // namespace scolopax::server

@@ -65,7 +65,7 @@ std::optional<EditQueue::Edit> EditQueue::next() {
   return edit;
 }
 
-/// False if the next edit has to wait.
+/// False if the next edit must wait.
 bool EditQueue::applyAll() {
   while (auto edit = next()) {
     const std::lock_guard applying(applying_);

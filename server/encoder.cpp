@@ -17,7 +17,7 @@ struct DestroyHandle {
   void operator()(void* handle) const { tjDestroy(handle); }
 };
 
-// A handle may be used by only one thread at a time and is costly to create, hence one per thread.
+// One per thread, because a handle may be used by only one thread at a time and is costly to create.
 tjhandle threadCompressor() {
   thread_local const std::unique_ptr<void, DestroyHandle> handle(tjInitCompress());
   if (!handle) throw Error(ErrorCode::io, std::string("JPEG encoder: ") + tjGetErrorStr2(nullptr));
@@ -46,8 +46,7 @@ std::vector<std::uint8_t> encodeJpeg(const Image8& image, int quality, ChromaSam
   unsigned char* begin = bytes.data();
   auto size = static_cast<unsigned long>(bytes.size());
   const tjhandle handle = threadCompressor();
-  // NOREALLOC: the buffer has the library's own upper bound as its size, so the result always fits and is
-  // never moved to another buffer.
+  // NOREALLOC: the buffer has the size of the library's own upper bound, so the result always fits into it.
   if (tjCompress2(handle, image.rgb.data(), image.width, 0, image.height, TJPF_RGB, &begin, &size,
                   subsampling, quality, TJFLAG_NOREALLOC) != 0)
     throw Error(ErrorCode::io, std::string("JPEG encoder: ") + tjGetErrorStr2(handle));

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Encodes 8-bit pictures as JPEG with libjpeg-turbo. Comes after Film and toSrgb8; the result goes into
-// frames and responses.
+// Encodes 8-bit pictures as JPEG with libjpeg-turbo, after Film and toSrgb8, for frames and responses.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -11,12 +10,12 @@ namespace scolopax::server {
 
 enum class ChromaSampling { full444, half420 };
 
-/// Memory, in bytes, that encoding a picture of `pixels` pixels takes, including the 8-bit picture.
+/// Bytes of memory for encoding a picture of `pixels` pixels, including the 8-bit picture.
 std::uint64_t jpegMemory(std::uint64_t pixels);
 
 /// A JPEG file (JFIF, sRGB values as given). `quality` is in [1, 100]. The same picture always gives the same
-/// bytes. Throws Error: badInput for an empty picture, tooLarge for one that JPEG cannot hold (more than
-/// 65500 pixels on a side).
+/// bytes. Throws Error: badInput for an empty picture, tooLarge for more than 65500 pixels on a side, which
+/// JPEG does not support.
 std::vector<std::uint8_t> encodeJpeg(const Image8& image, int quality, ChromaSampling sampling);
 
 }  // namespace scolopax::server

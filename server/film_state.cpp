@@ -7,10 +7,10 @@
 namespace scolopax::server {
 
 bool FilmState::stale(const RenderRequest& request) const {
-  // When edits have stopped, the resolution returns to full in steps; a film that already has it continues,
-  // if it was drawn with the scene's own method.
+  // When edits have stopped, the resolution returns to full in steps. A film that already has full resolution
+  // continues if it was drawn with the scene's own method.
   const bool finerDue = divisor != 1 && (begunInteractive || restShown || !request.pollSamples.empty());
-  // While edits arrive, `auto` is drawn with a fixed step (drawnScene), whose bias no samples reduce.
+  // While edits arrive, `auto` is drawn with a fixed step (drawnScene). More samples do not reduce its bias.
   const bool methodDue = begunInteractive && scene && scene->render.method == Method::automatic;
   return !scene || request.revision != revision || (!request.interactive && (finerDue || methodDue)) ||
          (request.aovs && !recording);

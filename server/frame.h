@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A session's picture on its way to the viewers: first rendered (float), then encoded (JPEG, which the float
-// image accompanies).
+// A session's picture on its way to the viewers: first rendered (float), then encoded (JPEG, with the float
+// image).
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -23,17 +23,17 @@ struct FrameInfo {
   std::uint32_t number = 0;           ///< counts a session's encoded frames from 1; 0 before encoding
   std::uint32_t revision = 0;         ///< of the scene that it shows; a frame never mixes two scenes
   std::uint32_t samples = 0;          ///< per pixel
-  Method method = Method::automatic;  ///< that was used
+  Method method = Method::automatic;  ///< the method that was used
   float error = 0;  ///< estimated RMSE over linear premultiplied RGBA; NaN below two samples
   std::uint32_t rebuildUs = 0, renderUs = 0,
-                encodeUs = 0;  ///< the last rebuild, the last pass, this encoding
+                encodeUs = 0;  ///< times of the last rebuild, the last pass, this encoding
   bool interactive = false;    ///< made while edits arrive or soon after; may be reduced
-  bool reduced = false;        ///< smaller than the scene's picture; to be enlarged
-  bool mixed = false;          ///< blended with the reduced picture before it (blend.h); not given to scripts
+  bool reduced = false;        ///< smaller than the scene's picture; the viewer enlarges it
+  bool mixed = false;          ///< blended with the reduced picture before it (blend.h); not for scripts
   bool final = false;          ///< the stop rule is met: nothing better follows at this revision
 };
 
-/// Linear picture of one film; from the render thread to the encoder thread.
+/// A film's linear picture, passed from the render thread to the encoder thread.
 struct RenderedFrame {
   FrameInfo info;
   std::shared_ptr<const Image> image;

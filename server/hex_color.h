@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Colours as scenes and capabilities write them, "#rrggbb" in sRGB, and as the renderer takes them.
+// Converts colours between the form of scenes and capabilities, "#rrggbb" in sRGB, and the renderer's linear
+// RGB.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -11,7 +12,7 @@ namespace scolopax::server {
 std::string hexOf(const std::array<std::uint8_t, 3>& color);
 /// `linear`: RGB, each in [0, 1].
 std::string hexOf(const glm::dvec3& linear);
-/// Linear RGB of a text that has been checked.
+/// Linear RGB; `hex` must be valid.
 glm::dvec3 linearOf(const std::string& hex);
 
 }  // namespace scolopax::server

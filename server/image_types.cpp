@@ -14,7 +14,7 @@ namespace {
 
 using net::trimmed;
 
-/// For what a file needs besides its pixels.
+/// Bytes of a file besides its pixels, at most.
 constexpr std::uint64_t kFileBytes = 1 << 20;
 
 constexpr ImageType kImageTypes[] = {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts for GET /metrics, in Prometheus' text format. Every function may be called from any thread.
+// Counters for GET /metrics, in Prometheus' text format. Every function may be called from any thread.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -15,7 +15,7 @@ class Metrics {
   ~Metrics();
   void requestAnswered(int status);
   void passEnded(const PassResult& pass);
-  /// Adds a stream's counts since they were last collected.
+  /// Adds counts of frames since the last call.
   void framesSent(std::uint64_t sent, std::uint64_t replaced);
   void setSessions(std::size_t count);
   void setClients(std::size_t count);

@@ -22,7 +22,7 @@ std::shared_ptr<Renderer> ParkedRenderers::take(const void* owner) {
 }
 
 bool ParkedRenderers::dropOldest() {
-  std::list<Parked> dropped;  // destroyed without the lock: it may be large
+  std::list<Parked> dropped;  // destroyed after the lock is released, since it may be large
   const std::lock_guard lock(mutex_);
   if (parked_.empty()) return false;
   dropped.splice(dropped.end(), parked_, parked_.begin());

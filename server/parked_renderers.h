@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Renderers, with their films, of sessions that nobody watches at present. They are kept as long as nobody
-// else needs their memory. Between ProgressiveRender and the memory budget.
+// Keeps the renderers, with their films, of sessions that nobody watches, until their memory is needed. Used
+// by ProgressiveRender and the memory budget.
 #pragma once
 #include <list>
 #include <memory>
@@ -13,11 +13,11 @@ namespace scolopax::server {
 /// Every function may be called from any thread.
 class ParkedRenderers {
  public:
-  /// `owner` must have none here.
+  /// `owner` must not have a renderer here.
   void park(const void* owner, std::shared_ptr<Renderer> renderer);
   /// The owner's renderer; null if it has been dropped.
   std::shared_ptr<Renderer> take(const void* owner);
-  /// Drops the renderer that has been here longest; false if there is none.
+  /// Drops the renderer that was parked first; false if there is none.
   bool dropOldest();
 
  private:
@@ -26,7 +26,7 @@ class ParkedRenderers {
     std::shared_ptr<Renderer> renderer;
   };
   std::mutex mutex_;
-  std::list<Parked> parked_;  ///< in the order in which they came
+  std::list<Parked> parked_;  ///< in the order in which they were parked
 };
 
 }  // namespace scolopax::server

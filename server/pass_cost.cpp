@@ -7,9 +7,9 @@
 namespace scolopax::server {
 namespace {
 
-/// Factor by which the times of two passes may differ beyond what their sizes explain.
+/// Factor by which the times of two passes may differ beyond the difference that their sizes explain.
 constexpr double kDisturbed = 2;
-/// Sizes within this ratio of each other say nothing about the slope.
+/// Two sizes within this ratio say nothing about the slope.
 constexpr double kApart = 1.2;
 
 double median(std::vector<double> values) {
@@ -21,7 +21,7 @@ double median(std::vector<double> values) {
 
 }  // namespace
 
-/// Whether a line without negative parts passes near both, within kDisturbed.
+/// Whether a line without negative parts fits both passes within kDisturbed.
 bool PassCost::agree(const Pass& a, const Pass& b) {
   const Pass& small = a.pixels <= b.pixels ? a : b;
   const Pass& large = a.pixels <= b.pixels ? b : a;
@@ -34,8 +34,7 @@ void PassCost::push(const Pass& pass) {
   passes_[count_++] = pass;
 }
 
-/// When the scene's cost changes, what was learnt before is worthless: forgets passes that contradict the
-/// last two.
+/// Forgets passes that contradict the last two: when the scene's cost changes, earlier passes are worthless.
 void PassCost::forgetContradicted() {
   if (count_ < 3) return;
   const Pass last = passes_[count_ - 1], before = passes_[count_ - 2];
@@ -61,7 +60,7 @@ void PassCost::fit() {
       if (std::max(a.pixels, b.pixels) >= kApart * std::min(a.pixels, b.pixels))
         slopes.push_back((a.seconds - b.seconds) / (a.pixels - b.pixels));
     }
-  // Passes of a single size say nothing about the fixed part: it keeps its value, but at most the time of a
+  // Passes of a single size say nothing about the fixed part. It keeps its value, limited to the time of a
   // pass.
   if (slopes.empty()) {
     fixed_ = std::min(fixed_, medianOf([](const Pass& pass) { return pass.seconds; }));

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cost of a sample pass as a function of the picture's size, learnt from earlier passes. Used by
-// ResolutionPolicy.
+// Predicts the time of a sample pass from the picture's size, by earlier passes. Used by ResolutionPolicy.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -9,25 +8,23 @@
 
 namespace scolopax::server {
 
-/// seconds = fixed + perPixel * pixels: a line fitted to recent passes, neither part negative. A single pass
-/// that was disturbed hardly moves it; two consecutive passes that agree replace the older ones that they
-/// contradict.
+/// seconds = fixed + perPixel * pixels: a line fitted to recent passes, with neither part negative. A single
+/// outlier hardly changes it. Two consecutive passes that agree replace the older ones that contradict them.
 class PassCost {
  public:
-  /// A pass over `pixels` (above 0) took `seconds` (0 or more).
+  /// Records that a pass over `pixels` (above 0) took `seconds` (0 or more).
   void add(std::uint64_t pixels, double seconds);
-  /// A pass was abandoned after `seconds`. If that is longer than expected, the pass is assumed to have been
-  /// half done, until the next complete pass.
+  /// Records that a pass was abandoned after `seconds`. If that is longer than expected, the pass is assumed
+  /// to have been half done, until the next complete pass.
   void addUnfinished(std::uint64_t pixels, double seconds);
-  /// Whether anything has been learnt yet.
+  /// Whether any pass has been recorded.
   bool known() const { return count_ > 0 || late_; }
   /// The expected time of a pass over `pixels`; 0 if nothing is known.
   double seconds(std::uint64_t pixels) const;
-  /// Pixels of the largest recent picture, 0 if there is none. For larger pictures the line is an
+  /// Pixels of the largest recent picture; 0 if there is none. For larger pictures the line is an
   /// extrapolation.
   double largestPixels() const;
-  /// Whether as many passes are remembered as possible and all were of one size: then the fixed part is not
-  /// known.
+  /// Whether all kRecent recorded passes had the same size. Then the fixed part is not known.
   bool oneSize() const;
   double fixedSeconds() const { return fixed_; }
   double secondsPerPixel() const { return perPixel_; }
@@ -43,7 +40,7 @@ class PassCost {
   void forgetContradicted();
   void fit();
 
-  std::array<Pass, kRecent> passes_{};  ///< the newest last
+  std::array<Pass, kRecent> passes_{};  ///< the newest is the last
   std::size_t count_ = 0;
   std::optional<Pass> late_;  ///< an abandoned pass that was slower than the line
   double fixed_ = 0, perPixel_ = 0;

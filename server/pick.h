@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Picking: what is visible at a pixel or in a rectangle of a session's picture. Session keeps the queries,
+// Picking: what is visible at a pixel or in a rectangle of a session's picture. Session stores the queries,
 // and the render thread answers them with the Renderer.
 #pragma once
 #include <chrono>
@@ -33,12 +33,11 @@ struct PickQuery {
 /// or outside the picture.
 PixelArea areaOf(const PickQuery& query, int width, int height);
 
-/// The answer in the protocol's form: one hit for a pixel, or a list of hits for a rectangle, each voxel
-/// once.
+/// The answer as in the protocol: one hit for a pixel, or a list of hits for a rectangle, each voxel once.
 nlohmann::json pickedJson(const ResolvedScene& scene, std::uint32_t revision, const PickQuery& query,
                           const std::vector<Picked>& found);
 
-/// What was found, or why the pick failed: an Error or a ProtocolError.
+/// The result of a pick, or the reason why it failed: an Error or a ProtocolError.
 struct PickAnswer {
   nlohmann::json found = {};
   std::exception_ptr failure = {};
@@ -51,14 +50,14 @@ struct PendingPick {
   PickQuery query;
 };
 
-/// The pick that a session's renderer is working on.
+/// The pick on which a session's renderer works.
 class CurrentPick {
  public:
-  /// Begins or continues a pick for at most `slice`, and gives the session the answer when it is complete.
-  /// The renderer must have the scene.
+  /// Begins or continues a pick for at most `slice`, and passes the answer to the session when it is
+  /// complete. The renderer must have the scene.
   void run(const PendingPick& pick, const ResolvedScene& scene, std::uint32_t revision,
            const Renderer& renderer, std::chrono::nanoseconds slice, Session& session);
-  /// To be called before the renderer takes another scene or is destroyed: a pick in progress will start
+  /// To be called before the renderer gets another scene or is destroyed. A pick in progress then starts
   /// over.
   void forget() { picking_.reset(); }
 

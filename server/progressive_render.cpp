@@ -19,10 +19,10 @@ double secondsBetween(TimePoint from, TimePoint to) {
 
 std::uint32_t microseconds(double seconds) { return std::uint32_t(std::clamp(seconds * 1e6, 0.0, 4e9)); }
 
-/// A part of a pass that takes so much longer than its turn was meant to has rays that take that long; on a
-/// busy machine, any part may take a little longer.
+/// If a part of a pass exceeds its slice by this time, single rays take that long. On a busy machine, any
+/// part may exceed it a little.
 constexpr std::chrono::milliseconds kSlowRay{300};
-/// For so long, passes are then rendered in the background, where they keep no other session waiting.
+/// Time for which passes are then rendered in the background, where they delay no other session.
 constexpr std::chrono::seconds kSlowTime{10};
 
 }  // namespace
@@ -40,7 +40,7 @@ ProgressiveRender::~ProgressiveRender() {
   dropRenderer();
 }
 
-/// Releasing the memory of a large film takes time, so it is done in the background.
+/// Done in the background, because releasing the memory of a large film takes time.
 void ProgressiveRender::dropRenderer() {
   pick_.forget();
   film_.scene.reset();
@@ -66,15 +66,15 @@ void ProgressiveRender::unpark() {
   if (!renderer_) dropRenderer();
 }
 
-/// Until an edit has been shown, speed still counts more than quality: if its picture is late because others
-/// had their turns, a finer one would be much later.
+/// Until an edit has been shown, speed counts more than quality. If its picture is late because of other
+/// sessions' turns, a finer one would be much later.
 RenderRequest ProgressiveRender::request() const {
   RenderRequest request = session_->request();
   if (film_.shown.revision < request.edit) request.interactive = true;
   return request;
 }
 
-/// Whether there is a pick and the renderer has its scene and is not building another.
+/// Whether there is a pick, and the renderer has its scene and is not building another one.
 bool ProgressiveRender::pickable(const RenderRequest& request) const {
   return request.pick && film_.scene && !build_ && film_.revision == request.revision;
 }
@@ -115,7 +115,7 @@ std::optional<TimePoint> ProgressiveRender::dueAt() const {
   if (job_) return std::nullopt;  // its end wakes the loop
   const RenderRequest request = this->request();
   if (!request.wanted || request.retryAt) return request.retryAt;
-  // Even if the end has just passed, between urgency() and here: it is then due at once.
+  // The end may have passed between urgency() and here. Then the turn is due at once.
   if (request.interactive || film_.shown.interactive) return request.interactiveEnd;
   return std::nullopt;
 }
@@ -183,7 +183,7 @@ void ProgressiveRender::buildScene(const RenderRequest& request, const OtherSess
     dropRenderer();
     resolution_.forget();
   }
-  if (film_.recording && !request.aovs) dropRenderer();  // with the memory of the records
+  if (film_.recording && !request.aovs) dropRenderer();  // to release the memory of the records
   volume_ = volume;
   film_.abandoned = film_.unfinished;
   film_.unfinished = false;
@@ -194,7 +194,7 @@ void ProgressiveRender::buildScene(const RenderRequest& request, const OtherSess
   build_->scene = drawnScene(*request.scene, build_->divisor, request.interactive);
   build_->record = request.aovs && !film_.recording;
   build_->renderer = renderer_;
-  // Beginning to record clears memory.
+  // Recording begins by clearing a lot of memory.
   build_->inBackground = !renderer_ || build_->record || renderer_->takesLong(build_->scene);
   Scene chosen = build_->scene;
   if (chosen.method == Method::automatic) chosen.method = Method::hybrid;
@@ -214,7 +214,7 @@ void ProgressiveRender::sceneBuilt(PassResult& result) {
   renderer_ = build->renderer;
   if (build->record) {
     film_.recording = true;
-    film_.shown = {};  // the frames so far do not count: they have no AOVs
+    film_.shown = {};  // earlier frames do not count, since they have no AOVs
   }
   if (build->stats.filmReset || build->record) filmSeconds_ = 0;
   if (request.interactive || film_.revision != request.revision) reduced_.reset();
@@ -228,10 +228,11 @@ void ProgressiveRender::sceneBuilt(PassResult& result) {
   rebuildUs_ = microseconds(result.rebuildSeconds);
 }
 
-/// The longest turn of a first picture after an edit. While other sessions are edited, their first pictures
-/// have priority: this pass gets its planned time once, then short turns until a pass completes.
+/// The longest turn of a first picture after an edit. While other sessions are edited, too, this pass gets
+/// its planned time once and then short turns until it is complete, so that the others' first pictures are
+/// not delayed.
 std::chrono::microseconds ProgressiveRender::urgentSlice(int editedOthers) const {
-  constexpr double kMargin = 1.5;  // so that a pass as long as planned needs a single turn
+  constexpr double kMargin = 1.5;  // so that a pass that takes the planned time needs a single turn
   const RenderPolicy& policy = context_.policy;
   if (editedOthers == 0) return policy.tooLate;
   if (film_.unfinished || film_.abandoned) return policy.politeSlice;
@@ -257,8 +258,8 @@ void ProgressiveRender::addSample(const RenderRequest& request, const OtherSessi
   }
   const auto render = [&](const std::stop_token&) {
     const PassInterrupter::Watched watched(interrupter_, begin + slice + kSlowRay);
-    // A turn between two urgent ones is short but not interrupted, so it makes progress however fast edits
-    // come.
+    // A turn between two urgent ones is short but not interrupted, so that it makes progress however fast
+    // edits arrive.
     part_->render(*renderer_, context_.now, interrupter_.flag(urgent || othersWait));
   };
   perform(nullptr, render, &ProgressiveRender::partRendered, result);
@@ -275,7 +276,7 @@ void ProgressiveRender::partRendered(PassResult& result) {
   if (!part->complete) return;
   const auto add = [renderer = renderer_, estimate = film_.scene->stop.error > 0](const std::stop_token&) {
     renderer->addPixels();
-    // So that the error is known when it is needed; if estimating it takes long, show() does it.
+    // Makes the error known when it is needed. If estimating it takes long, show() does it.
     if (estimate && !renderer->errorTakesLong()) renderer->estimatedError();
   };
   perform(renderer_->filmIsLarge() ? &context_.pictures : nullptr, add, &ProgressiveRender::sampleAdded,
@@ -307,7 +308,7 @@ void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
   picture_->frame.background = film_.scene->render.background;
   picture_->interactive = request.interactive;
   picture_->aovs = film_.recording && !request.interactive;
-  // The reduced picture on screen is blended into the one that replaces it.
+  // The reduced picture on the screen is blended into the picture that replaces it.
   if (!request.interactive && !info.final && request.pollSamples.empty()) picture_->reduced = reduced_;
   picture_->sampleError = sampleError_;
   const auto make = [picture = picture_, renderer = renderer_, pixels = filmSize(), memory = context_.memory](
@@ -333,7 +334,7 @@ void ProgressiveRender::pictureMade(PassResult&) {
   session_->submit(std::move(picture->frame));
 }
 
-/// Runs a slice of a pick, if there is one and the last turn was not a pick's.
+/// Runs a slice of a pick if there is one and the last turn was not a pick's.
 bool ProgressiveRender::pickIn(const RenderRequest& request) {
   pickedLast_ = pickable(request) && !pickedLast_;
   if (pickedLast_)
@@ -357,7 +358,7 @@ void ProgressiveRender::turn(const RenderRequest& request, const OtherSessions& 
     built = true;
     next = step(request);
   }
-  if (built && pickIn(request)) return;  // so the pick need not wait for a pass
+  if (built && pickIn(request)) return;  // so that the pick does not wait for a pass
   const auto mayShow = [&] { return !job_ && !film_.unfinished && showDue(request); };
   // A sample added in the background is shown before the next pass begins.
   if (collected && mayShow()) return show(request, result);
@@ -388,7 +389,7 @@ void ProgressiveRender::fail(const RenderRequest& request, const Error& error) {
                                  : film_.scene ? film_.revision
                                                : request.revision;
   session_->fail(revision, error);
-  // The state that an error leaves behind is not worth keeping.
+  // The state after an error cannot be trusted.
   build_.reset();
   part_.reset();
   picture_.reset();

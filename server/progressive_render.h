@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One session's renderer and film, and the decisions about what to do with them next. Used only by the render
-// thread; takes scenes from Session and hands pictures back to it.
+// A session's renderer and film, and the decisions what to do with them next. Used only by the render thread.
+// Takes scenes from Session and submits pictures to it.
 #pragma once
 #include <functional>
 #include <memory>
@@ -18,27 +18,27 @@
 namespace scolopax::server {
 
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(std::shared_ptr<const Volume>)>;
-/// Receives one line that clients must not see.
+/// Receives a line that clients must not see.
 using Log = std::function<void(const std::string&)>;
 
 /// The outcome of one turn, for the metrics.
 struct PassResult {
   bool rendered = false;  ///< a sample was added to every pixel
   bool cancelled = false;
-  bool built = false;      ///< a scene that was built in the background was taken over
-  bool abandoned = false;  ///< such a build was abandoned
+  bool built = false;      ///< a build in the background was completed
+  bool abandoned = false;  ///< a build in the background was cancelled
   std::uint64_t pixels = 0;
   double renderSeconds = 0, rebuildSeconds = 0;
 };
 
-/// What the renders of all sessions share. `wake` makes the render loop check its sessions again.
+/// Shared by the renders of all sessions. `wake` makes the render loop check its sessions again.
 struct RenderContext {
   MakeRenderer makeRenderer;
   RenderPolicy policy;
   Now now;
   Log log;
-  Background& pictures;  ///< for large pictures: adding up samples, making and encoding; and releasing films
-  Background& passes;    ///< for passes with slow rays, and for errors that take long to measure
+  Background& pictures;  ///< for large pictures (adding samples, making, encoding) and for releasing films
+  Background& passes;    ///< for passes with slow rays and for errors that take long to measure
   Background& builds;    ///< for scenes, including the automatic choice of the method
   std::function<void()> wake;
   std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for pictures; null: no limit
@@ -52,12 +52,12 @@ struct PictureJob;
 
 class ProgressiveRender {
  public:
-  /// What the other sessions need, which limits this session's pass.
+  /// The needs of the other sessions, which limit this session's pass.
   struct OtherSessions {
-    int edited = 0;       ///< number of those at which edits arrive
+    int edited = 0;       ///< number of other sessions at which edits arrive
     bool urgent = false;  ///< one of them has urgent work
   };
-  /// Kinds of work, the least important first.
+  /// Urgency of a session's next turn, in ascending order.
   enum class Urgency {
     none,
     refine,  ///< a better picture while edits arrive, which the next edit will replace
@@ -72,23 +72,24 @@ class ProgressiveRender {
   ProgressiveRender& operator=(const ProgressiveRender&) = delete;
 
   const std::shared_ptr<Session>& session() const { return session_; }
-  /// What run() would do now; none while a background job is running, unless a pick can be answered.
+  /// Urgency of the work that run() would do now; none while a background job is running, unless a pick can
+  /// be answered.
   Urgency urgency() const;
   /// Whether edits arrive.
   bool edited() const;
-  /// When there may be work again even if nothing wakes the loop.
+  /// The time at which there may be work again even if nothing wakes the loop.
   std::optional<TimePoint> dueAt() const;
-  /// Cancels the background job once its result is no longer wanted, and parks the renderer while nobody
+  /// Cancels the background job if its result is no longer wanted, and parks the renderer while nobody
   /// watches.
   void supervise();
-  /// One turn: a slice of a pick, or at most one sample pass with the rebuild before it and the submission
-  /// after it. Steps that take long run in the background and are completed in a later turn. Never throws:
-  /// failures to render are reported to the session.
+  /// Runs one turn: a slice of a pick, or at most one sample pass with the rebuild before it and the
+  /// submission after it. Long steps run in the background and are completed in a later turn. Does not throw:
+  /// failures are reported to the session.
   PassResult run(const OtherSessions& others);
 
  private:
   using Next = void (ProgressiveRender::*)(PassResult&);
-  /// What a turn does, if no background job is running and it is not a pick's.
+  /// The work of a turn, unless a background job is running or the turn is a pick's.
   enum class Step { none, buildScene, addSample, show };
 
   RenderRequest request() const;
@@ -135,7 +136,7 @@ class ProgressiveRender {
   bool parked_ = false;  ///< the renderer is in RenderContext::parked, unless it has been dropped
   FilmState film_;
   ResolutionPolicy resolution_;
-  TimePoint slowUntil_{};   ///< until then, passes are rendered in the background
+  TimePoint slowUntil_{};   ///< until this time, passes are rendered in the background
   bool quick_ = false;      ///< the last part of a pass took no longer than its turn
   double filmSeconds_ = 0;  ///< spent on the film's samples
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;

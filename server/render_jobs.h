@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The jobs of ProgressiveRender, run on its own thread or in the background: bringing a scene into the
-// renderer, and making a picture from the film.
+// The jobs of ProgressiveRender, which run on its own thread or in the background: building a scene,
+// rendering a part of a pass, and making a picture of the film.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -15,12 +15,11 @@
 
 namespace scolopax::server {
 
-/// The scene that is drawn, at 1 / `divisor` of the resolution. While edits arrive (`interactive`), and only
-/// if the scene leaves the choice of method to the server, it uses the quickest method that looks like the
-/// picture at rest.
+/// The scene that is drawn, at 1 / `divisor` of the resolution. While edits arrive (`interactive`), a scene
+/// with the method `auto` is drawn by the fastest method that looks like the picture at rest.
 Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive);
 
-/// A scene being brought into the renderer.
+/// The build of a scene in the renderer.
 struct SceneBuild {
   RenderRequest request;
   TimePoint begin;
@@ -28,11 +27,11 @@ struct SceneBuild {
   Scene scene;
   bool record = false;  ///< AOVs are recorded from this scene on
   bool inBackground = false;
-  bool onlyChooses = false;  ///< what takes long is only the automatic choice of the method
+  bool onlyChooses = false;  ///< only the automatic choice of the method takes long
   std::shared_ptr<Renderer> renderer;
   RebuildStats stats;
 
-  /// Whether the expensive part of this build is useless for `other`.
+  /// Whether the expensive part of this build is of no use for `other`.
   bool uselessFor(const RenderRequest& other) const {
     return (onlyChooses && other.edit != request.edit) ||
            other.scene->dataset->volume != request.scene->dataset->volume ||
@@ -55,12 +54,12 @@ struct PassPart {
   void render(Renderer& renderer, const Now& now, const std::stop_token& stop);
 };
 
-/// A picture being made from the film.
+/// The making of a picture from the film.
 struct PictureJob {
   RenderedFrame frame;
   bool interactive = false;              ///< made while edits arrive
   bool aovs = false;                     ///< includes AOVs
-  std::shared_ptr<const Image> reduced;  ///< picture to blend in; null: none
+  std::shared_ptr<const Image> reduced;  ///< the picture to blend in; null: none
   double sampleError = 0;
   double share = 0;  ///< weight of the new picture in the blend
 

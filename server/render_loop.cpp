@@ -66,10 +66,11 @@ std::optional<TimePoint> RenderLoop::step() {
   std::optional<TimePoint> next = store_.expire();
   followStore();
   for (const auto& render : renders_) render->supervise();
-  interrupter_.reset();  // an edit from here on interrupts the pass; nextTurn() sees those before
+  interrupter_.reset();  // edits from here on interrupt the pass; earlier ones are seen by nextTurn()
   const auto turn = nextTurn();
   if (turn != renders_.end()) {
-    // Moved behind all others before it runs: a session with slow passes gets one turn per round as well.
+    // Moved behind all others before it runs, so that a session with slow passes also gets only one turn per
+    // round.
     std::rotate(turn, turn + 1, renders_.end());
     ProgressiveRender::OtherSessions others;
     others.urgent = othersUrgent_;
@@ -88,8 +89,7 @@ EncodedFrame encodeFrame(const RenderedFrame& rendered, const Now& now,
                          const std::shared_ptr<MemoryBudget>& memory) {
   const TimePoint begin = now();
   const Image& image = *rendered.image;
-  // A picture that will be enlarged has few bytes, and enlarging would make its compression artefacts
-  // visible.
+  // A reduced picture has few bytes, and enlarging it would make compression artefacts visible.
   const int quality = rendered.info.reduced ? 95 : rendered.info.interactive ? 80 : 90;
   EncodedFrame frame;
   frame.info = rendered.info;

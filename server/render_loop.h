@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The two loops that serve all sessions: one renders them in turn, one sample pass at a time; the other
-// encodes frames and delivers them. Each is a step that returns when to run again, driven by a LoopThread or
-// by a test; so is what watches the first.
+// The two loops that serve all sessions. One renders the sessions in turn, one sample pass at a time; the
+// other encodes frames and delivers them. Each is a step that returns when to run again, called by a
+// LoopThread or by a test. The same holds for the function that watches the first loop.
 #pragma once
 #include <functional>
 #include <map>
@@ -18,9 +18,9 @@ namespace scolopax::server {
 class RenderLoop {
  public:
   using OnPass = std::function<void(const PassResult&)>;
-  /// When the context's budget lacks memory, renderers of sessions that nobody watches are dropped.
+  /// If the context's memory budget is used up, renderers of sessions that nobody watches are dropped.
   RenderLoop(SessionStore& store, RenderContext context, OnPass onPass);
-  /// Runs one turn of the next session that has work. First pictures after edits take precedence; between two
+  /// Runs one turn of the next session that has work. First pictures after edits have priority. Between two
   /// of them, a session at rest gets a short turn, so that no session starves.
   std::optional<TimePoint> step();
   /// Interrupts the running pass, unless it makes the first picture after an edit or is a short turn between
@@ -40,9 +40,9 @@ class RenderLoop {
   SessionStore& store_;
   const RenderContext context_;
   const OnPass onPass_;
-  Renders renders_;  ///< in the order of their next turns
+  Renders renders_;  ///< in the order of their turns
   PassInterrupter interrupter_;
-  bool othersUrgent_ = false;  ///< the chosen turn is not urgent, but another session's is
+  bool othersUrgent_ = false;  ///< the chosen turn is not urgent, but another session has an urgent one
   bool lastUrgent_ = false;    ///< the last turn was urgent
 };
 
@@ -57,7 +57,7 @@ class EncodeLoop {
         pictures_(pictures),
         wake_(std::move(wake)),
         memory_(std::move(memory)) {}
-  /// Encodes the pictures that wait, at most one per session, and delivers the frames that are due. Large
+  /// Encodes the waiting pictures, at most one per session, and delivers the frames that are due. Large
   /// pictures are encoded in the background, one per session at a time.
   std::optional<TimePoint> step();
 
@@ -71,9 +71,9 @@ class EncodeLoop {
   std::map<const Session*, std::shared_ptr<Background::Job>> jobs_;
 };
 
-/// Encodes a rendered picture as JPEG with 4:4:4 sampling: quality 95 if it is reduced, otherwise 80 if it
-/// was made while edits arrive, and 90 at rest. The memory of the result is charged to the budget until the
-/// result is released.
+/// Encodes a rendered picture as JPEG with 4:4:4 sampling. The quality is 95 for a reduced picture, otherwise
+/// 80 while edits arrive and 90 at rest. The memory of the result is charged to the budget until the result
+/// is released.
 EncodedFrame encodeFrame(const RenderedFrame& rendered, const Now& now,
                          const std::shared_ptr<MemoryBudget>& memory = nullptr);
 

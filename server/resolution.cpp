@@ -9,12 +9,11 @@ namespace scolopax::server {
 namespace {
 
 constexpr double kDivisors[] = {1, 1.5, 2, 2.5, 3, 4, 6, 8, 12, kMaxDivisor};
-/// The first divisor while edits arrive, when nothing is known: a small pass is quick and gives a
-/// measurement.
+/// The first divisor while edits arrive, when no cost is known: a small pass is fast and gives a measurement.
 constexpr double kProbeDivisor = 4;
 /// Largest ratio of the pixels of a picture to those of the next coarser one, plus a margin.
 constexpr double kLargestStep = 2.3;
-/// How many times the fixed cost a picture may take.
+/// The target is at least so many times the fixed cost.
 constexpr double kOverFixed = 1.6;
 constexpr double kFiner = 0.8, kKept = 1.2;  ///< shares of the target at which the divisor changes
 
@@ -57,8 +56,8 @@ void ResolutionPolicy::forget() {
   untilProbe_ = probeWait_ = kMinWait;
 }
 
-/// Passes of a single size do not show what part of their cost is fixed. A finer picture now and then does;
-/// these trials become rarer while they turn out not to fit.
+/// Passes of a single size do not show which part of their cost is fixed, but an occasional finer picture
+/// does. These trials become rarer while the finer pictures do not fit.
 bool ResolutionPolicy::probes(const PassCost& cost) {
   if (current_ <= 1 || !cost.oneSize() || --untilProbe_ > 0) return false;
   untilProbe_ = probeWait_ = std::min(2 * probeWait_, kMaxWait);

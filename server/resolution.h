@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Chooses the resolution at which a picture is ready in time: while edits arrive, and on the way back to full
-// resolution. Used by ProgressiveRender before each film; knows how long passes took, but reads no clock.
+// Chooses the resolution at which a picture is ready in time, while edits arrive and on the way back to full
+// resolution. Used by ProgressiveRender before each film. Knows how long passes took, but reads no clock.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -14,56 +14,55 @@ namespace scolopax::server {
 /// The time limits of rendering.
 struct RenderPolicy {
   std::chrono::microseconds frameTarget{25'000};      ///< for one pass while edits arrive
-  std::chrono::microseconds minTarget{4'000};         ///< least target when many sessions are edited
+  std::chrono::microseconds minTarget{4'000};         ///< minimum of the target when many sessions are edited
   std::chrono::milliseconds interactiveInterval{33};  ///< between frames while edits arrive
   std::chrono::milliseconds stillInterval{500};       ///< between frames at rest, once there are many samples
-  std::chrono::milliseconds tooLate{75};              ///< an edit's first picture is then restarted, coarser
-  int restFactor = 12;                   ///< how much longer a pass may take at each step to full resolution
-  std::chrono::milliseconds slice{100};  ///< of a slow pass, before the next session's turn
-  std::chrono::milliseconds politeSlice{8};  ///< the same, while an edit's first picture or a pick waits
-  std::chrono::milliseconds shield{300};     ///< for so long a pass with a stale scene continues
+  std::chrono::milliseconds tooLate{75};  ///< when an edit's first picture is restarted at a lower resolution
+  int restFactor = 12;  ///< how many times longer a pass may take at each step to full resolution
+  std::chrono::milliseconds slice{100};      ///< of a slow pass, until the next session's turn
+  std::chrono::milliseconds politeSlice{8};  ///< the same while an edit's first picture or a pick waits
+  std::chrono::milliseconds shield{300};     ///< time for which a pass with a stale scene continues
 };
 
 /// The time for one session's pass while edits arrive at it and at `editedOthers` other sessions. All edited
-/// sessions together have two frame targets a round, so that the picture stays sharp while they are few.
+/// sessions together have two frame targets per round, so pictures stay sharp while few sessions are edited.
 std::chrono::microseconds targetOfPass(const RenderPolicy& policy, int editedOthers);
 
-/// The largest divisor of width and height.
+/// Maximum divisor of width and height.
 inline constexpr double kMaxDivisor = 16;
 
 /// The smallest of 1, 1.5, 2, 2.5, 3, 4, 6, 8, ... by which width and height must be divided so that a pass
-/// meets the target. `current` is the divisor of the previous pass (0: none). It is kept until another fits
-/// clearly better, since a resolution that changes back and forth is worse than a picture that is slightly
-/// late. No picture follows it that is much larger than the largest whose cost is known. If the fixed cost of
-/// a pass is most of the target (for example because other processes use the processors), smaller pictures
-/// gain nothing, and the target is raised.
+/// meets the target. `current` is the divisor of the previous pass (0: none). It is kept until another one
+/// fits clearly better, since a resolution that changes back and forth is worse than a picture that is
+/// slightly late. After a previous pass, the result is never much larger than the largest picture whose cost
+/// is known. If most of the target is spent on the fixed cost of a pass (for example because other processes
+/// use the processors), smaller pictures gain nothing, and the target is raised.
 double divisorForTarget(std::uint64_t pixels, const PassCost& cost, double targetSeconds, double current = 0);
 
 /// The scene for a smaller picture of the same view. Its height is divided and rounded up; its width is the
-/// least that shows as much as the whole picture. Samples go through pixel centres: the small picture is
-/// enlarged smoothly, and a sample at the centre of a pixel represents it better than one anywhere in the
-/// pixel.
+/// smallest that shows the whole view. Samples go through pixel centres: the small picture is enlarged
+/// smoothly, and a sample at the centre represents a pixel better than one anywhere in it.
 Scene atDivisor(Scene scene, double divisor);
 
-/// One session's choice of resolutions. `edited` distinguishes passes while edits arrive from passes at rest,
+/// A session's choice of resolutions. `edited` distinguishes passes while edits arrive from passes at rest,
 /// which are drawn differently and have different costs.
 class ResolutionPolicy {
  public:
   explicit ResolutionPolicy(const RenderPolicy& policy) : policy_(policy) {}
 
   void passDone(bool edited, std::uint64_t pixels, double seconds) { cost_[edited].add(pixels, seconds); }
-  /// A pass was abandoned after `seconds`.
+  /// To be called for a pass that was abandoned after `seconds`.
   void passGivenUp(bool edited, std::uint64_t pixels, double seconds) {
     cost_[edited].addUnfinished(pixels, seconds);
   }
-  /// To be called for another data set: discards what was learnt.
+  /// Discards all recorded costs. To be called for another data set.
   void forget();
 
   /// The divisor while edits arrive, here and at `editedOthers` other sessions; `pixels` is the size of the
   /// whole picture.
   double whileEdited(std::uint64_t pixels, int editedOthers);
-  /// The divisor at rest. `shown` is that of the reduced picture of this scene on screen, if there is one:
-  /// the result is smaller.
+  /// The divisor at rest. `shown` is the divisor of the reduced picture of this scene on the screen, if there
+  /// is one; the result is smaller.
   double atRest(std::uint64_t pixels, std::optional<double> shown) const;
 
  private:

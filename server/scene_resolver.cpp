@@ -39,7 +39,7 @@ std::vector<protocol::EnumEntry> entries(std::span<const NamedValue> values) {
   return list;
 }
 
-/// The value with this wire name; parseScene has checked that there is one.
+/// The value with this wire name, which parseScene has checked.
 template <class Enum, std::size_t N>
 Enum valueOf(const NamedValue (&list)[N], std::string_view name) {
   return Enum(std::find_if(list, list + N, [&](const NamedValue& value) { return value.name == name; }) -
@@ -57,8 +57,8 @@ std::vector<ColorKnot> knotsOf(const protocol::Colormap& colormap) {
   return knots;
 }
 
-/// Turns an Error of `check` into a ProtocolError(422), so that what the renderer would refuse later is
-/// refused with the edit.
+/// Turns an Error of `check` into a ProtocolError(422), so that an edit is refused that the renderer would
+/// refuse later.
 template <class Check>
 void refuseAt(const std::string& pointer, Check&& check) {
   try {
@@ -109,10 +109,10 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
   }
 }
 
-/// Share of the voxels with opacity whose gradients the automatic range includes.
+/// The automatic range includes the gradients of this share of the voxels that have opacity.
 constexpr double kWithinRange = 0.995;
 
-/// Whether a patch, which was applied successfully, asks for a new automatic range of a channel's gradients.
+/// Whether a patch, which has been applied, asks for a new automatic range of a channel's gradients.
 bool resetsGradientRange(const json& patch, std::size_t channel) {
   const auto channels = patch.find("channels");
   if (channels == patch.end()) return false;
@@ -196,7 +196,8 @@ void resolveLights(const protocol::Scene& scene, Scene& render) {
   }
 }
 
-/// Small macrocells of a large volume cost much and gain little. The default size is always accepted.
+/// Refuses small macrocells in a large volume, which cost much and gain little. The default size is always
+/// accepted.
 void checkMacrocell(int size, const Volume& volume, std::size_t maxIntervals) {
   const auto tooMany = [&](int one) { return intervalCount(volume, one) > maxIntervals; };
   int least = size;
@@ -207,7 +208,7 @@ void checkMacrocell(int size, const Volume& volume, std::size_t maxIntervals) {
       "expected at least " + std::to_string(least) + " for this data set, found " + std::to_string(size));
 }
 
-/// Memory, in bytes, that the curves of a scene take in all forms of a ResolvedScene.
+/// Bytes of memory that the curves of a scene take in all forms of a ResolvedScene.
 std::uint64_t curveBytes(const protocol::Scene& scene) {
   // In JSON, a control point is a list of its own, in three allocations; a colour is another.
   constexpr std::uint64_t kPoint = 96 + sizeof(protocol::ControlPoint) + sizeof(OpacityKnot),
@@ -222,7 +223,7 @@ std::uint64_t curveBytes(const protocol::Scene& scene) {
   return points * kPoint + colors * kColorPoint;
 }
 
-/// Removes what makes no difference to the picture.
+/// Removes everything that does not affect the picture.
 protocol::Scene pictureOf(protocol::Scene resolved) {
   resolved.stop = {};
   for (protocol::Channel& channel : resolved.channels) channel.name.reset();
@@ -263,7 +264,7 @@ void SceneResolver::frame(const protocol::Scene& scene, ResolvedScene& result) c
   std::vector<glm::vec3> hull;
   try {
     hull = visibleHull(*result.dataset->volume, coarse_.at(result.dataset.get()), result.render.channels);
-  } catch (const Error&) {  // rendering reports what cannot be rendered
+  } catch (const Error&) {  // rendering will report the error
   }
   result.automatic.framed = std::make_shared<const std::vector<glm::vec3>>(std::move(hull));
 }
@@ -279,7 +280,7 @@ std::array<double, 2> SceneResolver::gradientRange(const ResolvedScene& scene, i
     most = gradientQuantile(*gradients, scene.dataset->volume->channels()[std::size_t(channel)],
                             scene.render.channels[std::size_t(channel)], kWithinRange);
   });
-  return {0, most > 0 ? most : 1};  // flat: all ranges give the same picture
+  return {0, most > 0 ? most : 1};  // with a gradient of 0, all ranges give the same picture
 }
 
 void SceneResolver::resolveGradientOpacity(protocol::Scene& scene, ResolvedScene& result) const {
@@ -304,7 +305,7 @@ void SceneResolver::resolveGradientOpacity(protocol::Scene& scene, ResolvedScene
 
 std::shared_ptr<const Dataset> SceneResolver::datasetOf(const json& scene) const {
   const auto id = scene.is_object() ? scene.find("dataset") : scene.end();
-  // parseScene refuses what is not a name, with a better message.
+  // parseScene refuses anything but a name, with a better message.
   if (id == scene.end() || !id->is_string()) return datasets_->first();
   auto dataset = datasets_->find(id->get_ref<const std::string&>());
   if (!dataset) {
@@ -344,7 +345,7 @@ SceneResolver::Resolved SceneResolver::patch(const ResolvedScene& base, const js
 std::optional<std::string> SceneResolver::tooLarge(const Scene& scene, bool aovs) const {
   if (!options_.memory) return std::nullopt;
   const std::uint64_t pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height);
-  // What a session holds at the same time when it shows its first picture.
+  // Everything that a session holds at the same time when it shows its first picture.
   const std::uint64_t parts[] = {pixels * filmPixelBytes(scene.channels.size(), aovs),
                                  pixels * sizeof(glm::vec4),
                                  aovs ? pixels * std::size(kAovs) * sizeof(float) : 0, jpegMemory(pixels)};
@@ -395,7 +396,7 @@ SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const Automat
   render.seed = scene.integrator.seed;
   render.background = glm::vec3(linearOf(scene.image.background));
   render.filter = valueOf<PixelFilter>(kPixelFilters, scene.image.filter);
-  resolveGradientOpacity(scene, *result);  // late: refused scenes need no measuring
+  resolveGradientOpacity(scene, *result);  // late, so that refused scenes are not measured
   refuseAt("", [&] { checkScene(render, volume); });
   if (!scene.stop.samples && !scene.stop.seconds && !scene.stop.error)
     scene.stop.samples = options_.defaultSamples;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Resolves a sparse wire scene for a volume into a scene in which every value is set, for the renderer and
-// for the client.
+// Resolves a sparse wire scene for a volume: sets every value, for the renderer and for the client.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -25,13 +24,13 @@
 
 namespace scolopax::server {
 
-/// Values that were chosen automatically from a scene's curves. They stay while the curves are edited, so
-/// that nothing jumps.
+/// Values that were chosen automatically from a scene's curves. They do not change while the curves are
+/// edited, so that nothing jumps.
 struct AutomaticValues {
   std::shared_ptr<const Dataset> dataset;  ///< the data set that they were chosen for
-  /// What the automatic view frames (renderer/data/visible_hull.h); null: not needed so far.
+  /// The points that the automatic view frames (renderer/data/visible_hull.h); null: not needed so far.
   std::shared_ptr<const std::vector<glm::vec3>> framed;
-  /// For each channel, the automatic range of its gradientOpacity; empty where it has none or the range is
+  /// For each channel, the automatic range of its gradientOpacity; empty if it has none or if the range is
   /// set.
   std::vector<std::optional<std::array<double, 2>>> gradientRanges;
 };
@@ -49,10 +48,10 @@ struct ResolvedScene {
 
 /// Whether two resolved scenes give the same picture at a given number of samples.
 bool samePicture(const protocol::Scene& a, const protocol::Scene& b);
-/// The part of the resolved scene that determines that picture.
+/// The parts of the resolved scene that determine the picture at a given number of samples.
 nlohmann::json pictureJson(const protocol::Scene& resolved);
 
-/// The names the renderer knows, for validation, schema and capabilities.
+/// The names that the renderer knows, for validation, schema and capabilities.
 protocol::Lists rendererLists();
 
 class SceneResolver {
@@ -67,21 +66,21 @@ class SceneResolver {
   virtual ~SceneResolver() = default;
 
   using Resolved = std::shared_ptr<const ResolvedScene>;
-  /// Resolves a whole scene. Automatic values (the view and the ranges of gradients) are chosen from its
-  /// curves; waits until the data that this needs has been measured. Throws ProtocolError(422) with the
-  /// pointer of the bad field, Error(cancelled) once `stop` is requested, and Error(busy or tooLarge) if
-  /// there is not enough memory.
+  /// Resolves a whole scene. Chooses automatic values (the view and the ranges of gradients) from its curves,
+  /// and waits until the data that this needs has been measured. Throws ProtocolError(422) with the pointer
+  /// of the bad field, Error(cancelled) once `stop` is requested, and Error(busy or tooLarge) if there is not
+  /// enough memory.
   Resolved replace(const nlohmann::json& scene, const std::stop_token& stop = {}) const;
-  /// Applies a patch to the sparse form of `base`. Values chosen from its curves stay, unless the patch asks
-  /// for new ones (a camera, eye or target that is null; a channel, gradientOpacity or range that is null;
-  /// all channels replaced) or names another data set. Waits and throws as replace() does.
+  /// Applies a patch to the sparse form of `base`. Automatic values stay, unless the patch asks for new ones
+  /// (by a camera, eye, target, channel, gradientOpacity or range that is null, or by replacing all channels)
+  /// or names another data set. Waits and throws as replace() does.
   Resolved patch(const ResolvedScene& base, const nlohmann::json& patch,
                  const std::stop_token& stop = {}) const;
-  /// The same for callers that must not wait: throw Unmeasured instead.
+  /// The same for callers that must not wait: throws Unmeasured instead.
   virtual Resolved replaceNow(const nlohmann::json& scene) const;
   virtual Resolved patchNow(const ResolvedScene& base, const nlohmann::json& patch) const;
-  /// Why there is never memory for a picture of the scene, with AOVs if they are recorded; nullopt if there
-  /// may be.
+  /// The reason why a picture of the scene, with AOVs if they are recorded, can never fit into the memory
+  /// budget; nullopt if it may fit.
   std::optional<std::string> tooLarge(const Scene& scene, bool aovs) const;
   const protocol::Lists& lists() const { return lists_; }
 
@@ -93,7 +92,7 @@ class SceneResolver {
   std::shared_ptr<const Dataset> datasetOf(const nlohmann::json& scene) const;
 
   std::shared_ptr<const DatasetStore> datasets_;
-  std::map<const Dataset*, MacrocellGrid> coarse_;  ///< of each data set, for frame()
+  std::map<const Dataset*, MacrocellGrid> coarse_;  ///< one for each data set, for frame()
   Options options_;
   protocol::Lists lists_;
 };

@@ -13,11 +13,11 @@
 namespace scolopax::server {
 namespace {
 
-// A viewer that gets no frames keeps at most this many ids of its patches. Beyond that the oldest are
-// forgotten, which only makes the header's patch id lag behind.
+// Limits the ids of patches that are kept for a viewer that gets no frames. Beyond it the oldest are
+// forgotten; then the patch id in headers only lags behind.
 constexpr std::size_t kMaxPendingPatches = 1024;
 
-/// Calls a function of a client. A failure there must not disturb the other clients, nor end a loop's thread.
+/// Calls a function of a client. Its failure must neither affect other clients nor end a loop's thread.
 template <class Call, class... Arguments>
 void notify(const Call& call, Arguments&&... arguments) noexcept {
   try {
@@ -64,12 +64,13 @@ Session::SceneState Session::edit(const EditOrigin& origin, const Resolve& resol
   std::unique_lock lock(mutex_);
   checkRevision(origin);
   before = scene_;
-  // Whatever takes time is done without the mutex.
+  // Everything that takes time is done without the mutex.
   lock.unlock();
   auto next = resolve(*before);
   const bool pictureChanges = !samePicture(next->resolved, before->resolved);
   lock.lock();
-  // For other viewers; most sessions have only one. A query for AOVs may begin a revision meanwhile.
+  // The message for the other viewers; most sessions have only one. A query for AOVs may begin a revision
+  // meanwhile.
   std::string change;
   std::shared_ptr<const std::string> message;
   for (std::uint32_t announced = 0;
@@ -80,7 +81,7 @@ Session::SceneState Session::edit(const EditOrigin& origin, const Resolve& resol
     message = std::make_shared<const std::string>(protocol::sceneText(announced, change));
     lock.lock();
   }
-  checkRevision(origin);  // a query for AOVs may have begun one, or the session have ended
+  checkRevision(origin);  // a query for AOVs may have begun a revision, or the session may have ended
   scene_ = std::move(next);
   ++revision_;
   lastUsed_ = hooks_.now();
@@ -121,7 +122,7 @@ void Session::removeViewer(ViewerId id) {
   const std::lock_guard lock(mutex_);
   viewers_.erase(id);
   lastUsed_ = hooks_.now();
-  hooks_.wakeRender();  // which also times the session's end
+  hooks_.wakeRender();  // the loop also determines when the session ends
 }
 
 void Session::setView(ViewerId id, bool visible, double maxFps) {
@@ -130,7 +131,7 @@ void Session::setView(ViewerId id, bool visible, double maxFps) {
   if (viewer == viewers_.end()) return;
   viewer->second.visible = visible;
   if (visible) retryIfBusy();
-  // At most an hour: a longer period overflows a duration.
+  // At most an hour, because a longer period would overflow a duration.
   const auto seconds = maxFps > 0 ? std::min(1 / maxFps, 3600.0) : 0.0;
   viewer->second.period =
       std::chrono::duration_cast<TimePoint::duration>(std::chrono::duration<double>(seconds));
@@ -156,7 +157,7 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
     lastAovs_ = hooks_.now();
   }
   if (query.aovs && !aovs_) {
-    // The picture starts over, so it must not be confused with the one before.
+    // The picture starts over, so it needs a new revision.
     aovs_ = true;
     ++revision_;
     const auto message = std::make_shared<const std::string>(protocol::sceneText(revision_, "{}"));
@@ -278,7 +279,7 @@ void Session::fail(std::uint32_t revision, const Error& error) {
   const bool known = busy && retryAt_ && failedRevision_ == revision;  // a retry that failed again
   if (!known)
     for (auto& [id, viewer] : viewers_) notify(&ViewerSink::renderFailed, *viewer.sink, error);
-  if (revision != revision_) return;  // the current scene may well render
+  if (revision != revision_) return;  // the current scene may be renderable
   failedRevision_ = revision;
   failure_ = error;
   retryAt_.reset();

@@ -12,7 +12,7 @@ namespace scolopax::server {
 SessionStore::SessionStore(std::shared_ptr<const SceneResolver> resolver, Options options, SessionHooks hooks)
     : resolver_(std::move(resolver)), options_(options), hooks_(std::move(hooks)) {}
 
-/// Throws if there cannot be another session now. Requires the mutex.
+/// Throws if another session cannot be created now. Requires the mutex.
 void SessionStore::checkRoom() const {
   if (closed_) throw protocol::ProtocolError(503, "", *closed_);
   if (sessions_.size() >= options_.maxSessions)
@@ -25,14 +25,14 @@ std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene) {
   expire();
   {
     const std::lock_guard lock(mutex_);
-    checkRoom();  // resolving a scene that is refused anyway would take time
+    checkRoom();  // before resolving the scene, which takes time
   }
   auto session = std::make_shared<Session>(createToken(), createToken(), resolver_,
                                            resolver_->replaceNow(scene), hooks_);
   const std::lock_guard lock(mutex_);
-  checkRoom();  // again: others may have begun sessions
+  checkRoom();  // again, because other threads may have created sessions
   sessions_.push_back(session);
-  hooks_.wakeRender();  // which ends the session if nobody uses it
+  hooks_.wakeRender();  // the loop will end the session if nobody uses it
   return session;
 }
 
@@ -61,7 +61,7 @@ bool SessionStore::remove(std::string_view id) {
     sessions_.erase(found);
   }
   session->close("the session was deleted");
-  hooks_.wakeRender();  // which releases the session's renderer
+  hooks_.wakeRender();  // the loop releases the session's renderer
   return true;
 }
 

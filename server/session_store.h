@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// All sessions. A session outlives its last viewer for a while and then ends.
+// All sessions. A session ends some time after its last viewer has left.
 #pragma once
 #include <functional>
 #include <map>
@@ -23,18 +23,18 @@ class SessionStore {
   SessionStore(std::shared_ptr<const SceneResolver> resolver, Options options, SessionHooks hooks);
 
   /// Throws ProtocolError: 503 if the maximum number of sessions is reached or all have been closed, 422 for
-  /// an invalid scene; and Unmeasured until the data that the scene needs has been measured.
+  /// an invalid scene. Throws Unmeasured until the data that the scene needs has been measured.
   std::shared_ptr<Session> create(const nlohmann::json& scene);
   /// nullptr if there is none.
   std::shared_ptr<Session> find(std::string_view id) const;
   std::shared_ptr<Session> findByToken(std::string_view token) const;
   /// Ends the session; false if there is none with this id.
   bool remove(std::string_view id);
-  /// In the order of their creation.
+  /// All sessions, in the order of their creation.
   std::vector<std::shared_ptr<Session>> all() const;
   /// Ends the sessions that have expired; returns when the next one may expire.
   std::optional<TimePoint> expire();
-  /// Ends all sessions; create() refuses from then on, with this reason.
+  /// Ends all sessions. From then on create() throws, with this reason.
   void closeAll(const std::string& reason);
 
  private:
@@ -45,7 +45,7 @@ class SessionStore {
   const SessionHooks hooks_;
   mutable std::mutex mutex_;
   std::vector<std::shared_ptr<Session>> sessions_;
-  std::optional<std::string> closed_;  ///< why, after closeAll()
+  std::optional<std::string> closed_;  ///< the reason, after closeAll()
 };
 
 }  // namespace scolopax::server

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Whether the patch leaves the channel as it is.
+/// Whether the patch does not change the channel.
 bool keeps(const json& patch, std::size_t channel) {
   const auto channels = patch.find("channels");
   return channels == patch.end() || (channels->is_object() && !channels->contains(std::to_string(channel)));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the user has set of a scene, in JSON. SceneResolver makes whole scenes of it.
+// The parts of a scene that the user has set, in JSON. SceneResolver makes whole scenes of them.
 #pragma once
 #include <cstddef>
 #include <memory>
@@ -11,8 +11,8 @@
 
 namespace scolopax::server {
 
-/// A sparse scene (protocol/patch.h). Its channels, whose curves may be long, are shared with the scenes that
-/// were made from it by patches to something else.
+/// A sparse scene (protocol/patch.h). Scenes made from it by patches share the channels that the patches do
+/// not change, since their curves may be long.
 class SparseScene {
  public:
   SparseScene() = default;
@@ -22,7 +22,7 @@ class SparseScene {
   protocol::Scene parsed(const protocol::Lists& lists) const;
   nlohmann::json whole() const;
   const std::shared_ptr<const nlohmann::json>& channel(std::size_t index) const { return channels_[index]; }
-  /// The scene, but for the channels, which are empty objects.
+  /// The scene without the contents of its channels, which are empty objects.
   const nlohmann::json& rest() const { return rest_; }
 
  private:

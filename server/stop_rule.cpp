@@ -4,7 +4,7 @@
 namespace scolopax::server {
 namespace {
 
-/// The most that a scene may ask for; sample numbers beyond 2^31 would repeat random numbers.
+/// The maximum that a scene may ask for. Sample numbers beyond 2^31 would repeat random numbers.
 constexpr std::uint32_t kMaxSamples = 1u << 24;
 
 }  // namespace
@@ -15,7 +15,7 @@ void measureFor(const StopRule& stop, const Renderer& renderer, const std::stop_
 
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds) {
   const std::uint32_t samples = renderer.samples();
-  // The estimate counts from 16 samples on: fewer may be alike by chance.
+  // The estimate is used from 16 samples on, since fewer samples may be equal by chance.
   const auto errorMet = [&] {
     return stop.error > 0 && samples >= 16 && !renderer.errorTakesLong() &&
            renderer.estimatedError() <= stop.error;

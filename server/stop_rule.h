@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// When a picture is good enough: made from a scene's `stop`, for sessions and for pictures that are rendered
-// once.
+// When to stop rendering: made from a scene's `stop`, for sessions and for single renders.
 #pragma once
 #include <cstdint>
 
@@ -8,18 +7,18 @@
 
 namespace scolopax::server {
 
-/// Rendering ends when the first of these is met; 0 means no such limit.
+/// Rendering ends when the first of these limits is reached; 0 means no limit.
 struct StopRule {
   std::uint32_t samples = 0;
   double seconds = 0;
   double error = 0;
 };
 
-/// Makes the renderer measure what stopMet() needs but does not wait for. Throws Error(cancelled) soon after
-/// `cancel` is requested.
+/// Makes the renderer measure the error that stopMet() needs but does not wait for. Throws Error(cancelled)
+/// soon after `cancel` is requested.
 void measureFor(const StopRule& stop, const Renderer& renderer, const std::stop_token& cancel = {});
-/// Whether rendering ends, given the renderer's samples and error and the seconds spent. An error that would
-/// take long to estimate counts as not reached.
+/// Whether rendering ends, after `seconds`. An error limit counts as not reached if the error would take long
+/// to estimate.
 bool stopMet(const StopRule& stop, const Renderer& renderer, double seconds);
 
 }  // namespace scolopax::server

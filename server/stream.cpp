@@ -18,7 +18,7 @@ namespace scolopax::server {
 
 using protocol::ProtocolError;
 
-/// Text messages come one at a time, on any thread; frames come only from the encoder thread.
+/// Text messages arrive one at a time, on any thread; frames come only from the encoder thread.
 class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
  public:
   Stream(SessionStore& store, Background& background, const StreamHub::Options& options,
@@ -102,7 +102,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   void handle(const protocol::PatchMessage& message) {
     const EditOrigin origin{viewer_, message.id, std::nullopt};
     EditQueue::Edit edit;
-    // Kept as text, since parsed it would take many times the memory while it waits.
+    // Stored as text, because a parsed patch would take many times the memory while it waits.
     edit.apply = [session = session_, text = *received_, origin, &limits = options_.limits] {
       session->patch(std::get<protocol::PatchMessage>(protocol::parseClientMessage(text, limits)).patch,
                      origin);
@@ -120,7 +120,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   void handle(const protocol::AckMessage& message) {
     if (const auto socket = socket_.lock()) socket->acknowledge(message.frame);
   }
-  /// Answered in order with the edits, so that a pong shows that those before it have been applied or
+  /// Answered in order with the edits, so that a pong shows that all earlier edits have been applied or
   /// refused. Number 0 only asks whether the server responds.
   void handle(const protocol::PingMessage& message) {
     if (message.id == 0) return sendText(protocol::pongText(0));
@@ -165,8 +165,8 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
     });
   }
 
-  /// Calls `send`; if it fails for a reason that the client must not be told, ends the stream. The calling
-  /// thread serves other clients as well.
+  /// Calls `send`. If it throws, logs the cause, which the client must not see, and ends the stream. The
+  /// exception must not escape, because the calling thread serves other clients as well.
   template <class Send>
   void orEnd(Send&& send) {
     try {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One client's WebSocket on a session: text messages in, frames and texts out. Between net/ and Session.
+// A client's WebSocket on a session: receives text messages, sends frames and texts. Connects net/ with
+// Session.
 #pragma once
 #include <functional>
 #include <memory>
@@ -27,7 +28,7 @@ class StreamHub {
     nlohmann::json capabilities;  ///< for hello
     std::function<void(const std::string&)> log;
   };
-  /// `background` runs the measurements that edits wait for.
+  /// `background` runs the measurements for which edits wait.
   StreamHub(SessionStore& store, Background& background, Metrics& metrics, Options options);
   ~StreamHub();
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory of long answers from the time when they are ready until they have been sent. A client decides how
-// long that takes, so there is a limit for each and one for all. Between the handlers and the memory budget.
+// Accounts for the memory of long answers until they have been sent. The client determines how long that
+// takes, so there is a limit for each flow and one for all. Used by the handlers; charges the memory budget.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -10,19 +10,19 @@
 
 namespace scolopax::server {
 
-/// May be used from any thread. What take() returns may outlive this object.
+/// May be used from any thread. The result of take() may outlive this object.
 class UnsentAnswers {
  public:
-  /// What a flow may have unsent even if all together have more than they may.
+  /// Bytes that a flow may always have unsent, even if all flows together exceed their limit.
   static constexpr std::uint64_t kFairBytes = 1 << 20;
 
-  /// A quarter of the budget is for unsent answers, and half of that for those of one flow
-  /// (net::Request::flow). A null `memory` grants every request.
+  /// Unsent answers may take a quarter of the budget, and those of one flow (net::Request::flow) half of
+  /// that. With a null `memory` there is no limit.
   explicit UnsentAnswers(std::shared_ptr<MemoryBudget> memory);
 
-  /// To be kept until an answer of so many bytes has been sent; null if it has no more than
-  /// MemoryBudget::kFreeBytes. A flow may exceed its limit with a single answer. Throws Error(tooLarge) if
-  /// there is never memory for the answer, and Error(busy) if there is none now.
+  /// Reserves memory for an answer of so many bytes. To be kept until the answer has been sent; null if the
+  /// answer has no more than MemoryBudget::kFreeBytes. A flow may exceed its limit with a single answer.
+  /// Throws Error(tooLarge) if the answer can never fit, and Error(busy) if it does not fit now.
   std::shared_ptr<const void> take(const std::string& flow, std::uint64_t bytes) const;
 
  private:
