@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The device path draws what the CPU backend draws, bit for bit, in every instance of the kernels.
+// In every instance of the kernels, the device renders the same picture as the CPU backend, bit for bit.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,17 +21,17 @@ std::size_t differentPixels(const Image& a, const Image& b) {
   return count;
 }
 
-/// Fraction of the pixels that show anything.
+/// Fraction of the pixels that are not empty.
 double coverage(const Image& image) {
   const auto shown = std::count_if(image.pixels.begin(), image.pixels.end(),
                                    [](const glm::vec4& pixel) { return pixel.a > 0; });
   return double(shown) / double(image.pixels.size());
 }
 
-/// Compares every AOV, and what a pick in the middle finds.
+/// Compares every AOV and a pick in the middle.
 void expectSameRecords(const Renderer& cpu, const Renderer& device, const Scene& scene) {
   for (std::size_t a = 0; a < std::size(kAovs); ++a) {
-    if (Aov(a) == Aov::cost) continue;  // may differ
+    if (Aov(a) == Aov::cost) continue;  // costs may differ
     const std::vector<float> expected = cpu.aov(Aov(a)).values, found = device.aov(Aov(a)).values;
     ASSERT_EQ(found.size(), expected.size());
     std::size_t different = 0, known = 0;
@@ -52,10 +52,10 @@ void expectSameRecords(const Renderer& cpu, const Renderer& device, const Scene&
   }
 }
 
-/// Whether a device's counts of fetches and cells are those of the CPU.
+/// Whether a device counts the same fetches and cells as the CPU.
 enum class Counts { equal, fewer, atMost };
 
-/// Renders on both, compares pictures and counts, and with `record` also AOVs and a pick.
+/// Renders on both and compares pictures and counts; with `record`, also AOVs and a pick.
 void expectSameOnBoth(const std::shared_ptr<const Volume>& volume, const Scene& scene, int samples,
                       Counts counts = Counts::equal, bool record = false) {
   const auto cpu = makeCpuRenderer(volume, 1), device = makeCudaRenderer(volume);
@@ -72,7 +72,7 @@ void expectSameOnBoth(const std::shared_ptr<const Volume>& volume, const Scene& 
   if (record) expectSameRecords(*cpu, *device, scene);
 
   const RenderStats stats = cpu->stats(), counted = device->stats();
-  // The CPU takes several rays or points at once, and so looks at some that do not show.
+  // The CPU processes several rays or points at once, so it counts some that have no effect.
   if (hasStep(cpu->choice().method)) counts = Counts::atMost;
 #if defined(SCOLOPAX_HOST_KERNELS)
   if (counts == Counts::fewer) counts = Counts::equal;
@@ -92,7 +92,7 @@ void expectSameOnBoth(const std::shared_ptr<const Volume>& volume, const Scene& 
   EXPECT_GT(stats.fetches, 0u);
 }
 
-/// The substitute runtime always has a device; linked with CUDA's own, there may be none.
+/// The substitute runtime always has a device. Linked with CUDA's own runtime, there may be none.
 class DevicePicture : public testing::Test {
  protected:
   void SetUp() override {
@@ -101,7 +101,7 @@ class DevicePicture : public testing::Test {
 };
 class DevicePictures : public DevicePicture, public testing::WithParamInterface<Method> {};
 
-/// Calls f(scene) with scenes of every instance of an integrator's kernels.
+/// Calls f(scene) with a scene for every instance of an integrator's kernels.
 template <class F>
 void forEveryBlendModeAndLight(Scene scene, Method method, F&& f) {
   scene.method = method;
@@ -117,7 +117,7 @@ void forEveryBlendModeAndLight(Scene scene, Method method, F&& f) {
       }
 }
 
-// Sizes that fill the last blocks of threads and sizes that do not.
+// Sizes that fill the last blocks of threads, and sizes that do not.
 TEST_P(DevicePictures, AreThoseOfTheCpuInEveryBlendModeAndLight) {
   const auto mixed = mixedVolume(), withSign = signedVolume();
   forEveryBlendModeAndLight(obliqueScene(*mixed, 16, 16), GetParam(),
@@ -129,7 +129,7 @@ TEST_P(DevicePictures, AreThoseOfTheCpuInEveryBlendModeAndLight) {
                             [&](const Scene& each) { expectSameOnBoth(withSign, each, 2); });
 }
 
-// Of integers, of voxels that are not finite, and beside a channel without.
+// In a channel of integers and in one with voxels that are not finite, beside channels without it.
 TEST_P(DevicePictures, WithOpacityByTheGradientAreThoseOfTheCpuInEveryBlendModeAndLight) {
   const auto volume = mixedVolume();
   Scene scene = obliqueScene(*volume, 13, 11);
@@ -147,7 +147,8 @@ TEST_P(DevicePictures, WithOpacityByTheGradientAreThoseOfTheCpuInEveryBlendModeA
   expectSameOnBoth(volume, scene, 2, Counts::fewer);
 }
 
-// Trackers look closer at such cells; the CPU's, for which that is a loop of its own, track such rays twice.
+// Trackers use tighter bounds in such cells. On the CPU, which does that in a separate loop, such rays are
+// tracked twice.
 TEST_P(DevicePictures, OfThickCellsAreThoseOfTheCpu) {
   const auto volume = mixedVolume();
   for (const BlendMode blend : {BlendMode::density, BlendMode::max, BlendMode::composite}) {
@@ -163,7 +164,7 @@ TEST_P(DevicePictures, OfThickCellsAreThoseOfTheCpu) {
   }
 }
 
-/// A scene with a cubic channel, a channel of nearest voxels, a trilinear one, and surfaces of two.
+/// A scene with a cubic, a nearest-voxel and a trilinear channel, and surfaces of two of them.
 Scene sceneOfEverything(const Volume& volume) {
   Scene scene = obliqueScene(volume, 13, 11);
   scene.channels[0].interpolation = Interpolation::cubic;
@@ -193,7 +194,7 @@ TEST_P(DevicePictures, WithRecordsAreThoseOfTheCpu) {
   }
 }
 
-// From one face of voxel cells to the next.
+// Segments between faces of voxel cells.
 TEST_P(DevicePictures, AtStepZeroAreThoseOfTheCpuInEveryBlendModeAndLight) {
   if (!hasStep(GetParam())) GTEST_SKIP() << "the method has no step";
   const auto volume = mixedVolume();
@@ -220,7 +221,7 @@ TEST_F(DevicePicture, OfOnePixelAndOfThinStripsIsThatOfTheCpu) {
   }
 }
 
-// Which may be another one than on the CPU, where a sample costs something else.
+// The chosen method may differ from the CPU's, where samples have other costs.
 TEST_F(DevicePicture, OfMethodAutoIsThatOfTheMethodAndStepThatItHasChosen) {
   const auto volume = mixedVolume();
   for (const bool shadows : {false, true}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes that need every branch of the kernels.
+// Scenes that reach every branch of the kernels.
 #pragma once
 #include <string>
 
@@ -37,7 +37,7 @@ inline std::shared_ptr<const Volume> signedVolume() {
                   channelOf<std::uint16_t>(dims, [](int x, int y, int z) { return 700 * x + 40 * y * z; }));
 }
 
-/// Perspective, curves with several knots, gamma, three kinds of light.
+/// A perspective view, curves with several knots, gamma, three kinds of light.
 inline Scene obliqueScene(const Volume& volume, int width, int height) {
   Scene scene;
   scene.width = width;
@@ -71,8 +71,8 @@ inline Scene obliqueScene(const Volume& volume, int width, int height) {
   return scene;
 }
 
-/// A renderer on CUDA devices of whatever runtime the program is linked with. An error of a device is one of
-/// the renderer.
+/// A renderer on the CUDA devices of the runtime that the program is linked with. A device's error becomes an
+/// error of the renderer.
 inline std::unique_ptr<Renderer> makeCudaRenderer(const std::shared_ptr<const Volume>& volume,
                                                   const cuda::SharedDevices& devices) {
   return makeRenderer(cuda::makeCudaLauncher(devices, 1, {.continueOnCpu = false, .log = nullptr}), volume);

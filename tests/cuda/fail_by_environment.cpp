@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lets a test of the whole program have the device fail: at call number FAIL_CALL of the runtime.
+// Lets tests of the whole program make the device fail at call number FAIL_CALL of the runtime.
 #include <cstdlib>
 
 #include "tests/cuda/substitute_runtime.h"

@@ -15,7 +15,7 @@ namespace {
 
 using namespace test;
 
-/// Every test begins and ends with a runtime of which nothing is in use.
+/// Every test begins and ends with a runtime in which nothing is in use.
 class CudaLauncher : public testing::Test {
  protected:
   void SetUp() override { ASSERT_TRUE(substitute::reset()); }
@@ -25,7 +25,7 @@ class CudaLauncher : public testing::Test {
   }
 };
 
-/// Of one channel, so that there is little to upload.
+/// One channel, so that little is uploaded.
 Scene smallScene(const Volume& volume) {
   Scene scene = obliqueScene(volume, 16, 24);
   for (std::size_t i = 1; i < scene.channels.size(); ++i) scene.channels[i].visible = false;
@@ -65,7 +65,7 @@ TEST_F(CudaLauncher, ThatDoesNotFitTheDeviceSaysSoAndRendersOnceThereIsMemory) {
   const Image expected = pictureOfTheCpu(volume, scene);
   int failures = 0;
   bool fits = false;
-  // Every allocation in turn is the first that fails.
+  // Each allocation in turn fails first.
   for (std::size_t limit = 0; !fits; limit += 16384) {
     const auto renderer = makeCudaRenderer(volume);
     substitute::limitMemory(limit);
@@ -112,8 +112,8 @@ TEST_F(CudaLauncher, MakesRoomByForgettingVolumesThatNobodyRenders) {
   }
 }
 
-// Whichever call fails: either the device fails as a whole, and the picture is made on the CPU, or it is an
-// error of memory and the next attempt succeeds.
+// Whichever call fails, one of two things happens: the device fails as a whole and the CPU makes the picture,
+// or it is an error of memory and the next attempt succeeds.
 TEST_F(CudaLauncher, GoesOnOnTheCpuWhicheverCallFails) {
   const auto volume = mixedVolume();
   const Scene scene = smallScene(*volume);
@@ -127,7 +127,7 @@ TEST_F(CudaLauncher, GoesOnOnTheCpuWhicheverCallFails) {
                                  {.continueOnCpu = true, .log = [&](const std::string&) { ++lines; }}),
           volume);
     } catch (const Error&) {
-      return false;  // before there was a renderer
+      return false;  // failed before there was a renderer
     }
     substitute::failCall(call, cudaErrorIllegalAddress);
     const std::size_t before = substitute::callCount();
@@ -201,7 +201,7 @@ TEST_F(CudaLauncher, UploadsAVolumeOnceAndOnlyChannelsThatAreVisible) {
   EXPECT_TRUE(second->takesLong(scene));
   rendered(*second, scene, 1);
   EXPECT_GE(moved(), plane);
-  // A channel of which nothing can be seen is not needed.
+  // A channel of which nothing is visible is not needed.
   const auto third = makeCudaRenderer(otherVolume, devices);
   Scene transparent = scene;
   transparent.channels[1].opacity = {{0, 0}};
@@ -211,7 +211,7 @@ TEST_F(CudaLauncher, UploadsAVolumeOnceAndOnlyChannelsThatAreVisible) {
   transparent.channels[1].opacity = {{0, 1}};
   EXPECT_TRUE(third->takesLong(transparent));
   moved();
-  // The camera alone.
+  // Only the camera changes.
   scene.camera.eye.x += 1;
   EXPECT_FALSE(second->takesLong(scene));
   rendered(*second, scene, 1);
@@ -248,7 +248,7 @@ TEST_F(CudaLauncher, ContinuesWhereACancelledPassEnded) {
   EXPECT_EQ(renderer->samples(), 0u);
   int slices = 1;
   while (!renderer->renderSample(kNever, std::chrono::nanoseconds(1)) && slices < 100) ++slices;
-  // A pass whose time is over renders nothing.
+  // A pass without time left renders nothing.
   EXPECT_EQ(slices, 100);
   for (int i = 0; i < 2; ++i) ASSERT_TRUE(renderer->renderSample(kNever));
   expectSamePicture(renderer->image(), pictureOfTheCpu(volume, scene));

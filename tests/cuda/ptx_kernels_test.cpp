@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The compiled kernels themselves: all there, and every access of theirs checked.
+// Tests of the compiled kernels: none is missing, and all of their memory accesses are checked.
 #include <gmock/gmock.h>
 
 #include "tests/cuda/device_scenes.h"
@@ -13,8 +13,9 @@ namespace {
 using namespace test;
 
 TEST(PtxKernels, AreOneForEveryMethodBlendModeAndLight) {
-  // auto is one of the others; raymarch and hybrid share two, for equal steps and for voxel cells. Of each
-  // there is one with light and one without, and another of both for plain scenes. One more rebuilds totals.
+  // auto uses the other methods. raymarch and hybrid share two kernels, for equal steps and for voxel cells.
+  // Each kernel exists with and without light, and both again for plain scenes. One more kernel rebuilds
+  // totals.
   EXPECT_EQ(ptx::kernelNames().size(), (std::size(kMethods) - 1) * std::size(kBlendModes) * 2 * 2 + 1);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What translated PTX (ptx_to_cpp.py) is built from: registers, instructions with a meaning of their own, and
-// memory of which every access is checked.
+// The parts from which translated PTX (ptx_to_cpp.py) is built: registers, instructions without a C++
+// equivalent, and memory whose accesses are all checked.
 #pragma once
 #include <bit>
 #include <cmath>
@@ -16,7 +16,7 @@
 
 namespace ptx {
 
-// Untyped registers: every instruction says what it reads their bits as.
+// Untyped registers: every instruction states the type as which it reads their bits.
 union Register16 {
   std::uint8_t u8;
   std::int8_t s8;
@@ -49,7 +49,7 @@ struct Index {
   unsigned x, y, z;
 };
 
-/// A stretch of memory that a thread may use.
+/// A range of memory that a thread may use.
 struct Range {
   std::uint64_t begin, end;
   bool holds(std::uint64_t address, std::size_t size) const {
@@ -59,7 +59,7 @@ struct Range {
 
 struct Frame;
 
-/// One thread of a grid: where it stands, and what it may touch.
+/// One thread of a grid: its position, and the memory that it may access.
 struct Thread {
   Index tid, ntid, ctaid, nctaid;
   std::span<const Range> global;      ///< allocations and tables, by address
@@ -74,7 +74,7 @@ struct Frame {
       : thread(owner),
         range{reinterpret_cast<std::uint64_t>(bytes), reinterpret_cast<std::uint64_t>(bytes) + kSize},
         outer(owner.local) {
-    std::memset(bytes, 0xa5, kSize);  // what is read before it is written shows in the picture
+    std::memset(bytes, 0xa5, kSize);  // reading uninitialised memory changes the picture
     thread.local = this;
   }
   Frame(const Frame&) = delete;
@@ -84,14 +84,14 @@ struct Frame {
   const Frame* outer;
 };
 
-/// An access outside of what the thread may use, or not aligned.
+/// An access outside of the memory that the thread may use, or one that is not aligned.
 struct Fault : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
 using Function = void (*)(Thread& thread, std::byte* result, const std::byte* const* arguments);
 
-/// Makes itself known under its name when the program starts.
+/// Registers a kernel under its name when the program starts.
 struct Kernel {
   Kernel(const char* name, Function run, std::vector<std::size_t> parameterSizes, unsigned maxThreads);
   std::string name;
@@ -110,7 +110,8 @@ struct Table {
   Table(const void* values, std::size_t size);
 };
 
-/// Throws Fault unless the address is a multiple of the size, a power of two; of a vector, its whole size.
+/// Throws Fault unless the address is a multiple of the size, a power of two. The size of a vector is its
+/// whole size.
 inline void checkAlignment(std::uint64_t address, std::size_t size) {
   if (address % size != 0) throw Fault("misaligned address");
 }
@@ -144,7 +145,7 @@ void store(const Thread& thread, std::uint64_t address, T value) {
 inline float floatOf(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 inline double doubleOf(std::uint64_t bits) { return std::bit_cast<double>(bits); }
 
-/// A whole float as an integer: to the nearest there is; 0 for NaN.
+/// A whole float as an integer: the nearest representable one; 0 for NaN.
 template <class Integer, class Float>
 Integer saturate(Float x) {
   using Limits = std::numeric_limits<Integer>;
@@ -154,7 +155,7 @@ Integer saturate(Float x) {
   return Integer(x);
 }
 
-/// Of a number and NaN, the number; -0 is below +0.
+/// If one operand is NaN, the result is the other one; -0 is below +0.
 template <class T>
 T minimum(T a, T b) {
   if constexpr (std::is_floating_point_v<T>) {
@@ -191,8 +192,8 @@ T reverseBits(T a) {
   return reversed;
 }
 
-/// `length` low bits of `field` in the place of those of `into` from `position` on; what is beyond is left
-/// out.
+/// Inserts the `length` low bits of `field` into `into` from bit `position` on. Bits beyond the register are
+/// dropped.
 template <class T>
 T insertBits(T field, T into, std::uint32_t position, std::uint32_t length) {
   for (std::uint32_t i = 0; i < (length & 0xff) && (position & 0xff) + i < sizeof(T) * 8; ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Launches translated PTX: what host code compiled by clang or nvcc calls to make its kernels known and to
-// start them, and the memory that a thread may touch.
+// Launches translated PTX: the functions that host code compiled by clang or nvcc calls to register and
+// launch its kernels, and the memory that a thread may access.
 #include <algorithm>
 #include <cstdlib>
 #include <map>
@@ -10,7 +10,7 @@
 
 namespace {
 
-// Functions instead of variables: other files' objects register themselves before main.
+// Functions instead of variables, because objects of other files register themselves before main.
 std::map<std::string, const ptx::Kernel*>& kernels() {
   static std::map<std::string, const ptx::Kernel*> all;
   return all;
@@ -118,8 +118,8 @@ cudaError_t cudaLaunchKernel(const void* function, dim3 grid, dim3 block, void**
       });
 }
 
-// What compilers put into host objects, by NVIDIA's binary interface. The module itself is not looked at: the
-// translated kernels are found by name.
+// The functions that compilers call in host objects, by NVIDIA's binary interface. The module itself is not
+// used: the translated kernels are found by name.
 void** __cudaRegisterFatBinary(void*) {
   static void* handle = nullptr;
   return &handle;
@@ -132,7 +132,7 @@ void __cudaRegisterFunction(void**, const char* hostFunction, char*, const char*
   hostFunctions()[hostFunction] = kernelName;
 }
 
-// Of kernels that are called like functions, which cuda/ never does; referred to all the same.
+// For kernels that are called like functions. cuda/ never does that, but the symbol is referenced.
 unsigned __cudaPushCallConfiguration(dim3, dim3, size_t, cudaStream_t) { std::abort(); }
 cudaError_t __cudaPopCallConfiguration(dim3*, dim3*, size_t*, void*) { std::abort(); }
 cudaError_t __cudaGetKernel(void**, const void*) { std::abort(); }

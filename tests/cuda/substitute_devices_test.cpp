@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The substitute runtime: kernels, and several devices beside each other.
+// The substitute runtime: kernels, and several devices at the same time.
 #include <cuda_runtime.h>
 #include <tbb/global_control.h>
 

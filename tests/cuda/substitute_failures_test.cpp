@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The substitute runtime: what fails on request, and what it leaves behind.
+// The substitute runtime: failures on request, and the state after them.
 #include <functional>
 
 #include "tests/cuda/substitute_objects.h"
@@ -9,7 +9,7 @@ namespace {
 
 using SubstituteFailures = SubstituteTest;
 
-/// A call of every function, as a launcher could make them. Returns the first error, and ends with it.
+/// Calls every function, as a launcher could. Stops at the first error and returns it.
 cudaError_t callEverything() {
   cudaError_t first = cudaSuccess;
   const auto ok = [&](cudaError_t result) { return (first = result) == cudaSuccess; };

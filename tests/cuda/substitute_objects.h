@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Owners of what the substitute runtime gives, and short names for what its tests do with them.
+// Owners of the objects of the substitute runtime, and helpers for its tests.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ using Event = std::unique_ptr<CUevent_st, Frees<cudaEventDestroy>>;
 
 inline constexpr int kPoisonInt = int(0xcdcdcdcd);
 
-// These return null after a failure.
+// The following functions return null after a failure.
 inline DeviceInts deviceInts(std::size_t count) {
   void* memory = nullptr;
   cudaMalloc(&memory, count * sizeof(int));
@@ -54,14 +54,14 @@ inline cudaError_t download(const PinnedInts& to, const DeviceInts& from, std::s
                             const Stream& stream) {
   return cudaMemcpyAsync(to.get(), from.get(), count * sizeof(int), cudaMemcpyDeviceToHost, stream.get());
 }
-/// What a blocking copy finds in device memory.
+/// The contents of device memory, by a blocking copy.
 inline std::vector<int> contents(const DeviceInts& memory, std::size_t count) {
   std::vector<int> found(count);
   EXPECT_EQ(cudaMemcpy(found.data(), memory.get(), count * sizeof(int), cudaMemcpyDeviceToHost), cudaSuccess);
   return found;
 }
 
-/// Leaves the runtime as it found it, and nothing alive.
+/// Restores the runtime's initial state, and checks that nothing is left alive.
 class SubstituteTest : public testing::Test {
  protected:
   ~SubstituteTest() override { EXPECT_TRUE(reset()) << "something is still alive"; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The CUDA runtime as tests need it: devices, memory and errors.
+// A substitute of the CUDA runtime for tests: devices, memory and errors.
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
@@ -12,8 +12,8 @@ using namespace substitute;
 
 namespace {
 
-/// Memory with kPoison in it; null if there is none. The size is not rounded up: a sanitizer sees the first
-/// byte beyond it.
+/// Memory filled with kPoison; null if there is none. The size is not rounded up, so that a sanitizer detects
+/// an access to the first byte beyond it.
 std::byte* allocate(std::size_t sizeBytes) {
   void* memory = nullptr;
   if (posix_memalign(&memory, 256, sizeBytes) != 0) return nullptr;
@@ -21,7 +21,7 @@ std::byte* allocate(std::size_t sizeBytes) {
   return static_cast<std::byte*>(memory);
 }
 
-/// The allocation that begins here. Throws Failure(cudaErrorInvalidValue) if there is none.
+/// The allocation that begins at this address. Throws Failure(cudaErrorInvalidValue) if there is none.
 Memory expectAllocation(const Heap& heap, const void* memory) {
   const auto allocation = heap.find(static_cast<const std::byte*>(memory));
   if (allocation == heap.end()) throw Failure{cudaErrorInvalidValue};

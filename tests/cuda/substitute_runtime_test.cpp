@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The substitute runtime's streams: a launcher that would be wrong on a device has to be wrong on them, too.
+// The substitute runtime's streams. A launcher that would fail on a device must also fail here.
 #include <atomic>
 #include <thread>
 
@@ -69,7 +69,7 @@ TEST_F(SubstituteStreams, AreInOrderOnlyWhereEventsSaySo) {
   EXPECT_EQ(cudaStreamWaitEvent(second.get(), uploaded.get()), cudaSuccess);
   download(to, memory, 1, second);
   launchHost(first.get(), [&] { laterWorkRan = true; });
-  cudaEventRecord(uploaded.get(), first.get());  // the wait stays for what it was called for
+  cudaEventRecord(uploaded.get(), first.get());  // the wait is still for the first record
   cudaStreamSynchronize(second.get());
   EXPECT_EQ(to[0], 1);
   EXPECT_FALSE(laterWorkRan);

@@ -13,7 +13,8 @@ namespace {
 std::mutex mutex;  // of the state
 std::atomic<unsigned> epoch = 0;
 
-// Kernels report faults from several threads, while the call that runs them holds the other lock.
+// A separate mutex, because kernels report faults from several threads while the call that runs them holds
+// the other one.
 struct Faults {
   std::mutex mutex;
   std::string last;
@@ -43,7 +44,7 @@ Leaks countLeaks() {
   return {now.deviceMemory.size(), now.pinnedMemory.size(), std::size_t(streams), now.events.size()};
 }
 
-/// Counts a call; whether it is to fail.
+/// Counts a call; returns whether it must fail.
 bool isToFail() { return ++state().calls == state().failingCall; }
 
 cudaError_t returned(cudaError_t error) {
@@ -60,7 +61,7 @@ cudaError_t errorOf(const std::function<void()>& body) {
   return cudaSuccess;
 }
 
-/// What the next operation will write holds nothing from now on.
+/// Poisons the memory that the next operation will write.
 void poisonNextResult(const CUstream_st& stream) {
   if (!stream.queue.empty()) std::ranges::fill(stream.queue.front().result, kPoison);
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the files of the substitute runtime share. Device memory is host memory with bounds that are known.
-// Work on a stream waits in a queue until something waits for it: then it runs in the calling thread.
+// Shared by the files of the substitute runtime. Device memory is host memory with known bounds. Work on a
+// stream stays in a queue until something waits for it. Then it runs in the calling thread.
 //
-// It is stricter than CUDA where launchers should not rely on more:
+// It is stricter than CUDA in these ways, on which launchers should not rely:
 // - asynchronous copies need pinned memory (cudaHostAlloc);
 // - device memory is used by its own device only;
 // - streams and events that nobody waits for make no progress;
@@ -18,12 +18,12 @@
 
 namespace substitute {
 
-/// Ends a call of the runtime, which returns the error.
+/// Thrown to end a call of the runtime, which returns the error.
 struct Failure {
   cudaError_t error;
 };
 
-/// A place in a stream's queue, marked by cudaEventRecord.
+/// A position in a stream's queue, marked by cudaEventRecord.
 struct Record {
   CUstream_st* stream;  ///< valid until it is reached
   bool reached = false;
@@ -33,10 +33,11 @@ struct Record {
 /// Work in a stream's queue. Every member may be empty.
 struct Operation {
   std::function<void()> run{};
-  std::shared_ptr<Record> after{};      ///< has to be reached first
-  std::shared_ptr<Record> reaches{};    ///< is reached when this has run
+  std::shared_ptr<Record> after{};      ///< must be reached first
+  std::shared_ptr<Record> reaches{};    ///< reached when this has run
   std::span<const std::byte> source{};  ///< pinned memory that it reads
-  /// Poisoned when the operation becomes the next in its stream. Not earlier: those before it may read that.
+  /// Poisoned when the operation becomes the next in its stream, not earlier, because earlier operations may
+  /// read it.
   std::span<std::byte> result{};
 };
 
@@ -44,7 +45,7 @@ struct Operation {
 
 struct CUstream_st {
   int device;
-  bool nonBlocking = true;  ///< does not wait for the default stream, nor that for this
+  bool nonBlocking = true;  ///< it and the default stream do not wait for each other
   bool destroyed = false;   ///< lives until its queue is empty
   std::deque<substitute::Operation> queue{};
 };
@@ -52,7 +53,7 @@ struct CUstream_st {
 struct CUevent_st {
   int device;
   bool timed;
-  std::shared_ptr<substitute::Record> record{};  ///< the last
+  std::shared_ptr<substitute::Record> record{};  ///< the last one
 };
 
 namespace substitute {
@@ -74,30 +75,30 @@ struct State {
   std::deque<Device> devices;  ///< at least deviceCount, so that what is on them can be freed
   int deviceCount = 1;
   cudaError_t deviceCountResult = cudaSuccess;
-  std::size_t limit = std::size_t(1) << 32;  ///< of devices to come
+  std::size_t limit = std::size_t(1) << 32;  ///< of devices added later
   Heap deviceMemory, pinnedMemory;
   std::vector<std::unique_ptr<CUstream_st>> streams;
   std::vector<std::unique_ptr<CUevent_st>> events;
   std::size_t calls = 0, failingCall = 0;
   cudaError_t failure = cudaSuccess;
   std::size_t bytesToDevice = 0, freesThatWaited = 0;
-  std::mt19937 random{1};  ///< what order of blocks and streams is tried
+  std::mt19937 random{1};  ///< chooses the order of blocks and streams
 };
 
-/// To be used within call(), release() and locked() only.
+/// To be used only within call(), release() and locked().
 State& state();
 
-/// Makes a call of the runtime: counts it, and fails it if a test asked for that. No two calls run at once.
-/// Returns the Failure that the body throws, and keeps it as the thread's last error.
+/// Runs a call of the runtime: counts it, and lets it fail if a test has requested that. Calls run one at a
+/// time. Returns the Failure that the body throws, and stores it as the thread's last error.
 cudaError_t call(const std::function<void()>& body);
-/// The same for calls that free something: the body is run even if the call is to fail.
+/// The same for calls that free something: the body runs even if the call must fail.
 cudaError_t release(const std::function<void()>& body);
-/// What is not a call of the runtime, but must not run beside one.
+/// Runs code that is not a call of the runtime, but must not run at the same time as one.
 void locked(const std::function<void()>& body);
 
-/// What is each thread's own.
+/// The state of each thread.
 struct Caller {
-  unsigned epoch = 0;  ///< of reset()
+  unsigned epoch = 0;  ///< number of resets that the thread has seen
   int device = 0;
   cudaError_t lastError = cudaSuccess;
 };
@@ -105,31 +106,32 @@ Caller& caller();
 
 /// Throws Failure(cudaErrorIllegalAddress) if the device is lost.
 void expectAlive(int device);
-/// Throws Failure(cudaErrorInvalidDevice) if there is no such device, and expectAlive().
+/// Throws Failure(cudaErrorInvalidDevice) if there is no such device; otherwise as expectAlive().
 Device& deviceOf(int number);
-/// The calling thread's device, as deviceOf().
+/// The calling thread's device; throws as deviceOf().
 Device& currentDevice();
 /// Throws Failure(cudaErrorIllegalAddress) once after a fault.
 void surfaceFault(int device);
 
-/// The allocation that holds all of these bytes; null if there is none.
+/// The allocation that contains all of these bytes; null if there is none.
 const Memory* allocationOf(const Heap& heap, const void* memory, std::size_t sizeBytes);
-/// Throws Failure(cudaErrorInvalidValue) unless all of these bytes are of one allocation on the device.
+/// Throws Failure(cudaErrorInvalidValue) unless one allocation on the device contains all of these bytes.
 void expectOnDevice(const void* memory, std::size_t sizeBytes, int device);
 
 bool overlap(std::span<const std::byte> a, std::span<const std::byte> b);
 
 /// Work on a default stream runs at once.
 void enqueue(CUstream_st& stream, Operation operation);
-/// Runs one operation: the stream's next, or one that this waits for. The queue must not be empty.
+/// Runs one operation: the stream's next one, or one for which it waits. The queue must not be empty.
 void step(CUstream_st& stream);
-/// Runs all that is queued, and what it waits for.
+/// Runs all queued operations, and those for which they wait.
 void finish(CUstream_st& stream);
-/// The same for all streams of a device, in turns. Whether anything was queued.
+/// The same for all streams of a device, in turns. Returns whether anything was queued.
 bool finishDevice(int device);
-/// Runs what is queued for the copies that use this pinned memory. Whether there were any.
+/// Runs the queued copies that use this pinned memory, and all operations before them. Returns whether there
+/// were any.
 bool finishUsersOf(std::span<const std::byte> pinned);
-/// What the default stream waits for: the streams that are not non-blocking.
+/// The streams for which the default stream waits: all except non-blocking ones.
 void finishBlockingStreams(int device);
 void reach(Record& record);
 

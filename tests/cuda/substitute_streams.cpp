@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The CUDA runtime as tests need it: streams, events, and what is queued on streams.
+// A substitute of the CUDA runtime for tests: streams, events, and the operations queued on streams.
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -14,8 +14,8 @@ using namespace substitute;
 
 namespace {
 
-/// The stream behind a handle, null being the current device's default stream. Throws
-/// Failure(cudaErrorInvalidResourceHandle) if there is none, and expectAlive().
+/// The stream of a handle; null is the current device's default stream. Throws
+/// Failure(cudaErrorInvalidResourceHandle) if there is none; otherwise as expectAlive().
 CUstream_st& streamOf(cudaStream_t handle) {
   if (!handle) return currentDevice().defaultStream;
   for (const auto& stream : state().streams) {
@@ -34,7 +34,7 @@ auto placeOf(cudaEvent_t handle) {
   return place;
 }
 
-/// As streamOf().
+/// The event of a handle; throws as streamOf().
 CUevent_st& eventOf(cudaEvent_t handle) {
   CUevent_st& event = **placeOf(handle);
   expectAlive(event.device);
@@ -56,7 +56,7 @@ bool fits(dim3 grid, dim3 block) {
          grid.z <= 65535;
 }
 
-/// Whether a queued copy will still read some of this pinned memory.
+/// Whether a queued copy will read a part of this pinned memory.
 bool isStillRead(std::span<const std::byte> memory) {
   return std::ranges::any_of(state().streams, [&](const auto& stream) {
     return std::ranges::any_of(stream->queue,
@@ -77,7 +77,7 @@ void runBlocks(dim3 grid, const std::function<void(uint3 blockIndex)>& runBlock)
   std::vector<std::size_t> order(std::size_t(grid.x) * grid.y * grid.z);
   std::iota(order.begin(), order.end(), std::size_t(0));
   std::shuffle(order.begin(), order.end(), state().random);
-  // Isolated: a thread that waits here must not take up work that calls the runtime.
+  // Isolated, because a thread that waits here must not start work that calls the runtime.
   tbb::this_task_arena::isolate([&] {
     tbb::parallel_for(std::size_t(0), order.size(), [&](std::size_t n) {
       const std::size_t i = order[n];
@@ -142,7 +142,7 @@ cudaError_t cudaMemcpyAsync(void* to, const void* from, size_t sizeBytes, cudaMe
     };
     copy.result = {static_cast<std::byte*>(to), sizeBytes};
     if (upload) copy.source = {static_cast<const std::byte*>(from), sizeBytes};
-    // Only copies read pinned memory, so it can mostly be poisoned at once, whatever is queued.
+    // Only copies read pinned memory, so it can usually be poisoned at once, whatever else is queued.
     if (!upload && !isStillRead(copy.result)) std::memset(to, int(kPoison), sizeBytes);
     enqueue(stream, std::move(copy));
   });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plan on device 0, for tests that start kernels themselves.
+// A plan on device 0, for tests that launch kernels themselves.
 #pragma once
 #include <memory>
 #include <span>
@@ -12,7 +12,7 @@
 
 namespace scolopax::test {
 
-/// Pixels in device memory of no more than their size, so that an access behind them is seen.
+/// Pixels in device memory of exactly their size, so that an access beyond them is detected.
 class ExactPixels {
  public:
   explicit ExactPixels(std::size_t count) {
@@ -42,7 +42,7 @@ class UploadedPlan {
     scene_.emplace(plan_, volume_, *memory_, uploader_);
   }
   const RenderPlan& plan() const { return *plan_; }
-  /// The first sample of the whole picture.
+  /// Renders the first sample of the whole picture.
   cuda::DeviceBand band(glm::vec4* pixels) const {
     return {scene_->viewOf(plan_->view()),
             sampleNumber(plan_->scene().sampling, 0),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The instance that the other controls break, unbroken.
+// The unchanged instance, which the other controls break.
 #include <gtest/gtest.h>
 
 #include "tests/cuda/controls/one_instance.h"

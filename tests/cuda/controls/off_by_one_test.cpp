@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Linked with a kernel whose guard lets one row too many through: the checked memory has to notice.
+// Linked with a kernel whose guard admits one row too many. The checked memory must detect it.
 #include <gmock/gmock.h>
 
 #include "renderer/core/error.h"

@@ -10,7 +10,7 @@ namespace scolopax::test {
 
 int differenceOfOneInstance() {
   const auto volume = mixedVolume();
-  Scene scene = obliqueScene(*volume, 21, 35);  // of no size that blocks of threads fill
+  Scene scene = obliqueScene(*volume, 21, 35);  // not a multiple of the blocks of threads
   scene.method = Method::syncDda;
   scene.shading = scene.shadows = true;
   const UploadedPlan uploaded(volume, scene);

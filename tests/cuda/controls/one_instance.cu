@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One instance of the kernels, for builds that are wrong on purpose.
+// One instance of the kernels, for intentionally wrong builds.
 #define SCOLOPAX_PLAIN_SCENES
 #include "tests/cuda/controls/one_instance.h"
 

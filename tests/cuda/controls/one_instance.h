@@ -7,7 +7,7 @@ namespace scolopax::test {
 /// sync-dda, density, shading and shadows.
 cuda::LaunchFunction oneInstance();
 
-/// Renders a scene that asks for that instance; returns how many of the pixels differ from the CPU's.
+/// Renders a scene with that instance; returns the number of pixels that differ from the CPU's.
 int differenceOfOneInstance();
 
 }  // namespace scolopax::test

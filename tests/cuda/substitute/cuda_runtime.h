@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kernel language for compilers that come without CUDA's headers. clang in CUDA mode: attributes and
-// special registers. A plain C++ compiler: kernels are functions, and cudaLaunchKernel calls them.
+// The kernel language for compilers without CUDA's headers. For clang in CUDA mode: attributes and special
+// registers. For a plain C++ compiler: kernels are functions, which cudaLaunchKernel calls.
 #pragma once
-// First, because clang's own wrapper of <new> wants malloc declared.
+// Included first, because clang's wrapper of <new> needs the declaration of malloc.
 #include <stdlib.h>
 
 #include "cuda_runtime_api.h"
@@ -14,7 +14,7 @@
 #define __global__ __attribute__((global))
 #define __launch_bounds__(...) __attribute__((launch_bounds(__VA_ARGS__)))
 #define __CUDACC__ 1
-#define CUDA_VERSION 11000  // GLM asks; unused
+#define CUDA_VERSION 11000  // needed by GLM, otherwise unused
 
 // Reading a member reads the register.
 #define SUBSTITUTE_REGISTER(name)                                                        \

@@ -37,7 +37,7 @@ struct dim3 {
   constexpr dim3(unsigned width = 1, unsigned height = 1, unsigned depth = 1)
       : x(width), y(height), z(depth) {}
 };
-/// As in CUDA 13; what is unnamed here is left 0.
+/// As in CUDA 13. Unnamed members are 0.
 struct cudaDeviceProp {
   char name[256];
   char unused1[32];
