@@ -197,7 +197,7 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// Counts and errors of a first picture, which also warms up.
+/// Counts and errors of a first picture, which also warms up the renderer.
 ordered_json describe(const json& setting, const Data& data, const Drawn& drawn) {
   const auto number = [](const std::optional<double>& value) {
     return value ? ordered_json(*value) : ordered_json();
@@ -222,7 +222,8 @@ void run(const std::string& sceneFile, const std::string& settingsFile,
   const auto resolved = resolveScene({sceneFile, files, {}});
   Data data{resolved->dataset->volume, resolved->render};
   data.scene.filter = PixelFilter::point;
-  const auto held = sharedMacrocells(data.volume, data.scene.macrocell);  // so that they are measured once
+  const auto held =
+      sharedMacrocells(data.volume, data.scene.macrocell);  // keeps them, so that they are built once
   std::ifstream file(settingsFile);
   const json all = json::parse(file);
   const json& settings = all.at("settings");

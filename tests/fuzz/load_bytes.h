@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the loaders' fuzz targets share: bytes as a file of a given name, loaded under a small limit.
+// Shared by the fuzz targets of the loaders: loads bytes as a file with a given name, with a small memory
+// limit.
 #pragma once
 #include <fcntl.h>
 #include <stdlib.h>
@@ -14,7 +15,7 @@
 
 namespace scolopax::fuzz {
 
-/// A folder of this process, made once and removed at its end.
+/// A folder of this process, which is removed when the process ends.
 inline const std::filesystem::path& folder() {
   struct Folder {
     std::filesystem::path path;
@@ -35,7 +36,7 @@ inline void writeFile(const std::string& name, const std::uint8_t* bytes, std::s
   if (!written) ::abort();
 }
 
-/// Anything but a volume or a scolopax::Error is a finding. What loads must also be measured.
+/// Any result other than a volume or a scolopax::Error is a finding. A volume is also measured.
 inline void load(const std::string& name) {
   constexpr std::uint64_t kLimit = std::uint64_t(64) << 20;
   const std::filesystem::path paths[] = {folder() / name};

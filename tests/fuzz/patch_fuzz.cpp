@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as scene, patch and message: nothing but the protocol's own error comes out, and what is taken
-// keeps the promises of patch.h.
+// Any bytes as scene, patch and message: the only exception is the protocol's error, and accepted input keeps
+// the promises of patch.h.
 #include <cstdint>
 #include <cstdlib>
 #include <nlohmann/json.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The first byte picks the sidecar's kind; the rest is the sidecar, beside a small data file that it may
+// The first byte selects the kind of sidecar; the rest is the sidecar, for a small data file that it may
 // name.
 #include "tests/fuzz/load_bytes.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sampling rate of every macrocell: that of section 6.2 of Knoll et al. 2009, and one from bounds of the
-// error of linear interpolation.
+// The sampling rate of every macrocell: by section 6.2 of Knoll et al. 2009, and by bounds of the error of
+// linear interpolation.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -23,9 +23,9 @@ struct Moments {
   double variance() const { return std::max(0.0, squares / count - (sum / count) * (sum / count)); }
 };
 
-/// For every macrocell, that only each M-th sample of a StepLaw is taken in it: M = 2 / m + 1, with m the
-/// standard deviation of the cell's voxels relative to that of all voxels. T(x) stays as it is, for every x
-/// is a whole number, so that Eq. 19's increments are not needed.
+/// For every macrocell, M such that only each M-th sample of a StepLaw is taken in it: M = 2 / m + 1, where m
+/// is the standard deviation of the cell's voxels relative to that of all voxels. T(x) is not changed: every
+/// x is a whole number, so the increments of Eq. 19 are not needed.
 inline std::vector<int> cellRates(const Channel& channel, glm::ivec3 dims, int size) {
   const glm::ivec3 cells = macrocellsOf(dims, size);
   constexpr double kMost = 1 << 20;  // of a cell without variance; a step ends with its cell
@@ -54,7 +54,7 @@ inline std::vector<int> cellRates(const Channel& channel, glm::ivec3 dims, int s
   return rates;
 }
 
-/// The largest slopes, by the value, of a channel's extinction and of what it emits, between two values.
+/// The largest slopes of a channel's extinction and emission, as functions of the value, between two values.
 inline double largestSlope(const ChannelAppearance& look, double low, double high) {
   const double size = look.rangeHi - look.rangeLo;
   const auto positionOf = [&](double value) { return std::clamp((value - look.rangeLo) / size, 0.0, 1.0); };
@@ -80,11 +80,11 @@ inline double largestSlope(const ChannelAppearance& look, double low, double hig
   return look.density * (opacity + opaque * color) / std::abs(size);
 }
 
-/// For every macrocell, the number of steps of this length (world units) that may be taken at once: scalars
-/// are then taken to be linear over a way h, which is wrong by up to h^2 / 8 times their second derivative
-/// along the ray. That is bounded by differences of voxels along the axes, which are the kinks at the faces
-/// of cells, and mixed ones: f = xy has none along the axes. The error of the extinction and of what is
-/// emitted over the way of a voxel is at most `tolerance`.
+/// For every macrocell, the number of steps of this length (world units) that may be taken at once: the
+/// scalar is then assumed to be linear over a length h, which is wrong by up to h^2 / 8 times its second
+/// derivative along the ray. That derivative is bounded by differences of voxels along the axes (the kinks at
+/// the faces of cells), and by mixed differences, since f = xy has none along the axes. The error of the
+/// extinction and emission over the length of a voxel is at most `tolerance`.
 inline std::vector<int> boundedRates(const Channel& channel, const Grid& grid, int size,
                                      const ChannelAppearance& look, double step, double tolerance) {
   const glm::ivec3 dims = grid.dims, cells = macrocellsOf(dims, size);

@@ -36,8 +36,8 @@ class PeakTable {
   static constexpr int kBins = 128, kMost = 4;
 
   /// `most`: of the peaks of one segment, at most kMost. The paper does not say to which bin a peak at a
-  /// bin's edge or inside one belongs. Here the peaks in the bins of both ends are included: those that are
-  /// not crossed fail the rule of signs, but none in reach is lost to the rounding to bins.
+  /// bin's edge or inside one belongs. Here the peaks in the bins of both ends are included: peaks that are
+  /// not crossed fail the rule of signs, and rounding to bins loses none that is crossed.
   PeakTable(std::vector<PeakSurface> surfaces, int most)
       : surfaces_(std::move(surfaces)), entries_(std::size_t(kBins) * kBins) {
     for (int front = 0; front < kBins; ++front)
@@ -53,7 +53,7 @@ class PeakTable {
       }
   }
 
-  /// Calls visit(surface) for the peaks of a segment, in order. Returns whether there is any.
+  /// Calls visit(surface) for the peaks of a segment, in order. Returns whether there are any.
   template <class Visit>
   bool visit(float front, float back, Visit&& visit) const {
     const int f = binOf(front), b = binOf(back);

@@ -12,10 +12,10 @@
 namespace scolopax::peaks {
 
 /// Means of extinction and colour over all values between those at the front and the back of a segment, in a
-/// table of size x size entries. The scalar is taken to be linear along the segment, and absorption within
-/// the segment is ignored when colours are averaged. So the table holds for segments of any length. Entries
-/// come from exact integrals of the curves, and a look-up interpolates between four of them, as texture units
-/// do: the best that a table of this size can be.
+/// table of size x size entries. The scalar is assumed to be linear along the segment, and absorption within
+/// the segment is ignored when colours are averaged, so the table is valid for segments of any length.
+/// Entries come from exact integrals of the curves, and a look-up interpolates between four of them, as
+/// texture units do: the best that a table of this size can be.
 class PreintegratedTable {
  public:
   struct Mean {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The ray caster of Knoll et al. 2009: postclassification or preintegration, peak finding, and sampling by a
-// StepLaw, for one channel. One ray at a time, as the paper's shader, after its Algorithm 1.
+// StepLaw, for one channel. One ray at a time, like the paper's shader, following its Algorithm 1.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -80,8 +80,8 @@ class RayCaster {
 
   bool ended(const Path& path) const { return path.transmittance < c_.opaque; }
 
-  /// Takes the samples from the last one before a macrocell to the first one behind it, except those that
-  /// were already taken in the macrocell before.
+  /// Takes the samples from the last one before a macrocell to the first one behind it, except those already
+  /// taken in the previous macrocell.
   void crossCell(Path& path, double enter, double exit, int rate) const {
     const auto first = std::int64_t(std::floor(c_.law.indexAt(enter + path.toEye)));
     const auto end = std::int64_t(std::ceil(c_.law.indexAt(exit + path.toEye)));
@@ -173,7 +173,7 @@ class RayCaster {
     return {t, point, (stored - channel_.origin) * channel_.scale + channel_.offset};
   }
 
-  /// The renderer's own shading, so that pictures differ only by where and how often they are sampled.
+  /// The renderer's own shading, so that pictures differ only in the positions and the number of samples.
   glm::vec3 lit(Path& path, double t, const glm::vec3& point, const glm::vec3& color, bool onSurface) const {
     if (!scene_.shading) return color;
     using kernel::One;

@@ -36,9 +36,9 @@ inline double footprint(const Camera& camera, int height, double distance) {
   return distance * 2 * std::tan(0.5 * camera.fovY * kRadians) / height;
 }
 
-/// The paper's equations for a and b (6 to 17) are missing from the text that we have, so these are our own:
-/// the step is s_k footprints where the volume's box is nearest to the eye, and where it is farthest. The
-/// paper's s_k is 4, for pictures some 1000 pixels high.
+/// The available text of the paper lacks its equations for a and b (6 to 17), so these are our own: the step
+/// is s_k footprints where the volume's box is nearest to the eye, and where it is farthest. The paper's s_k
+/// is 4, for pictures some 1000 pixels high.
 inline StepLaw differentialLaw(double sk, const Camera& camera, int height, const Grid& grid) {
   if (camera.orthoHeight) return {0, 0, sk * footprint(camera, height, 0)};
   const glm::dvec3 eye(glm::inverse(grid.worldFromVoxel) * glm::dvec4(camera.eye, 1));

@@ -11,7 +11,7 @@ namespace {
 
 using Builds = SharedBuilds<int, int>;
 
-/// Blocks a build until it is opened or the build is requested to stop.
+/// Blocks a build until it is opened or the build must stop.
 class Gate {
  public:
   Builds::Result pass(const std::stop_token& stop) {

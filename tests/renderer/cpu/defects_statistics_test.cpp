@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The negative controls of the statistical tests: typical defects of renderers, seeded on purpose, each of
-// which the comparison with the reference must detect.
+// The negative controls of the statistical tests: typical defects of renderers, seeded intentionally. The
+// comparison with the reference must detect each of them.
 //
 // It cannot detect two. One scrambling shared by all pixels does not change the expected value of any pixel;
 // LowDiscrepancy.LeavesNoiseWithoutStructure detects it. A sample that is lost, or counted twice, is unbiased
@@ -263,7 +263,7 @@ TEST_F(Defect, OfHalfAVoxelIsFound) {
       (passes<kernel::Superposed, kernel::BlendDensity>([](SceneView& view) { view.rays.origin0 += 0.5f; })));
 }
 
-/// A clip plane for all channels, one for the first channel, and regions that do not form a box.
+/// A clip plane for all channels, a clip plane for the first channel, and regions that do not form a box.
 void clipOften(Scene& scene, const Grid& grid) {
   const glm::dvec3 centre(grid.worldFromVoxel * glm::dvec4(glm::dvec3(grid.dims - 1) * 0.5, 1));
   scene.clip = {{centre, {0.2, -1, 0.4}, {}}, {centre, {1, 0.3, -0.2}, std::vector<int>{0}}};

@@ -41,7 +41,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Estimators, testing::Range(0, int(std::size(kTe
                          [](const auto& tested) { return std::string(kTestSceneNames[tested.param]); });
 
 TEST(Settings, OfTheQuickTestsHaveEveryPairOfSceneBlendModeAndLight) {
-  // Methods are not among the factors: every setting is tested with all of them.
+  // Methods are not factors here, because every setting is tested with all of them.
   std::set<std::pair<int, int>> sceneBlend, sceneLight, blendLight;
   for (const Setting& s : pairwiseSettings()) {
     sceneBlend.insert({s.scene, s.blend});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Defects in opacity by the gradient, seeded on purpose, each of which the comparison with the reference must
-// detect; defects_statistics_test.cpp has the other defects.
+// Defects in opacity by the gradient, seeded intentionally. The comparison with the reference must detect
+// each of them; defects_statistics_test.cpp has the other defects.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -93,7 +93,7 @@ TEST_F(GradientDefect, OfAFactorThatIsIgnoredIsFound) {
   const auto ignored = inFactors([](kernel::GradientFactorView& factor) { factor.curve.count = 0; });
   EXPECT_FALSE(trackerPasses(ignored));
   EXPECT_GT(marcherError(ignored), 10 * kQuadratureError);
-  // In the bounds as well, which would otherwise limit the excess.
+  // The bounds are changed, too, since they would otherwise limit the excess.
   Scene without = made_.scene;
   for (ChannelAppearance& channel : without.channels) channel.gradientOpacity.reset();
   EXPECT_FALSE(haveMean(replicate(made_.volume, without, Method::superposed), made_.scene, expected_));

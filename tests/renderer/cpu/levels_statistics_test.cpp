@@ -11,10 +11,10 @@ namespace {
 
 using namespace test;
 
-/// Bias that is left at the finest resolution.
+/// Bias that remains at the finest resolution.
 constexpr double kBiasLeft = 2e-5;
 
-/// As the renderer chooses.
+/// The levels that the renderer chooses.
 Method quadratureOf(const Scene& scene) { return scene.shadows ? Method::hybrid : Method::raymarch; }
 /// Steps of 4 and 1, then voxel cells, whole and in parts of a half and a sixteenth: the bias of halves, up
 /// to 5e-4 in these scenes, is of second order, and 64 times that of sixteenths.

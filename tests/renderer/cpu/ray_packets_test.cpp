@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays marched many at a time give the same bits as rays marched one by one.
+// Rays that are marched many at a time give the same bits as rays marched one by one.
 #include "renderer/cpu/ray_packets.h"
 
 #include <gmock/gmock.h>
@@ -176,7 +176,7 @@ class RayPackets : public testing::TestWithParam<InstructionSet> {
   Instance instance() const { return instanceOf(scene_.method, scene_.blend, view_); }
   std::size_t count() const { return std::size_t(scene_.width) * std::size_t(scene_.height); }
 
-  /// Renders the pixels that are not done; the others get 3.
+  /// Renders the pixels that are not done; the others keep the value 3.
   Picture packets(std::uint32_t sample, std::vector<std::uint8_t> done) const {
     const std::atomic<bool> never = false;
     Picture picture{std::vector<glm::vec4>(count(), glm::vec4(3)), std::vector<kernel::SampleCost>(count()),
@@ -281,8 +281,8 @@ TEST_P(RayPackets, SeeNothingBesideTheVolumeHoweverSteepTheirWay) {
 }
 
 TEST_P(RayPackets, CountEveryRaysSegmentsForItself) {
-  // Every second ray is in cells with matter all the way, which is more segments than a ray may have; the ray
-  // next to it has half as many, near or far.
+  // Every second ray is in cells with matter from end to end, which is more segments than a ray may have. The
+  // ray next to it has half as many, near or far.
   const glm::ivec3 dims(8, 8, 400);
   const auto volume = volumeOf(gridOf(dims, {1, 1, 40}), channelOf<std::uint8_t>(dims, [](int, int y, int z) {
                                  return ((y + 1) / 2 % 2 == 0) == (z < 200) ? 200 : 0;
@@ -312,8 +312,8 @@ TEST_P(RayPackets, CountEveryRaysSegmentsForItself) {
 }
 
 TEST_P(RayPackets, CountRaysThatEndInTheirLastSegmentAsWhole) {
-  // Almost nothing up to a wall, which is half a step nearer to the eye from ray to ray; the middle ray
-  // reaches it after as many segments as a ray may have. Single rays look some segments ahead.
+  // Almost nothing up to a wall, which is half a step nearer to the eye from ray to ray. The middle ray
+  // reaches it after the maximum number of segments. Single rays are computed some segments ahead.
   const glm::ivec3 dims(8, 8, 400);
   const double spacing = 40, step = 0.01;
   const double wall = kernel::kMaxSegments * step / spacing - 0.5;  // in voxels; the box begins at -1/2

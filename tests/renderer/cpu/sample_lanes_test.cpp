@@ -47,7 +47,7 @@ struct Channels {
       : volume(gridOf(dims), sources(dims, types, random)) {
     for (const Channel& channel : volume.channels()) {
       kernel::ChannelView view{};
-      // Most of them trilinear, so that several of those are beside each other.
+      // Most are trilinear, so that several of these are neighbours.
       view.field = fieldView(channel, Interpolation(std::max(0, int(random() % 6) - 3)));
       views.push_back(view);
     }

@@ -125,8 +125,8 @@ struct ShadowedElsewhere : kernel::EqualSteps {
   };
 };
 
-/// So that some 300 of all rays of a comparison collide in matter of this optical depth, and the mean picture
-/// of a tracker is known within some 6 %.
+/// Chosen so that some 300 of all rays of a comparison collide in matter of this optical depth. A tracker's
+/// mean picture is then known within some 6 %.
 int longerFor(double depth) {
   const double rays = 9.0 * kReplicates * samplesPerReplicate();
   return std::max(1, int(300 / (rays * depth)));
@@ -134,7 +134,7 @@ int longerFor(double depth) {
 
 class ThinLight : public testing::TestWithParam<BlendMode> {
  protected:
-  /// Trackers take `longer` times as many samples as in other tests.
+  /// Trackers use `longer` times as many samples as in other tests.
   static void compare(const VolumeAndScene& made, int longer) {
     for (const LightConfiguration& light : kLightConfigurations) {
       Scene scene = made.scene;

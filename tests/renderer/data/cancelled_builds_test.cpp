@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every stage of a build whose time grows with the number of macrocells ends when it is told to.
+// Every stage of a build whose time grows with the number of macrocells ends when it is cancelled.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -15,7 +15,7 @@ namespace {
 
 using namespace test;
 
-/// Whether build(stop) throws Error(cancelled) if `stop` has been requested, and nothing if not.
+/// Whether build(stop) throws Error(cancelled) if `stop` has been requested, and does not throw otherwise.
 template <class Build>
 bool endsWhenToldTo(Build build) {
   std::stop_source stop;

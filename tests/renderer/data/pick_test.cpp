@@ -17,7 +17,7 @@ std::vector<FirstCollision> samplesOf(std::size_t through, std::vector<FirstColl
 
 TEST(VisibleSample, IsTheMedianOfTheChannelInWhichMostEnd) {
   EXPECT_EQ(visibleSample(samplesOf(0, {{9, 1}, {2, 0}, {7, 1}, {1, 0}, {8, 1}})), 4u);
-  // Of two samples in the middle the nearer; of channels with equally many samples the first.
+  // The nearer of two median samples, and the first of the channels with equally many samples.
   EXPECT_EQ(visibleSample(samplesOf(3, {{9, 1}, {4, 0}, {3, 0}, {8, 1}})), 2u);
   EXPECT_EQ(visibleSample(samplesOf(0, {{5, 2}, {5, 2}, {5, 2}})), 1u);
 }

@@ -12,7 +12,8 @@ namespace {
 using namespace test;
 
 TEST(Resolution, OfAPlanIsThatOfItsScene) {
-  // The bias of a picture is estimated at a view's resolution, and would be that of another picture.
+  // The bias is estimated at a view's resolution. At another resolution it would be that of a different
+  // picture.
   const glm::ivec3 dims(4);
   const auto volume =
       volumeOf(gridOf(dims, {1, 2, 0.5}), channelOf<std::uint8_t>(dims, [](int x, int, int) { return x; }));

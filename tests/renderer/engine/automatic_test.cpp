@@ -36,7 +36,7 @@ Choice chosen(const std::shared_ptr<const Volume>& volume, const Scene& scene) {
   return renderer->choice();
 }
 
-/// RMSE against the reference, over linear premultiplied RGBA, and what the renderer claims it to be.
+/// RMSE against the reference, over linear premultiplied RGBA, and the error that the renderer claims.
 std::pair<double, double> errorAfter(int samples, const std::shared_ptr<const Volume>& volume,
                                      const Scene& scene) {
   const auto expected = reference::renderReference(*volume, scene, 1);
@@ -51,7 +51,7 @@ std::pair<double, double> errorAfter(int samples, const std::shared_ptr<const Vo
   return {std::sqrt(squares / (4.0 * double(found.pixels.size()))), renderer->estimatedError()};
 }
 
-/// The scene with its first channel's opacity a peak of this width, a share of the range.
+/// The scene with a peak in the first channel's opacity; its width is a share of the range.
 Scene withPeak(Scene scene, double width) {
   for (ChannelAppearance& channel : scene.channels) channel.visible = &channel == &scene.channels[0];
   scene.channels[0].opacity = {{0, 0}, {0.3 - width, 0}, {0.3, 1}, {0.3 + width, 0}, {1, 0}};
@@ -68,7 +68,7 @@ TEST(Automatic, TakesASmallerStepForFinerDetail) {
 }
 
 TEST(Automatic, DrawsMatterOfWhichOnlyTheSurfaceIsSeen) {
-  // So dense that a ray sees only the colour of its very surface, which changes within a voxel.
+  // So dense that only the colour at its very surface is visible, and that changes within a voxel.
   const auto volume = orbitals();
   Scene scene = automaticScene(*volume);
   scene.filter = PixelFilter::point;
@@ -85,7 +85,7 @@ TEST(Automatic, DrawsMatterOfWhichOnlyTheSurfaceIsSeen) {
 }
 
 TEST(Automatic, SeesTheAlphaOfDarkMatterOverABrightGround) {
-  // In the colours alone, which are those of soot, no step has an error.
+  // All colours are those of soot, so no step has an error in them.
   const auto path = std::filesystem::path(SCOLOPAX_DATA_DIR) / "scalar/neghip_64x64x64_uint8.derived.raw";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "the data set is absent from " << SCOLOPAX_DATA_DIR;
   const auto datasets =
@@ -265,7 +265,7 @@ TEST(Automatic, KeepsTheFilmUnlessItsChoiceChanges) {
   scene.background = {1, 0, 0};
   EXPECT_FALSE(renderer->setScene(scene).filmReset);
   EXPECT_EQ(renderer->samples(), 1u);
-  // Stating what was chosen asks for a picture without corrections.
+  // A scene with the chosen method and step gives a picture without corrections.
   const Choice choice = renderer->choice();
   scene.method = choice.method;
   scene.step = choice.step;
@@ -301,7 +301,8 @@ TEST(Automatic, FallsBelowTheBiasOfItsStep) {
 }
 
 TEST(Automatic, CorrectsThePictureThatItsSamplesShow) {
-  // The first level's coarse picture is that of the samples; every other's is the finer one before it.
+  // The coarse picture of the first level is that of the samples; that of every other level is the fine
+  // picture of the level before it.
   const auto volume = orbitals();
   const auto launcher = makeCpuLauncher(0);
   for (const double width : {0.0, 0.3, 0.05, 0.01, 1e-3})
@@ -369,7 +370,7 @@ TEST(Automatic, GoesOnWithoutCorrectionsWhileThereIsNoMemoryForThem) {
   const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(64) << 20);
   const auto limited = makeCpuRenderer(volume, 1, memory);
   limited->setScene(scene);
-  // Leaves room for half of what a level takes.
+  // Leaves memory for half of a level.
   const std::uint64_t pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height);
   std::optional<MemoryBudget::Share> rest;
   rest = MemoryBudget::take(memory, MemoryUse::pictures);
@@ -381,7 +382,7 @@ TEST(Automatic, GoesOnWithoutCorrectionsWhileThereIsNoMemoryForThem) {
   }
   EXPECT_GT(unlimited->choice().corrections.size(), 0u);
   EXPECT_EQ(limited->choice().corrections.size(), 0u);
-  EXPECT_GT(limited->estimatedError(), unlimited->estimatedError());  // it tells the bias that is left
+  EXPECT_GT(limited->estimatedError(), unlimited->estimatedError());  // it includes the remaining bias
   rest.reset();
   for (int i = 0; i < 64; ++i) limited->renderSample(kNever);
   EXPECT_GT(limited->choice().corrections.size(), 0u);

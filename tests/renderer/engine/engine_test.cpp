@@ -321,7 +321,7 @@ TEST(CpuRenderer, TakesNoMoreMemoryAfterManyEditsAndNoneForAnEditThatIsRefused) 
     }
     most = first + memory->used(MemoryUse::films);
   }
-  // As much as the scene needs; but while an edit is made, what it changes is there twice.
+  // The memory that the scene needs. During an edit, the parts that it changes exist twice.
   const auto memory = std::make_shared<MemoryBudget>(most * 21 / 20);
   const auto renderer = makeCpuRenderer(volume, 0, memory);
   edit(20);
@@ -379,7 +379,7 @@ TEST(CpuRenderer, TellsWhichScenesTakeLong) {
   EXPECT_TRUE(with([](Scene& s) { s.macrocell = 2; }));
   EXPECT_TRUE(with([](Scene& s) { s.method = Method::automatic; }));
   EXPECT_TRUE(with([](Scene& s) { s.width = s.height = 1024; }));
-  // Smaller pictures are as large in bytes when more is kept of each pixel.
+  // A smaller picture takes as many bytes if more values are kept for each pixel.
   EXPECT_FALSE(with([](Scene& s) { s.width = s.height = 900; }));
   EXPECT_FALSE(renderer->filmIsLarge());
   renderer->recordAovs();

@@ -24,7 +24,7 @@ std::vector<LevelEstimate> secondOrder(double size, double variance) {
   return levels;
 }
 
-/// A film of one pixel in which the first levels have so many corrections, all of the same size.
+/// A film of one pixel in which the first levels have these numbers of corrections, all of the same size.
 void fill(Film& film, const std::vector<std::uint32_t>& corrections, float size = 0) {
   film.reset(1, 1);
   film.pass()[0] = glm::vec4(0);
@@ -89,7 +89,7 @@ TEST(DueLevel, IsTheOneThatLacksMost) {
   EXPECT_EQ(dueLevel(levels, late, film), 1u);
   fill(film, {1, 1, 1, 1, 1});
   EXPECT_EQ(dueLevel(levels, late, film), 0u);
-  // All have what they should have, once samples are many enough to ask for it and no more.
+  // With enough samples, every level has the number of corrections that it should have.
   std::vector<std::uint32_t> all;
   for (const Level& level : levels)
     all.push_back(std::uint32_t(std::max(level.first, std::floor(level.perSample * 1000))));

@@ -26,7 +26,7 @@ std::shared_ptr<const Volume> deepVolume() {
   return volumeOf(gridOf(dims), channel(), channel());
 }
 
-/// A view along the volume's depth through all of it, which takes minutes to march.
+/// A view along the whole depth of the volume, which takes minutes to march.
 Scene slowScene(const Volume& volume) {
   Scene scene = frontScene(volume, 16, 16);
   for (ChannelAppearance& channel : scene.channels) channel.density = 1e-4;
@@ -38,7 +38,7 @@ Scene slowScene(const Volume& volume) {
   return scene;
 }
 
-/// Whether the work ends with Error(cancelled), and not minutes later.
+/// Whether the work ends at once, with Error(cancelled).
 template <class Work>
 void expectToEndWhenStopped(Work work) {
   std::stop_source stop;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers of channels, and relations between channels, for which drawing a channel may go wrong.
+// Numbers of channels, and relations between channels, with which drawing a channel may go wrong.
 #include <gtest/gtest.h>
 
 #include <utility>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Interpolation by the cubic B-spline and by the nearest voxel: what is known without noise.
+// Interpolation by the cubic B-spline and by the nearest voxel, in cases without noise.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -99,7 +99,7 @@ TEST(Filters, OfTheNearestVoxelKeepLabelsApart) {
 }
 
 TEST(Filters, OfDenseVoxelsEndAtTheirFaces) {
-  // A voxel's face is opaque at once, and the empty half cell before it takes trackers few collisions.
+  // A voxel's face is opaque at once, and in the empty half cell before it trackers have few collisions.
   const auto volume = block(glm::ivec3(9));
   for (const Interpolation interpolation : {Interpolation::nearest, Interpolation::cubic})
     for (const Method method : {Method::superposed, Method::cumulative, Method::syncDda, Method::nDda}) {

@@ -173,12 +173,12 @@ TEST(GradientOpacity, OfDenseMatterShowsItsEdgesOnly) {
         EXPECT_EQ(stats.truncatedRays, 0u) << nameOf(method);
         return double(stats.fetches) / double(stats.rays);
       };
-      // As in ThickCells, but a test or a stretch has seven times the fetches.
+      // As in ThickCells, but each test and each stretch has seven times the fetches.
       for (const Method method : kTrackers) {
         const double thin = fetchesPerRay(method, 1e4);
         EXPECT_LT(fetchesPerRay(method, 1e6), 1.5 * thin + 70) << nameOf(method);
       }
-      // Every second pair, where not all are wanted: the reference takes its time.
+      // Only every second pair, unless all are wanted, because the reference is slow.
       if (allCombinations() || (inside == 0) == (blend == BlendMode::density || blend == BlendMode::mix))
         expectUnbiased(volume, scene);
     }

@@ -89,7 +89,7 @@ inline double largestError(const std::shared_ptr<const Volume>& volume, Scene sc
   return largest - expected.maximumRayError;
 }
 
-/// One colour per channel, as colours that change within a cell hide each other, and little extinction.
+/// One colour per channel, because colours that change within a cell hide each other, and little extinction.
 inline Scene thin(Scene scene, double factor) {
   for (ChannelAppearance& channel : scene.channels) {
     channel.density *= factor;

@@ -105,8 +105,8 @@ TEST(Film, AddsTheMeanOfEveryLevelOfCorrections) {
   film.include(1);
   EXPECT_EQ(film.image().pixels[0], glm::vec4(0.75f, 0, 0, 0.5f));
   EXPECT_EQ(film.corrections(0), 2u);
-  // The product of both corrections of level 0 is negative. What is told is the estimate's standard
-  // deviation: half of the squared difference between the corrections, over the root of the number of
+  // The product of both corrections of level 0 is negative. The result is the standard deviation of the
+  // estimate: half of the squared difference between the corrections, divided by the root of the number of
   // components.
   EXPECT_NEAR(film.correctionSize(0), std::sqrt(0.5 / 2 / 4), 1e-6);
   film.reset(1, 1);
@@ -294,7 +294,7 @@ TEST(Picture, ThickerThanCanBeTrackedEndsAndSaysSo) {
     const RenderStats stats = statsOf(volume, scene, method, 2);
     EXPECT_EQ(stats.rays, 8u);
     EXPECT_EQ(stats.truncatedRays, 8u);
-    // The limit, and the fetches before the ray used bounds of stretches.
+    // The limit plus the fetches before the ray used bounds of stretches.
     EXPECT_LE(stats.fetches, 8u * (kernel::kMaxTentativeCollisions + 2 * kernel::kPatience));
   }
   scene.channels[0].opacity = {{0, 1}};  // as thick, but without null collisions

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cost of light, in counts: nothing when it is off or has no visible effect; otherwise only what it
-// needs. Every method, every blend mode.
+// The cost of light, in counts: none if it is off or has no visible effect; otherwise only the necessary
+// cost. Every method, every blend mode.
 #include <gtest/gtest.h>
 
 #include "tests/renderer/hard_cases/hard_scenes.h"

@@ -35,8 +35,8 @@ struct HalfShadow {
 };
 
 TEST(Light, InAPixelThatIsPartlyCoveredIsThatOfItsWholeArea) {
-  // The place in the pixel and the places that are lit must not depend on each other. Where they do, every
-  // seed converges to a picture of its own: some see the lit half of the slab only, and some the other.
+  // The position in the pixel and the positions that are lit must be independent. Otherwise every seed
+  // converges to a picture of its own: some see only the lit half of the slab, and some only the other half.
   const HalfShadow half;
   const auto expected = reference::renderReference(*half.volume, half.scene, 48);
   const double color = double(expected.image.pixels[0].r), alpha = double(expected.image.pixels[0].a);
@@ -162,8 +162,8 @@ TEST(ExactLight, OnSpacingsOfOneToAHundredHasTheNormalOfTheWorld) {
   field.expectRadiance(field.shaded(s, nl, 1));
 }
 
-/// A field that rises along an axis at right angles to the view, but for `tilt`: a picture of a rotated grid,
-/// lit from where the field rises to. `slope`: of data values by stored ones.
+/// A field that rises along an axis at right angles to the view, apart from `tilt`, in a rotated grid. The
+/// light comes from the side to which the field rises. `slope`: data values per stored value.
 double litAtRightAngles(double turn, double tilt, Method method, double slope = 1) {
   const glm::dvec3 across = glm::normalize(glm::dvec3(std::cos(turn), std::sin(turn), 0.3)),
                    view = glm::normalize(glm::cross(across, glm::dvec3(0.2, 0.1, 1))),
@@ -250,7 +250,7 @@ TEST(ExactLight, OfNoIntensityLeavesTheAmbientShare) {
   for (const bool shadows : {false, true}) {
     field.shadows = shadows;
     field.expectRadiance(field.shaded(1, 0, 0));
-    field.range = 4;  // no light that could be shadowed: what is not shaded keeps its colour
+    field.range = 4;  // no light that could be shadowed: unshaded points keep their colour
     const double s = 1 - 0.75 * 0.75;
     field.expectRadiance(field.shaded(s, 0, 0));
     field.range = 1;
@@ -347,7 +347,7 @@ TEST(ExactBlend, OfIdenticalChannelsInMixIsTheirWeightedSum) {
 }
 
 TEST(Light, OnAChannelAsThinAsFloatsCanSayChangesNothing) {
-  // Its share of a stratum, or the reciprocal, is out of the range of floats.
+  // Its share of a stratum, or the reciprocal of the share, is outside the range of floats.
   const glm::ivec3 dims(6);
   for (const float thin : {1.0f, 1e3f, 1e6f, 1e9f}) {
     const auto volume = volumeOf(gridOf(dims, glm::dvec3(0.25)), channelOf<float>(dims, lumps()),

@@ -64,7 +64,8 @@ TEST(RayMarch, OfASpikeNarrowerThanAStepHidesWhatIsInIt) {
 }
 
 TEST(RayMarch, PassesFromOneChannelToAnotherWhereTheirExtinctionsAreEqual) {
-  // One rises and the other falls: both are linear, and so is what is seen on either side of the middle.
+  // One rises and the other falls. Both are linear, and so is the visible extinction on either side of the
+  // middle.
   const glm::ivec3 dims(3, 3, 8);
   const auto volume = volumeOf(gridOf(dims), channelOf<float>(dims, [](int, int, int z) { return z; }),
                                channelOf<float>(dims, [](int, int, int z) { return 7 - z; }));

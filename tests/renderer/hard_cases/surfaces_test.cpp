@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Surfaces that quadrature meets, without noise, against the reference: it meets exactly the same ones,
-// whatever its steps.
+// Surfaces in quadrature, without noise, against the reference: it meets exactly the same surfaces with every
+// step.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -257,7 +257,8 @@ TEST(Surfaces, OutsideTheValuesCostNothing) {
 }
 
 TEST(Surfaces, BesideEmptyMacrocellsSeenFromAfar) {
-  // The value is all but that of the empty space around a block, whose faces are those of macrocells.
+  // The isovalue is close to the value of the empty space around a block, whose faces are faces of
+  // macrocells.
   const glm::ivec3 dims(24, 24, 24);
   const auto block = [](int x, int y, int z) {
     return std::min({x, y, z}) >= 8 && std::max({x, y, z}) <= 16 ? 255 : 0;

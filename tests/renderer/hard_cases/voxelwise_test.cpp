@@ -15,7 +15,7 @@ namespace {
 using namespace test;
 
 TEST(Voxelwise, IsExactInThinMatter) {
-  // What matter hides of other matter in the same cell is of second order in the density.
+  // The part of matter that other matter in the same cell hides is of second order in the density.
   for (const TestScene which : kTestScenes) {
     const auto made = testScene(which);
     if (!made) continue;
@@ -29,7 +29,7 @@ TEST(Voxelwise, IsExactInThinMatter) {
 }
 
 TEST(Voxelwise, IsExactForOneChannelOfOneColor) {
-  // Nothing hides anything of another colour, however dense.
+  // Nothing hides matter of another colour, however dense it is.
   for (const TestScene which : kTestScenes) {
     const auto made = testScene(which);
     if (!made) continue;

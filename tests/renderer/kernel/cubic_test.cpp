@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scalars that are cubics on a segment: where they turn, where they meet a value, and the means of curves
-// over them, against sums over many points in double.
+// Scalars that are cubics on a segment: their turning points, where they meet a value, and the means of
+// curves over them, against sums over many points in double.
 #include "renderer/kernel/cubic.h"
 
 #include <gtest/gtest.h>
@@ -158,7 +158,7 @@ TEST(MeansOfCubic, AreThoseOfManyPoints) {
 }
 
 TEST(MeansOfCubic, OfAConstantAreTheCurvesValue) {
-  // Also where the constant is exactly on a jump, which belongs to what follows it.
+  // Also if the constant is exactly on a jump, where the value after the jump applies.
   Channel channel;
   channel.slope = 1;
   for (int top = 2; top < 256; ++top)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Segments of dense matter are short where their light is seen, and longer the less of it is.
+// Segments of dense matter are short where their light is visible, and longer where less of it is visible.
 #include "renderer/kernel/voxel_segments.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 using namespace test;
 
-/// The optical depths of the segments of a ray through constant matter of which a share `left` is seen.
+/// The optical depths of the segments of a ray through constant matter, of which a share `left` is visible.
 std::vector<float> depthsOfSegments(const SceneView& view, float extinction, float left, float most) {
   const SampleNumber number{};
   Sampler sampler(0, number, 1);

@@ -42,9 +42,8 @@ Truth referenceOf(const Volume& volume, const Scene& scene, int samplesPerAxis) 
   return truth;
 }
 
-/// Adds the effect that rounding of floats can have on a picture: the change of the reference's picture when
-/// the eye moves by 3e-7 of the box's diagonal, values by 3e-7 of the largest, and gradients by that per
-/// voxel.
+/// Adds the possible effect of rounding in floats: the change of the reference's picture if the eye moves by
+/// 3e-7 of the box's diagonal, values change by 3e-7 of the largest value, and gradients by that per voxel.
 void addRounding(const RandomScene& drawn, const Scene& scene, Truth* truth) {
   constexpr double kRounding = 3e-7;
   const auto compare = [&](const Scene& changed) {
@@ -76,7 +75,7 @@ void addRounding(const RandomScene& drawn, const Scene& scene, Truth* truth) {
   }
 }
 
-/// Where an estimate exceeds its allowed error by most.
+/// The entry in which an estimate exceeds its allowed error most.
 struct Worst {
   std::size_t pixel = 0;
   int component = 0;
@@ -216,7 +215,7 @@ class Checks {
     if (worst.beyond()) report(std::string(nameOf(scene.method)), textOf(worst, more));
   }
 
-  /// The parts that quadrature leaves out on purpose, and the rounding of its product of transmittances.
+  /// The parts that quadrature leaves out intentionally, and the rounding of its product of transmittances.
   double quadratureFloor(const Scene& scene, const Truth& truth, std::size_t i) const {
     constexpr double kOpaque = 1e-4;
     const double segments = drawn_.source.grid.diagonal() / (std::max(scene.step, 0.01) * smallestSpacing());
@@ -254,7 +253,8 @@ class Checks {
     return levels;
   }
 
-  /// At step 0, nothing tells how large the error is. What is left out, or seen twice, is far more than this.
+  /// Allowed error at step 0, where no bound is known. An omission, or matter that is counted twice, causes
+  /// far more.
   static constexpr double kWholeCells = 0.05;
   void checkWholeCells(const Scene& scene) {
     const Estimates found =
@@ -356,7 +356,7 @@ class Checks {
     return claim;
   }
 
-  /// RMS over pictures, pixels and linear premultiplied RGBA, beyond what `hidden` may explain.
+  /// RMS over pictures, pixels and linear premultiplied RGBA, beyond the error that `hidden` may explain.
   double errorOf(const Claim& claim, const Truth& truth, const std::vector<double>& hidden) const {
     double squares = 0, count = 0;
     for (const Image& image : claim.pictures)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The checks of every random scene. Each has two stages: deviations beyond about four standard errors in a
-// quick check lead to a long one, with other random numbers, and only that decides.
+// The checks of every random scene. Each has two stages: a deviation beyond about four standard errors in a
+// quick check leads to a long check with other random numbers, and only that one decides.
 //
 // False-alarm probability: the long check uses an empirical Bernstein inequality at kLogTerm for every pixel,
 // component and level: 4 exp(-34) x 2e7 (20,000 scenes, 7 methods, 21 means, 4 components, 2 levels) < 2e-7.

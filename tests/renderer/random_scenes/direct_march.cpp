@@ -177,7 +177,7 @@ class Marcher {
     return mixture;
   }
 
-  /// On which side of every surface the point of a mixture is.
+  /// The side of every surface on which a point is.
   static std::vector<Side> sidesOf(const Mixture& mixture, const Matters& matters, Decisions* decisions) {
     std::vector<Side> sides;
     for (std::size_t n = 0; n < matters.size(); ++n) {
@@ -190,7 +190,7 @@ class Marcher {
     for (const Side side : sides) decisions->note(std::uint64_t(side));
     return sides;
   }
-  /// Surface number k of these.
+  /// Surface number k of these channels.
   static std::pair<const Matter*, const Matter::Surface*> surface(const Matters& matters, std::size_t k) {
     for (const Matter& m : matters) {
       if (k < m.surfaces.size()) return {&m, &m.surfaces[k]};

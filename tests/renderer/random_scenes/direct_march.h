@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An independent ray marcher: PROTOCOL.md's "exact meaning" in double precision, in small steps that are
-// halved until halving changes nothing. It shares no code with the reference or the kernels.
+// An independent ray marcher: the section "Exact meaning" of PROTOCOL.md in double precision, in small steps
+// that are halved until halving has no effect. It shares no code with the reference or the kernels.
 #pragma once
 #include <glm/vec4.hpp>
 

@@ -83,8 +83,8 @@ TEST(DirectMarch, FindsADipOfTheGradientFarNarrowerThanItsSteps) {
   EXPECT_LT(found.error, 1e-5);
 }
 
-// Every voxel is a slab of its own opacity. One that is not finite leaves a gap between its faces alone, at
-// which no surface is.
+// Every voxel is a slab with its own opacity. A voxel that is not finite leaves a gap between its faces, at
+// which there is no surface.
 TEST(DirectMarch, TakesTheNearestVoxel) {
   const glm::ivec3 dims(1, 1, 5);
   Drawing d = drawing(
@@ -105,7 +105,7 @@ TEST(DirectMarch, TakesTheNearestVoxel) {
   EXPECT_LT(found.error, 1e-6);
 }
 
-// The gradient of a ramp, although every voxel is flat.
+// The gradient is that of a ramp, although every voxel is flat.
 TEST(DirectMarch, LightsFacesOfVoxelsByTheTrilinearGradient) {
   const glm::ivec3 dims(1, 1, 5);
   Drawing d = drawing(channelOf<float>(dims, [](int, int, int z) { return z; }), dims);
@@ -131,7 +131,7 @@ TEST(DirectMarch, TakesTheSplineThatTheVoxelsAreTheCoefficientsOf) {
   Marched found = directMarch(d.source, d.scene, 0, 0);
   EXPECT_NEAR(found.rgba.a, 1 - std::exp(-1), found.error + 1e-9);
   EXPECT_LT(found.error, 1e-6);
-  // Of a voxel that is not finite, the cells to the second before it have none.
+  // If a voxel is not finite, the cells from the second voxel before it on have no values.
   last = std::numeric_limits<double>::infinity();
   d.source.channels[0] = channelOf<float>(dims, values);
   found = directMarch(d.source, d.scene, 0, 0);
@@ -187,8 +187,8 @@ TEST(DirectMarch, MeetsSurfacesInMatter) {
   EXPECT_LT(found.error, 1e-6);
 }
 
-// Along the ray the field rises by 10 a voxel only, and what x and y take off and z adds is rounded: the
-// value passes those of the surfaces several times.
+// Along the ray the field rises by only 10 a voxel, and the contributions of x, y and z, which cancel, are
+// rounded: the value passes the surfaces' values several times.
 TEST(DirectMarch, MeetsASurfaceOnceWhereRoundingPassesItOften) {
   const glm::ivec3 dims(4, 4, 4);
   Drawing d = drawing(

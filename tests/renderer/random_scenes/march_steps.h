@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Marching with the midpoint rule. A step is halved if halving changes the result, or if its samples result
-// from different decisions (knots, signs, holes): this narrows down jumps.
+// from different decisions (knots, signs, holes), which narrows down jumps.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 namespace scolopax::random_scenes {
 
-/// Where a point is as to a surface. At `neither` the field has no value.
+/// The side of a surface on which a point is; `neither` if the field has no value.
 enum class Side : std::uint8_t { below, above, neither };
 
 /// The field at a point of a ray, and a hash of all decisions in its computation.
@@ -18,7 +18,7 @@ struct PointSample {
   double extinction = 0;   ///< per world unit
   glm::dvec3 radiance{0};  ///< of a collision there
   std::uint64_t decisions = 0;
-  std::vector<Side> sides{};  ///< on which the point is of every surface
+  std::vector<Side> sides{};  ///< of every surface
 };
 
 /// A stretch of the ray, seen from its start.
@@ -41,8 +41,8 @@ struct StepRules {
   int most;                ///< number of samples after which no step is halved any more
 };
 
-/// sampleAt(t) gives the PointSample, glanceAt(t) one whose radiance may be wrong, surfaceAt(k, t) what
-/// surface number k does where it is crossed at t.
+/// sampleAt(t) returns the PointSample, glanceAt(t) one whose radiance may be wrong, and surfaceAt(k, t) the
+/// effect of surface number k where it is crossed at t.
 template <class SampleAt, class GlanceAt, class SurfaceAt>
 class SteppedMarch {
  public:
@@ -70,9 +70,9 @@ class SteppedMarch {
 
  private:
   static constexpr double kOpaque = 1e-9, kThin = 0.1;
-  /// Share of a step. So far inside its ends a point is beyond rounding, which decides at a jump.
+  /// Share of a step. A point so far inside its ends is not affected by rounding, which decides at a jump.
   static constexpr double kInset = 1e-9;
-  /// Share of the longest step. Sides that change more than once in so short a way do so by rounding.
+  /// Share of the longest step. If a side changes more than once within this length, rounding is the cause.
   static constexpr double kSettled = 1e-7;
 
   static Stretch slab(const PointSample& sample, double length) {
@@ -143,7 +143,7 @@ class SteppedMarch {
   const GlanceAt& glanceAt_;
   const SurfaceAt& surfaceAt_;
   StepRules rules_;
-  std::vector<Side> sides_;  // on which the ray is
+  std::vector<Side> sides_;  // of the ray, for every surface
   Stretch all_;
   std::vector<Run> runs_;
   double error_ = 0;

@@ -34,7 +34,7 @@ struct Matter {
   glm::ivec3 dims;
   const ChannelAppearance* look;
 
-  /// A surface: where the value is, what share of the light it takes, and its colour.
+  /// A surface: its value, the share of the light that it absorbs, and its colour.
   struct Surface {
     double value, opacity;
     glm::dvec3 color;
@@ -43,8 +43,8 @@ struct Matter {
   double voxel(int i, int j, int k) const { return values[std::size_t(i + dims.x * (j + dims.y * k))]; }
   static double mean(double a, double b, double w) { return w == 1 ? b : a + w * (b - a); }
 
-  /// Where a coordinate is, moved to between the outermost centres: in the cell from voxel `low` on, at the
-  /// share `way` of its width.
+  /// The position of a coordinate, moved to between the outermost centres: in the cell that begins at voxel
+  /// `low`, at the share `way` of its width.
   struct Place {
     int low;
     double way;
@@ -95,7 +95,7 @@ struct Matter {
   }
 
   /// The uniform cubic B-spline with these coefficients, or its slope, at the share `w` of the way from the
-  /// second to the third. By de Boor's means, so that what is constant stays so to the last bit.
+  /// second to the third. Computed by de Boor's algorithm, which keeps constants to the last bit.
   static double spline(const double (&c)[4], double w, bool slope) {
     const double a = mean(c[0], c[1], (w + 2) / 3), b = mean(c[1], c[2], (w + 1) / 3);
     const double d = mean(c[2], c[3], w / 3);
@@ -203,7 +203,7 @@ struct Matter {
     for (const Isovalue& i : look->isovalues)
       surfaces.push_back({i.value, i.opacity, i.color ? *i.color : colorAt(position(i.value))});
     if (look->peaks == Peaks::off || look->rangeLo == look->rangeHi) return;
-    // A maximum is a value that the curve takes over an interval (or at a point) before and behind which it
+    // A maximum is a value of the curve over an interval (or at a point), before and behind which the curve
     // is smaller.
     const auto& knots = look->opacity;
     const auto before = [&](double p) {  // limit from the left

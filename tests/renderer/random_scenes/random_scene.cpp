@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-/// What the value of a field may depend on.
+/// Everything on which the value of a field may depend.
 struct Surroundings {
   std::uint64_t scene;
   const Grid& grid;
@@ -249,7 +249,7 @@ json drawCamera(Draw& draw, const Surroundings& around) {
   return {{"camera", camera}};
 }
 
-/// Planes anywhere, also along the axes and through voxel centres and faces; of all, some or no channels.
+/// Planes anywhere, also along the axes and through voxel centres and faces, for all, some or no channels.
 json drawClip(Draw& draw, const Surroundings& around) {
   if (draw.chance(0.6)) return json::object();
   json planes = json::array();

@@ -19,7 +19,7 @@ std::uint64_t numberFrom(const char* variable, std::uint64_t otherwise) {
   return text ? std::strtoull(text, nullptr, 10) : otherwise;
 }
 
-/// An exception is a finding: thrown here, it would cancel what the other scenes compute.
+/// An exception is a finding. It is caught here, because it would cancel the computation of the other scenes.
 std::vector<Finding> findingsIn(std::uint64_t number) {
   try {
     return checkScene(drawScene(number));

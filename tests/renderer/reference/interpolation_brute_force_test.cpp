@@ -10,7 +10,7 @@
 namespace scolopax::reference {
 namespace {
 
-/// What scenes have.
+/// The features of the scenes.
 struct Features {
   bool shading = false, shadows = false, factors = false, surfaces = false;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The simplest program for a lit ray: tiny steps, and a bound on the error of the steps. Surfaces are those
-// of isovalues; they throw no shadows here. Shares no code with the renderer.
+// of isovalues; they cast no shadows here. Shares no code with the renderer.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -83,7 +83,7 @@ class LitMarcher : PointScene {
       std::vector<Arriving> lights;
       if (extinction > 0) lights = arriving(world, direction, t, shadowSteps, only, shadowBound);
       forEachMet(point, only, sides, [&](std::size_t n, const Isovalue& isovalue) {
-        // Lies somewhere in a step: both ends of it are tried.
+        // The surface is somewhere in a step, so both ends of the step are tried.
         const glm::dvec3 own = isovalue.color ? *isovalue.color : colorOf(n, isovalue.value);
         const auto seenAt = [&](double at) {
           return radiance(

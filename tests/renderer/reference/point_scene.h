@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene at points of a volume, every formula written again: what tiny steps add up. Shares no code with the
-// renderer.
+// A scene at points of a volume, for sums over tiny steps. Every formula is written again; shares no code
+// with the renderer.
 #pragma once
 #include <algorithm>
 #include <array>
