@@ -188,8 +188,8 @@ TEST(PatchBetween, NamesTheEditedMemberOfAnObjectThatMayBeAbsent) {
       json::parse(R"({"channels": {"0": {"gradientOpacity": {"range": [1, 3]}}}})"));
 }
 
-/// Sparse scenes in which every field is sometimes present, with small lists and few different values, so
-/// that equal parts are common.
+/// Sparse scenes in which every field is sometimes present. Lists are small and there are few different
+/// values, so that equal parts are common.
 class RandomScenes {
  public:
   explicit RandomScenes(unsigned seed) : random_(seed) {}

@@ -191,7 +191,7 @@ TEST(Api, RefusesOneRenderTooManyWith503) {
 TEST(Api, KeepsNoPlaceForARenderThatWaitsToBeEncodedNorForOneWhoseClientHasGone) {
   Api api;
   net::Gate gate;
-  // Takes the only place that such pictures have at the encoders.
+  // Takes the only slot that such pictures have at the encoders.
   api.encoders.start(
       "", [&](const std::stop_token&) { gate.pass(); }, [] {});
   gate.waitFor(1);
@@ -199,7 +199,7 @@ TEST(Api, KeepsNoPlaceForARenderThatWaitsToBeEncodedNorForOneWhoseClientHasGone)
   api.workshop.control->duringPass = [&] { ++samples; };
   {
     const auto render = [&] {
-      // Refused until the place of the one before is free.
+      // Refused until the slot of the previous one is free.
       while (!api.gone.stop_requested())
         EXPECT_EQ(api.errorOf("POST", "/api/v1/render", kSmallRender), Expected(503, ""));
     };
@@ -209,7 +209,7 @@ TEST(Api, KeepsNoPlaceForARenderThatWaitsToBeEncodedNorForOneWhoseClientHasGone)
     EXPECT_TRUE(net::eventually([&] { return samples == 6; }));
     api.gone.request_stop();
   }
-  EXPECT_EQ(gate.arrived(), 1);  // and was not opened
+  EXPECT_EQ(gate.arrived(), 1);  // the gate was not opened
 }
 
 TEST(Api, EndsARenderWhenTheServerStops) {

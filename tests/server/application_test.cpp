@@ -22,7 +22,7 @@ using net::Gate;
 using net::TestClient;
 using nlohmann::json;
 
-/// Builds that end only when they are told to.
+/// Builds that end only when the test ends them.
 struct EndlessBuilds {
   std::atomic<int> begun{0}, stopped{0};
   void operator()(const std::stop_token& stop) {
@@ -50,7 +50,7 @@ struct WaitingBuilds {
   }
 };
 
-/// A server whose renderers are all controlled by what the test puts into `building_`.
+/// A server whose renderers are all controlled by the function that the test puts into `building_`.
 class ApplicationTest : public ::testing::Test {
  protected:
   void start() {

@@ -28,7 +28,7 @@ Background::Work passing(Gate& gate) {
   return [&gate](const std::stop_token&) { gate.pass(); };
 }
 
-/// Notes the order in which jobs run.
+/// Records the order in which jobs run.
 class Notes {
  public:
   Background::Work job(const std::string& name) {
@@ -47,7 +47,7 @@ class Notes {
   std::vector<std::string> names_;
 };
 
-/// During its lifetime no thread can be created: each would need a stack for which there is no room.
+/// While it exists, no thread can be created, because there is no room for a stack.
 class NoThreads {
  public:
   NoThreads() {
@@ -102,7 +102,7 @@ TEST(BackgroundThreads, OutlivesJobsThatEndWhileOthersBegin) {
   EXPECT_EQ(worked + left, 2000);
 }
 
-/// Jobs that end when they are told to.
+/// Jobs that end when the test ends them.
 struct HeldJobs {
   std::mutex mutex;
   std::condition_variable changed;

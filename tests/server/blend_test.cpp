@@ -41,7 +41,7 @@ TEST(Blend, TakesAllOfAPictureWithoutError) {
   Image image = constant(2, 2, 1);
   EXPECT_EQ(mixIn(constant(2, 2, 0), 0, &image), 1);
   EXPECT_EQ(image.pixels, constant(2, 2, 1).pixels);
-  EXPECT_EQ(mixIn(constant(2, 2, 1), 0.5, &image), 1);  // no difference: any share is right
+  EXPECT_EQ(mixIn(constant(2, 2, 1), 0.5, &image), 1);  // the pictures are equal, so any share is right
 }
 
 TEST(Blend, TakesNothingOfAPictureThatIsAllNoise) {

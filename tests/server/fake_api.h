@@ -46,7 +46,7 @@ struct Api {
                      [] { return std::size_t(456); }};
   std::vector<Route> routes;
 
-  /// `budget`: for what is encoded and for answers.
+  /// `budget`: for encodings and answers.
   explicit Api(std::shared_ptr<MemoryBudget> budget = nullptr) : memory(std::move(budget)) {
     config.pollTimeout = std::chrono::milliseconds(0);
     config.maxRenders = 1;
@@ -54,7 +54,7 @@ struct Api {
       for (Route& route : family(context)) routes.push_back(std::move(route));
   }
 
-  /// Calls the route's handler, and throws what it throws. `target` may have a query.
+  /// Calls the route's handler and throws its exceptions. `target` may have a query.
   net::Response call(const std::string& method, const std::string& target, const std::string& body = "",
                      net::Headers headers = {{"Content-Type", "application/json"}}) {
     net::Request request;

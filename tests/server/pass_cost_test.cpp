@@ -31,7 +31,7 @@ TEST(PassCost, TellsTheFixedPartFromThatOfThePixelsByTwoSizes) {
   EXPECT_NEAR(cost.fixedSeconds(), 5e-4, 1e-9);
   EXPECT_NEAR(cost.secondsPerPixel(), 1e-7, 1e-12);
   EXPECT_NEAR(cost.seconds(700'000), truth(700'000), 1e-6);
-  // And keeps it while all passes have one size, even if their cost drifts.
+  // The fixed part is kept while all passes have one size, even if their cost drifts.
   for (const double drift : {1.0, 1.2})
     for (int i = 0; i < 10; ++i) cost.add(50'000, drift * truth(50'000));
   EXPECT_NEAR(cost.fixedSeconds(), 5e-4, 1e-9);

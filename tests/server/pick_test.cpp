@@ -267,7 +267,7 @@ TEST(Pick, OneTooManyIsRefusedWith429) {
   } catch (const ProtocolError& error) {
     EXPECT_EQ(error.status, 429);
   }
-  // A pick that waited in vain makes room again.
+  // A pick whose wait has timed out makes room again.
   picker.workshop.steps(2 * int(Session::kMaxPicks));
   EXPECT_EQ(picker.answers.size(), Session::kMaxPicks);
   for (std::size_t i = 0; i <= Session::kMaxPicks; ++i)

@@ -74,7 +74,7 @@ TEST(RenderLoop, DropsTheFilmThatNobodyHasWatchedForTheLongestTimeWhenMemoryIsSh
   watch(1);  // instead of 2
   EXPECT_EQ(workshop.control->renderersMade, 5);
   for (const Watched& one : all) {
-    // Nothing worse is shown than what was.
+    // No picture is worse than one shown before.
     std::vector<std::uint32_t> samples;
     for (const auto& frame : one.viewer->frames) samples.push_back(frame.info.samples);
     EXPECT_TRUE(std::is_sorted(samples.begin(), samples.end()));
@@ -307,7 +307,7 @@ TEST(RenderLoop, AddsUpAndMakesLargePicturesInTheBackground) {
 }
 
 TEST(RenderLoop, RendersInTheBackgroundWhatCannotBeDividedIntoTurns) {
-  // A pass of a second, of which a slice is a tenth: its rays take too long for a turn.
+  // A slice of a tenth of a second takes a whole second: the rays take too long for a turn.
   Workshop workshop;
   const auto slow = workshop.store.create(seedPatch(1)), quick = workshop.store.create(seedPatch(2));
   const auto slowViewer = std::make_shared<FakeViewer>(), quickViewer = std::make_shared<FakeViewer>();
@@ -487,7 +487,7 @@ TEST(RenderLoop, EndsEvenUrgentPassesWhenItStops) {
   EXPECT_EQ(workshop.control->passes.size(), passes);
 }
 
-/// A small picture of 16 samples whose error is being measured, until the background is told to finish.
+/// A small picture of 16 samples whose error is being measured until the test lets the background job finish.
 struct Measured {
   Workshop workshop;
   std::shared_ptr<FakeViewer> viewer = std::make_shared<FakeViewer>(), other = std::make_shared<FakeViewer>();

@@ -88,7 +88,7 @@ TEST(Session, WritesTheMessageAboutAnEditOnceForAllViewers) {
   EXPECT_EQ(first->messages, second->messages);
 }
 
-/// Resolves no patch before it is released.
+/// Resolves no patch until the test releases it.
 class HeldResolver : public SceneResolver {
  public:
   HeldResolver() : SceneResolver(testing::smallStore(), {}) {}
@@ -307,7 +307,7 @@ TEST(Session, RecordsNoAovsForWhichThereIsNeverMemory) {
   }
   EXPECT_FALSE(session.request().aovs);
   EXPECT_EQ(session.scene().revision, 1u);
-  // Nor does an edit make the scene one that cannot be rendered.
+  // An edit cannot lead to this either: it ends the recording.
   session.patch(sized(100), {});
   session.waitForFrame({0, 1, true}, 0ms);
   EXPECT_TRUE(session.request().aovs);

@@ -14,7 +14,7 @@ using nlohmann::json;
 using testing::FakeViewer;
 using testing::Workshop;
 
-/// Keeps what it is given to send, but fails for texts that contain `refused`.
+/// Stores the texts and frames that it gets, but fails for texts that contain `refused`.
 struct FakeSocket : net::WebSocket {
   std::string refused = "nothing";
   std::vector<net::SharedText> texts;

@@ -19,7 +19,7 @@ struct Unread {
   UnsentAnswers answers{memory};
   std::vector<std::shared_ptr<const void>> held;
 
-  /// The reason why the flow gets no memory for a further answer; empty if it gets it.
+  /// The reason why the flow gets no memory for another answer; empty if it gets memory.
   std::string refusal(const std::string& flow, std::uint64_t bytes) {
     try {
       held.push_back(answers.take(flow, bytes));

@@ -11,7 +11,7 @@
 namespace scolopax::net {
 namespace {
 
-/// Notes the order in which jobs run.
+/// Records the order in which jobs run.
 class Notes {
  public:
   FairPool::Job job(const std::string& name) {

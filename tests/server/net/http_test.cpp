@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// HTTP from the view of well-behaved and other clients.
+// HTTP as seen by well-behaved and other clients.
 #include <atomic>
 #include <mutex>
 
@@ -388,7 +388,7 @@ TEST_F(HttpTest, RefusesConnectionsOverTheLimitAndRecovers) {
 
 class StrangersTest : public HttpTest {
  protected:
-  /// A server with 8 places, 4 of them for strangers, which waits for heads for ever.
+  /// A server with 8 connections, 4 of them for strangers, that waits for heads for ever.
   void SetUp() override {
     Options options = quickOptions();
     options.maxConnections = 8;
@@ -401,7 +401,7 @@ class StrangersTest : public HttpTest {
     client->send("GET /hello/you HTTP/1.1\r\nX-Kno");
     return client;
   }
-  /// Waits until the server has accepted all connections so far, by one more that it knows.
+  /// Waits until the server has accepted all connections so far, by opening another one with a known client.
   void allAccepted() {
     EXPECT_EQ(TestClient(port()).request("GET /hello/you HTTP/1.1\r\nX-Known: 1").status, 200);
   }

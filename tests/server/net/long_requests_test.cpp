@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests that take long or wait: what they take from others, and how they end.
+// Requests that take long or wait: their effect on other requests, and how they end.
 #include <atomic>
 #include <memory>
 #include <thread>

@@ -8,7 +8,7 @@
 namespace scolopax::net {
 namespace {
 
-/// Takes all jobs that may begin, and ends them unless they are to be left running.
+/// Takes all jobs that may begin, and ends them unless they must be left running.
 std::string taken(TurnQueue<std::string>& queue, bool end = true) {
   std::string jobs;
   while (queue.ready()) {

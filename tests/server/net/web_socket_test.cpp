@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The upgrade, messages both ways, latest frame wins, and the end of connections.
+// The upgrade, messages in both directions, latest frame wins, and the end of connections.
 #include "server/net/web_socket.h"
 
 #include <mutex>
