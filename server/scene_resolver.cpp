@@ -16,7 +16,7 @@
 #include "renderer/data/defaults.h"
 #include "renderer/data/gradient_histogram.h"
 #include "renderer/data/image.h"
-#include "renderer/data/render_plan.h"
+#include "renderer/data/scene_checks.h"
 #include "renderer/data/surfaces.h"
 #include "renderer/data/visible_hull.h"
 #include "renderer/renderer.h"

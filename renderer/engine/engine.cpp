@@ -16,6 +16,7 @@
 #include "renderer/data/pixel_loops.h"
 #include "renderer/data/render_plan.h"
 #include "renderer/data/sampling.h"
+#include "renderer/data/scene_checks.h"
 #include "renderer/engine/corrections.h"
 #include "renderer/engine/picking.h"
 #include "renderer/engine/pilot.h"

@@ -9,6 +9,7 @@
 #include "renderer/data/camera.h"
 #include "renderer/data/instances.h"
 #include "renderer/data/sampling.h"
+#include "renderer/data/scene_view.h"
 
 namespace scolopax {
 namespace {

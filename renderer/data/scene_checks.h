@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a scene must fulfil to be rendered, apart from its camera and curves, which are checked where they are
+// converted.
+#pragma once
+#include "renderer/data/scene.h"
+#include "renderer/data/volume.h"
+
+namespace scolopax {
+
+/// Throws Error(badInput) if a side is not in 1..kMaxImageSide.
+void checkImageSize(const Scene& scene);
+/// Throws Error(badInput) for a light whose direction is zero, whose position or direction has no finite
+/// length, or whose colour or intensity is negative or not finite.
+void checkLight(const Light& light);
+/// Throws Error(badInput) for a step that Scene::step does not allow.
+void checkStep(double step);
+/// Throws Error(badInput) if RenderPlan would refuse the scene for anything but its camera and curves.
+void checkScene(const Scene& scene, const Volume& volume);
+
+}  // namespace scolopax
