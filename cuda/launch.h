@@ -7,6 +7,7 @@
 
 #include "renderer/data/instances.h"
 #include "renderer/kernel/rng.h"
+#include "renderer/kernel/sample_records.h"
 
 namespace scolopax::cuda {
 

@@ -12,6 +12,7 @@
 
 #include "renderer/data/render_plan.h"
 #include "renderer/kernel/rng.h"
+#include "renderer/kernel/sample_records.h"
 
 namespace scolopax {
 

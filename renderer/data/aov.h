@@ -8,7 +8,7 @@
 
 #include "renderer/data/image.h"
 #include "renderer/data/method.h"
-#include "renderer/kernel/views.h"
+#include "renderer/kernel/sample_records.h"
 
 namespace scolopax {
 

@@ -11,6 +11,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/is_finite.h"
+#include "renderer/kernel/views.h"
 
 namespace scolopax {
 namespace {

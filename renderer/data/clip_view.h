@@ -6,7 +6,7 @@
 
 #include "renderer/data/clipping.h"
 #include "renderer/data/volume.h"
-#include "renderer/kernel/views.h"
+#include "renderer/kernel/views/clip_view.h"
 
 namespace scolopax {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "renderer/data/scene.h"
-#include "renderer/kernel/views.h"
+#include "renderer/kernel/views/curve_view.h"
 
 namespace scolopax {
 

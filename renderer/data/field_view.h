@@ -3,7 +3,7 @@
 #pragma once
 #include "renderer/data/method.h"
 #include "renderer/data/volume.h"
-#include "renderer/kernel/views.h"
+#include "renderer/kernel/views/field_view.h"
 
 namespace scolopax {
 

@@ -4,6 +4,7 @@
 #pragma once
 #include "renderer/data/curve.h"
 #include "renderer/data/volume.h"
+#include "renderer/kernel/views/gradient_factor_view.h"
 
 namespace scolopax {
 

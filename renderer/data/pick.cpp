@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "renderer/kernel/views.h"
+
 namespace scolopax {
 namespace {
 constexpr int kLeastSide = 2;

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "renderer/kernel/views.h"
+#include "renderer/kernel/sample_records.h"
 
 namespace scolopax {
 

@@ -8,7 +8,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
 #include "renderer/data/clip_view.h"
-#include "renderer/kernel/views.h"
+#include "renderer/kernel/views/light_view.h"
 
 namespace scolopax {
 

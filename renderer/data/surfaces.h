@@ -7,6 +7,7 @@
 #include "renderer/data/macrocell_grid.h"
 #include "renderer/data/scene.h"
 #include "renderer/kernel/views.h"
+#include "renderer/kernel/views/surface_view.h"
 
 namespace scolopax {
 

@@ -6,6 +6,7 @@
 #include "renderer/kernel/blend_modes.h"
 #include "renderer/kernel/cell_walk.h"
 #include "renderer/kernel/rng.h"
+#include "renderer/kernel/sample_records.h"
 
 namespace scolopax::kernel {
 

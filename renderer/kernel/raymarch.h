@@ -5,6 +5,7 @@
 // of 5.2-5.3 takes one point instead). Lighting is computed once per stratum of absorbed light. Biased; the
 // error is of second order in the segments' length.
 #pragma once
+#include "renderer/kernel/sample_records.h"
 #include "renderer/kernel/strata.h"
 
 namespace scolopax::kernel {

@@ -5,6 +5,7 @@
 
 #include "renderer/kernel/cell_walk.h"
 #include "renderer/kernel/rng.h"
+#include "renderer/kernel/sample_records.h"
 
 namespace scolopax::kernel {
 

@@ -3,6 +3,7 @@
 #pragma once
 #include "renderer/kernel/clip.h"
 #include "renderer/kernel/gradient.h"
+#include "renderer/kernel/sample_records.h"
 
 namespace scolopax::kernel {
 

@@ -5,6 +5,7 @@
 #include "renderer/kernel/cubic.h"
 #include "renderer/kernel/filters.h"
 #include "renderer/kernel/point_walk.h"
+#include "renderer/kernel/sample_records.h"
 
 namespace scolopax::kernel {
 

@@ -2,6 +2,7 @@
 // The classifier of channels whose opacity and colour depend on the value alone, along curves.
 #pragma once
 #include "renderer/kernel/gradient.h"
+#include "renderer/kernel/sample_records.h"
 #include "renderer/kernel/segment_cubics.h"
 
 namespace scolopax::kernel {
