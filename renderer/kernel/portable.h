@@ -22,19 +22,23 @@ inline constexpr bool kPlainDevice = false;
 }  // namespace scolopax::kernel
 
 // SCOLOPAX_HOT marks functions in which most of the time is spent; everything that they call is inlined.
-// SCOLOPAX_APART and SCOLOPAX_RARE mark functions that are seldom called and are not inlined. On a device,
-// everything is inlined except SCOLOPAX_RARE functions, which only few scenes need. With sanitizers, whose
-// code is long, no inlining is forced.
+// SCOLOPAX_PART marks parts of one long function: they are inlined wherever they are called, so that what
+// they take by reference stays in registers. SCOLOPAX_APART and SCOLOPAX_RARE mark functions that are seldom
+// called and are not inlined. On a device, everything is inlined except SCOLOPAX_RARE functions, which only
+// few scenes need. With sanitizers, whose code is long, no inlining is forced.
 #if defined(__CUDACC__)
 #define SCOLOPAX_HOT SCOLOPAX_HD
+#define SCOLOPAX_PART SCOLOPAX_HD __attribute__((always_inline))
 #define SCOLOPAX_APART SCOLOPAX_HD
 #define SCOLOPAX_RARE SCOLOPAX_HD __attribute__((noinline))
 #elif defined(__SANITIZE_ADDRESS__)
 #define SCOLOPAX_HOT
+#define SCOLOPAX_PART
 #define SCOLOPAX_APART
 #define SCOLOPAX_RARE
 #else
 #define SCOLOPAX_HOT __attribute__((flatten))
+#define SCOLOPAX_PART __attribute__((always_inline))
 #define SCOLOPAX_APART __attribute__((noinline))
 #define SCOLOPAX_RARE SCOLOPAX_APART
 #endif
@@ -47,11 +51,13 @@ inline constexpr bool kPlainDevice = false;
 // address: g++ 12 passes only half of a vector by value if its instruction set is not that of the file.
 #if defined(SCOLOPAX_SIMD)
 #define SCOLOPAX_LANES SCOLOPAX_SIMD_INLINE inline
+#define SCOLOPAX_LANES_PART SCOLOPAX_LANES
 #define SCOLOPAX_LANES_LAMBDA SCOLOPAX_SIMD_INLINE
 #define SCOLOPAX_LANES_APART SCOLOPAX_SIMD __attribute__((noinline))
 #define SCOLOPAX_LANES_RARE SCOLOPAX_LANES_APART
 #else
 #define SCOLOPAX_LANES SCOLOPAX_HD inline
+#define SCOLOPAX_LANES_PART SCOLOPAX_PART inline
 #define SCOLOPAX_LANES_LAMBDA
 #define SCOLOPAX_LANES_APART SCOLOPAX_APART
 #define SCOLOPAX_LANES_RARE SCOLOPAX_RARE

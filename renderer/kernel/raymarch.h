@@ -71,6 +71,48 @@ struct Marched {
   typename L::Mask open;      ///< rays that a tracker would have followed up to here
 };
 
+/// What changes along rays from segment to segment, except the colour of matter, to which strata add. Kept in
+/// registers: only parts of marchRay() take it by reference.
+template <class L>
+struct MarchState {
+  using Float = typename L::Float;
+  using Mask = typename L::Mask;
+
+  Float end;  ///< a tracker's ray would end where the opacity passes this number
+  Mask open;  ///< rays that a tracker would have followed up to here
+  Float transmittance{1.0f};
+  Float opacity{0.0f};  ///< of matter; 1 - transmittance would lose the digits of thin matter
+  Float solid{0.0f};    ///< opacity of surfaces; apart from that of matter, which is lit in strata
+  typename L::Vec ofSurfaces{0.0f};  ///< what surfaces have added to the colour
+
+  /// Rays that are not opaque yet.
+  SCOLOPAX_LANES_PART Mask continuing(const OpacityLimit& opaque) const {
+    return transmittance > opaque.transmittance;
+  }
+  /// Absorbs light in matter of the given optical depth. Returns how much.
+  SCOLOPAX_LANES_PART Float absorb(Float depth) {
+    const Float alpha = absorbed(depth), absorbedHere = transmittance * alpha;
+    opacity = opacity + absorbedHere;
+    transmittance = transmittance * (1.0f - alpha);
+    return absorbedHere;
+  }
+  /// Of the rays in `which`, those whose tracker would have ended in the matter absorbed last. Where a ray
+  /// ends because it is opaque, a tracker's ray would hardly have come further.
+  SCOLOPAX_LANES_PART Mask endIn(Mask which, const OpacityLimit& opaque) {
+    const Mask ends = open & which & ((opacity + solid > end) | without(L::everywhere(), continuing(opaque)));
+    open = without(open, ends);
+    return ends;
+  }
+  /// A copy for functions that are not inlined, so that the state itself need not be in memory.
+  SCOLOPAX_LANES_PART Marched<L> marched() const { return {transmittance, solid, ofSurfaces, open}; }
+  SCOLOPAX_LANES_PART void take(const Marched<L>& marched) {
+    transmittance = marched.transmittance;
+    solid = marched.opacity;
+    ofSurfaces = marched.color;
+    open = marched.open;
+  }
+};
+
 /// Adds the surfaces that rays meet up to `reached`. A tracker's ray would end where the opacity of surfaces
 /// passes `end`; `offset` is the jitter of shadow rays.
 template <class Lighting, class Steps, class L, class Blend, class View>
@@ -114,6 +156,36 @@ SCOLOPAX_LANES_RARE void meetSurfaces(const View& scene, const Blend& blend, con
   }
 }
 
+/// Means of all channels over a segment.
+template <class L>
+struct SegmentMeans {
+  typename L::Float extinction;
+  typename L::Vec emission;
+};
+
+/// Integrates the channels over a segment. If such segments can be divided, shortens it first while it is too
+/// thick. Keeps the parts of the channels in `memory`, that of the strata, for lighting.
+template <class Lighting, class Steps, class L, class Blend, class View, class Scalars, class Cuts,
+          class Memory>
+SCOLOPAX_LANES_PART SegmentMeans<L> integrate(const View& scene, const Blend& blend, const Scalars& scalars,
+                                              typename L::Float transmittance, Cuts& along,
+                                              Segment<L>& segment, Hidden<L, Blend::kSums>& hidden,
+                                              [[maybe_unused]] Memory& memory) {
+  constexpr Detail kDetail = Lighting::kAny ? Detail::moment : Detail::emission;
+  for (;;) {
+    typename L::Vec emission(0.0f);
+    const typename L::Float extinction = visitParts<kDetail>(
+        scene, blend, segment, scalars, hidden, [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
+          if constexpr (Lighting::kAny) memory.parts[n] = part;
+          emission = emission + part.emission;
+        });
+    if constexpr (Steps::kDivides) {
+      if (along.shorten(segment, extinction * segment.length(), transmittance, scene.thickest)) continue;
+    }
+    return {extinction, emission};
+  }
+}
+
 /// Marches rays through `channels` (bit n: visible channel n). `set` keeps the random numbers of several such
 /// marches apart.
 template <class Lighting, class Steps, class L, class Blend, class View>
@@ -124,21 +196,15 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
   using Float = typename L::Float;
   using Mask = typename L::Mask;
   using Vec = typename L::Vec;
-  constexpr Detail kDetail = Lighting::kAny ? Detail::moment : Detail::emission;
-  Vec color(0.0f);
-  Float transmittance(1.0f), opacity(0.0f);  // both: 1 - transmittance loses the digits of thin matter
+  using OfStrata = Strata<Steps, L, Blend, View>;
   const Mask meets = inside.enter < inside.exit;
   const auto random = sampler.next(meets);
-  // A tracker's ray would end where the opacity passes this number.
-  const Float end = uniformOf(random.y);
-  Mask open = meets;
+  MarchState<L> state{uniformOf(random.y), meets};
+  Vec color(0.0f);  // of matter
   SurfacesAhead<L> ahead;
   const bool hasSurfaces = scene.hasSurfaces();
-  Float solid(0.0f);     // opacity of surfaces; that of matter is apart, because it is lit in strata
-  Vec ofSurfaces(0.0f);  // and so is what they add to the colour
   if (hasSurfaces) [[unlikely]]
     ahead.begin(scene, ray, inside, channels, cost);
-  using OfStrata = Strata<Steps, L, Blend, View>;
   [[maybe_unused]] typename OfStrata::Memory memory;
   [[maybe_unused]] OfStrata strata(memory, scene, blend, ray, channels, set, ofStrata, cost);
   typename Steps::template Scalars<L, View> scalars;
@@ -146,65 +212,44 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
   Segment<L> segment;
   Spans<L> spans(scene, ray, inside, channels);
   for (bool last = false; !last;) {
-    const auto span = spans.next(transmittance > scene.opaque.transmittance,
-                                 hasSurfaces ? ahead.hit().t : Float(kInfinity));
+    const auto span =
+        spans.next(state.continuing(scene.opaque), hasSurfaces ? ahead.hit().t : Float(kInfinity));
     typename Steps::template Cuts<L, View> along(scalars, scene, ray, span, channels, uniformOf(random.x),
                                                  scene.step, cost);
     for (bool more = true; more;) {
       more = along.next(segment);
-      Vec emission(0.0f);
-      Float extinction;
-      for (;;) {
-        emission = Vec(0.0f);
-        extinction = visitParts<kDetail>(scene, blend, segment, scalars, hidden,
-                                         [&](int n, const PartOf<L>& part) SCOLOPAX_LANES_LAMBDA {
-                                           if constexpr (Lighting::kAny) memory.parts[n] = part;
-                                           emission = emission + part.emission;
-                                         });
-        if constexpr (Steps::kDivides) {
-          if (along.shorten(segment, extinction * segment.length(), transmittance, scene.thickest)) continue;
-        }
-        break;
-      }
-      const Float length = segment.length(), before = opacity;
+      const SegmentMeans<L> means = integrate<Lighting, Steps, L>(scene, blend, scalars, state.transmittance,
+                                                                  along, segment, hidden, memory);
+      const Float extinction = means.extinction, before = state.opacity;
+      Vec emission = means.emission;
       const Mask some = extinction > 0.0f;
       if (any(some)) {
-        const Float alpha = absorbed(where(some, extinction * length)), absorbedHere = transmittance * alpha;
-        opacity = opacity + absorbedHere;
-        transmittance = transmittance * (1.0f - alpha);
-        more = more && along.keep(transmittance > scene.opaque.transmittance);
+        const Float absorbedHere = state.absorb(where(some, extinction * segment.length()));
+        more = more && along.keep(state.continuing(scene.opaque));
         emission = emission * where(some, absorbedHere / extinction);
         if constexpr (!Lighting::kAny) color = color + emission;
         if (first) [[unlikely]]
-          // Where a ray ends because it is opaque, a tracker's ray would hardly have come further.
-          if (const Mask met = open & some &
-                               ((opacity + solid > end) |
-                                without(L::everywhere(), transmittance > scene.opaque.transmittance));
-              any(met)) {
-            open = without(open, met);
+          if (const Mask met = state.endIn(some, scene.opaque); any(met)) {
             // A copy, so that the segment itself need not be in memory.
-            SegmentCollision<L> collision{segment, extinction, (end - (before + solid)) / absorbedHere, met};
+            SegmentCollision<L> collision{segment, extinction,
+                                          (state.end - (before + state.solid)) / absorbedHere, met};
             meet<L>(scene, blend, scalars, hidden, collision, first);
           }
       } else if (more) {
         continue;
       }
-      last = !more && spans.done(transmittance > scene.opaque.transmittance);
+      last = !more && spans.done(state.continuing(scene.opaque));
       if constexpr (Lighting::kAny)
-        strata.absorb(before, opacity, last, segment, extinction, emission, color);
+        strata.absorb(before, state.opacity, last, segment, extinction, emission, color);
     }
     if (hasSurfaces) [[unlikely]] {
-      // A copy, so that the ray's light itself need not be in memory.
-      Marched<L> marched{transmittance, solid, ofSurfaces, open};
-      meetSurfaces<Lighting, Steps, L>(scene, blend, ray, channels, span.exit, end - opacity,
+      Marched<L> marched = state.marched();
+      meetSurfaces<Lighting, Steps, L>(scene, blend, ray, channels, span.exit, state.end - state.opacity,
                                        uniformOf(random.z), ahead, marched, cost, first);
-      transmittance = marched.transmittance;
-      solid = marched.opacity;
-      ofSurfaces = marched.color;
-      open = marched.open;
+      state.take(marched);
     }
   }
-  return {color + ofSurfaces, minimum(opacity + solid, 1.0f)};
+  return {color + state.ofSurfaces, minimum(state.opacity + state.solid, 1.0f)};
 }
 
 template <class Steps>
