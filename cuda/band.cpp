@@ -87,14 +87,7 @@ void Band::finish(const Pass& pass) {
   const std::size_t count = std::size_t(band_.rows) * std::size_t(band_.scene.width);
   std::copy_n(pixels_.host, count, pass.pixels + begin);
   if (pass.first) std::copy_n(first_.host, count, pass.first + begin);
-  for (std::size_t i = 0; pass.cost && i < count; ++i) {
-    kernel::SampleCost& sum = pass.cost[begin + i];
-    const kernel::SampleCost& cost = cost_.host[i];
-    sum.fetches += cost.fetches;
-    sum.cellSteps += cost.cellSteps;
-    sum.randomBlocks += cost.randomBlocks;
-    sum.truncated += cost.truncated;
-  }
+  for (std::size_t i = 0; pass.cost && i < count; ++i) kernel::addCost(&pass.cost[begin + i], cost_.host[i]);
   std::fill_n(pass.done + begin, count, std::uint8_t(1));
 }
 

@@ -2,6 +2,7 @@
 // A sample by analog tracking: the ray ends at its first collision and has the lit colour there. With every
 // tracker its expected value is the exact picture, whatever the lighting.
 #pragma once
+#include "renderer/kernel/sample_records.h"
 #include "renderer/kernel/shade.h"
 #include "renderer/kernel/surfaces.h"
 #include "renderer/kernel/trackers/process_per_channel.h"
@@ -123,7 +124,7 @@ struct Analog {
         hit = Collision{
             {surface->t, 0.0f}, ray.origin + surface->t * ray.direction, surface->surface.channel, 0.0f};
       }
-      if (first) keepNearer(first, {hit->place.t(), hit->channel});
+      if (first) keepNearer(first, true, hit->place.t(), hit->channel);
       const glm::vec3 color = radiance<Tracker, Blend, Lighting>(scene, ray, *hit, ending, sampler, cost);
       *sum = glm::vec4(glm::vec3(*sum) + color, 1.0f);
     };

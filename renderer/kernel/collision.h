@@ -28,10 +28,6 @@ struct Collision {
   float position;   ///< position on that channel's curves
 };
 
-SCOLOPAX_HD inline void keepNearer(FirstCollision* first, const FirstCollision& other) {
-  if (first->channel < 0 || other.depth < first->depth) *first = other;
-}
-
 /// Maximum number of tentative collisions of a ray. A ray with more stops there and counts as truncated. This
 /// bounds the work, and is far above what is needed for any optical depth that is distinguishable from
 /// opaque.

@@ -119,6 +119,13 @@ SCOLOPAX_HD inline Value gather(const Value* base, std::uint32_t index) {
   return base[index];
 }
 
+/// Lanes in which bit n of the word is set.
+template <class Word>
+SCOLOPAX_LANES auto hasBit(Word word, int n) {
+  const Word bit(1u << n);
+  return (word & bit) == bit;
+}
+
 template <class Vec>
 SCOLOPAX_LANES auto dot(const Vec& a, const Vec& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

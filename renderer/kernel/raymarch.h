@@ -25,13 +25,6 @@ struct SegmentCollision {
   typename L::Float extinction, share;
   typename L::Mask which;
 };
-template <class L>
-SCOLOPAX_LANES void keepNearer(FirstCollisionOf<L>* first, typename L::Mask which, typename L::Float depth,
-                               typename L::Int channel) {
-  const typename L::Mask nearer = which & ((typename L::Int(0) > first->channel) | (depth < first->depth));
-  first->depth = select(nearer, depth, first->depth);
-  first->channel = select(nearer, channel, first->channel);
-}
 
 /// Records collisions that are nearer than the rays' nearest so far. The share chooses one of the channels'
 /// visible parts and, within it, the distance. Where the largest extinction hides the others, these parts

@@ -54,10 +54,7 @@ struct RenderPixel {
     if (collisions) collisions[at] = {scene.rays.depth(through.x, through.y, met.depth), met.channel};
     if (cost) {
       spent.randomBlocks += sampler.blocks();
-      cost[at].fetches += spent.fetches;
-      cost[at].cellSteps += spent.cellSteps;
-      cost[at].randomBlocks += spent.randomBlocks;
-      cost[at].truncated += spent.truncated;
+      addCost(&cost[at], spent);
     }
   }
 };

@@ -22,8 +22,7 @@ struct Segment {
   /// Rays for which channel n, one of `channels`, may have extinction.
   SCOLOPAX_LANES Mask of(int n) const {
     if (L::kLanes == 1 || !apart) return live;
-    const Word bit(1u << n);
-    return live & ((met & bit) == bit);
+    return live & hasBit(met, n);
   }
   /// Rays for which more than one channel may have extinction.
   SCOLOPAX_LANES Mask several() const {

@@ -76,7 +76,6 @@ SCOLOPAX_LANES_APART void findLight(const View& scene, const Blend& blend, const
                                     std::uint32_t channels, const StratumPlaces<L>& places,
                                     const SurfaceStart<L>& surface, const typename L::Mask& which,
                                     CostOf<L>* cost, typename L::Vec* radiance) {
-  using Word = typename L::Word;
   using Vec = typename L::Vec;
   const LitPoint<L> hit{ray, places.t, insideOf<L>(scene.clip, ray.origin + places.t * ray.direction)};
 
@@ -88,8 +87,7 @@ SCOLOPAX_LANES_APART void findLight(const View& scene, const Blend& blend, const
   const typename L::Mask onSurface = surface.channel > typename L::Int(-1);
   Vec sum(0.0f);
   for (int n = 0; n < scene.channelCount; ++n) {
-    const Word bit(1u << n);
-    const typename L::Mask here = which & ((places.kept & bit) == bit);
+    const typename L::Mask here = which & hasBit(places.kept, n);
     if (!any(here)) continue;
     const Vec light = places.share[n] *
                       lit(scene, scene.channels[n], places.color[n], hit, visibility, here, onSurface, cost);

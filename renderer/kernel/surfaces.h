@@ -120,10 +120,8 @@ class SurfaceWalk {
     inCell_ = inCell_ | has;
     const Word wanted = where(has, walk_.active()) & Word(channels_);
     sampleCubics<L>(scene_, rays_, unionOf(wanted), walk_.start(), walk_.end(),
-                    [&](int n, const Vec*, const Float* values) SCOLOPAX_LANES_LAMBDA {
-                      const Word bit(1u << n);
-                      look(n, values, has & ((wanted & bit) == bit));
-                    });
+                    [&](int n, const Vec*, const Float* values)
+                        SCOLOPAX_LANES_LAMBDA { look(n, values, has & hasBit(wanted, n)); });
     // Of channels that were not sampled, nothing is known at the next cell's face.
     known_ = select(has, known_ & wanted, known_);
   }
@@ -136,10 +134,9 @@ class SurfaceWalk {
     const Cubic<L> f = cubicThrough<L>(own);
     value_[n] = select<L>(which, f, value_[n]);
     cost_->fetches = cost_->fetches + Word(onesOf(which)) * Word(cubicFetches(channel.field));
-    const Word bit(1u << n);
     const Mask finite = which & isFinite(f.c0);
     known_ = select(without(which, finite), known_ & Word(~(1u << n)), known_);
-    const Mask first = without(finite, (known_ & bit) == bit);
+    const Mask first = without(finite, hasBit(known_, n));
     if (!any(first)) return;
     const Float atBegin = f.at(Float(-1.0f)), length = walk_.end() - walk_.start();
     const Float way = unit_ * kSoon;
@@ -162,7 +159,7 @@ class SurfaceWalk {
       above = above | where((unclear & (soon >= value)) | without(atBegin >= value, unclear), Word(1u << i));
     }
     above_[n] = select(first, above, above_[n]);
-    known_ = select(first, known_ | bit, known_);
+    known_ = select(first, known_ | Word(1u << n), known_);
   }
 
   /// Finds the next crossing in the cell of each ray in `seeking`. Returns the rays that have one.
@@ -173,8 +170,7 @@ class SurfaceWalk {
     for (int n = 0; n < scene_.channelCount; ++n) {
       const ChannelView& own = scene_.channels[n];
       if (own.surfaceCount == 0 || !(channels_ >> n & 1)) continue;
-      const Word bit(1u << n);
-      const Mask here = seeking & ((known_ & bit) == bit);
+      const Mask here = seeking & hasBit(known_, n);
       if (!any(here)) continue;
       const Cubic<L>& f = value_[n];
       const CubicBounds<L> bounds = boundsOf(f);
@@ -182,8 +178,7 @@ class SurfaceWalk {
       const Turns<L> turns = turnsOf(f);
       for (int i = 0; i < own.surfaceCount; ++i) {
         const SurfaceView& surface = own.surfaces[i];
-        const Word side(1u << i);
-        const Mask above = (above_[n] & side) == side;
+        const Mask above = hasBit(above_[n], i);
         const Float value(surface.value);
         const Mask may =
             here & ((above & (bounds.lower < value)) | without(bounds.upper >= value - slack, above));
@@ -255,8 +250,7 @@ class SurfaceWalk {
     const Word kept = channelsAt<L>(scene_.clip, rays_.origin + hit_.t * rays_.direction);
     Mask found = without(which, which);
     for (int n = 0; n < scene_.channelCount; ++n) {
-      const Word bit(1u << n);
-      found = found | (which & (hit_.surface.channel == Int(n)) & ((kept & bit) == bit));
+      found = found | (which & (hit_.surface.channel == Int(n)) & hasBit(kept, n));
     }
     return found;
   }
