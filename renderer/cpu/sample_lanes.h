@@ -112,10 +112,15 @@ SCOLOPAX_LANES Float sampleOne(const Points& at, const kernel::FieldView& field)
   return lerp(lerp(c00, c10, at.y.t), lerp(c01, c11, at.y.t), at.z.t);
 }
 
-/// Samples one channel of any type: by gathering if every axis has neighbours and 32-bit indices suffice,
-/// else lane by lane.
+/// Whether every axis has neighbours, and 32-bit indices suffice for gathers.
+SCOLOPAX_LANES bool canGather(const Points& at, const kernel::FieldView& field) {
+  return !isFlat(at.dims) && at.slices * float(at.dims.x) * float(at.dims.y) * float(field.stride) < 0x1p29f;
+}
+
+/// Samples one channel of any type: by gathering if that is possible, else lane by lane. The switch stands
+/// for visitScalarType(), which is not compiled for the instruction set and so could not inline sampleOne().
 SCOLOPAX_LANES Float sampleChannel(const Points& at, const kernel::FieldView& field) {
-  if (isFlat(at.dims) || !(at.slices * float(at.dims.x) * float(at.dims.y) * float(field.stride) < 0x1p29f)) {
+  if (!canGather(at, field)) {
     Float values;
     for (int i = 0; i < kLanes; ++i)
       put(kernel::sampleTrilinear(field, at.dims, pointIn(at.place, i)), i, &values);
@@ -175,8 +180,7 @@ SCOLOPAX_SIMD inline FourChannels fourWith(const kernel::SceneView& scene, int n
 template <class T>
 SCOLOPAX_SIMD void sampleFour(const Points& at, const kernel::FieldView& field, int lane,
                               float* const* members) {
-  const auto stride = std::size_t(field.stride), row = stride * std::size_t(at.dims.x),
-             slice = row * std::size_t(at.dims.y);
+  const kernel::VoxelStrides strides(field, at.dims);
   const T* base = static_cast<const T*>(field.voxels) + lane;
   alignas(4 * kLanes) std::int32_t low[3][kLanes], high[3][kLanes];
   alignas(4 * kLanes) float t[3][kLanes];
@@ -187,10 +191,10 @@ SCOLOPAX_SIMD void sampleFour(const Points& at, const kernel::FieldView& field, 
     store(axes[a]->t, t[a]);
   }
   for (int i = 0; i < kLanes; ++i) {
-    const std::size_t xLow = std::size_t(low[0][i]) * stride, xHigh = std::size_t(high[0][i]) * stride;
-    const std::size_t yLow = std::size_t(low[1][i]) * row, yHigh = std::size_t(high[1][i]) * row;
-    const T* zLow = base + std::size_t(low[2][i]) * slice;
-    const T* zHigh = base + std::size_t(high[2][i]) * slice;
+    const std::size_t xLow = std::size_t(low[0][i]) * strides.x, xHigh = std::size_t(high[0][i]) * strides.x;
+    const std::size_t yLow = std::size_t(low[1][i]) * strides.y, yHigh = std::size_t(high[1][i]) * strides.y;
+    const T* zLow = base + std::size_t(low[2][i]) * strides.z;
+    const T* zHigh = base + std::size_t(high[2][i]) * strides.z;
     const __m128 c00 = lerp4(load4(zLow + yLow + xLow), load4(zLow + yLow + xHigh), t[0][i]);
     const __m128 c10 = lerp4(load4(zLow + yHigh + xLow), load4(zLow + yHigh + xHigh), t[0][i]);
     const __m128 c01 = lerp4(load4(zHigh + yLow + xLow), load4(zHigh + yLow + xHigh), t[0][i]);
@@ -274,19 +278,19 @@ SCOLOPAX_LANES void cellVoxelsOfOne(const Points& at, const kernel::FieldView& f
 template <class T>
 SCOLOPAX_SIMD void cellVoxelsOfFour(const Points& at, const kernel::FieldView& field, int lane,
                                     float* const* members) {
-  const auto stride = std::size_t(field.stride), row = stride * std::size_t(at.dims.x),
-             slice = row * std::size_t(at.dims.y);
+  const kernel::VoxelStrides strides(field, at.dims);
   const T* base = static_cast<const T*>(field.voxels) + lane;
   alignas(4 * kLanes) std::int32_t low[3][kLanes];
   store(minimum(at.x.low, Int(at.dims.x - 2)), low[0]);
   store(minimum(at.y.low, Int(at.dims.y - 2)), low[1]);
   store(minimum(at.z.low, Int(at.dims.z - 2)), low[2]);
   for (int i = 0; i < kLanes; ++i) {
-    const T* first = base + std::size_t(low[2][i]) * slice + std::size_t(low[1][i]) * row +
-                     std::size_t(low[0][i]) * stride;
+    const T* first = base + std::size_t(low[2][i]) * strides.z + std::size_t(low[1][i]) * strides.y +
+                     std::size_t(low[0][i]) * strides.x;
     for (int c = 0; c < kernel::kCorners; ++c) {
       alignas(16) float four[4];
-      _mm_store_ps(four, load4(first + (c & 1 ? stride : 0) + (c & 2 ? row : 0) + (c & 4 ? slice : 0)));
+      _mm_store_ps(
+          four, load4(first + (c & 1 ? strides.x : 0) + (c & 2 ? strides.y : 0) + (c & 4 ? strides.z : 0)));
       for (int k = 0; k < 4; ++k)
         if (members[k]) members[k][c * kLanes + i] = four[k];
     }
@@ -297,7 +301,7 @@ SCOLOPAX_SIMD void cellVoxelsOfFour(const Points& at, const kernel::FieldView& f
 SCOLOPAX_LANES void cellVoxelsOfChannel(const kernel::SceneView& scene, const Points& at, int n,
                                         Float* corners) {
   const kernel::FieldView& field = scene.channels[n].field;
-  if (!isFlat(at.dims) && at.slices * float(at.dims.x) * float(at.dims.y) * float(field.stride) < 0x1p29f) {
+  if (canGather(at, field)) {
     switch (field.type) {
       case ScalarType::u8:
         return cellVoxelsOfOne<std::uint8_t>(at, field, corners);

@@ -10,6 +10,14 @@ namespace scolopax::kernel {
 /// and counts as truncated.
 inline constexpr int kMaxSegments = 1 << 20;
 
+/// Index along an axis of the macrocell that rays are in at t. `inverseSize`: 1 / MajorantView::cellSize.
+template <class L>
+SCOLOPAX_LANES_PART typename L::Int macrocellAt(const RayOf<L>& ray, typename L::Float t, int axis,
+                                                typename L::Float inverseSize, const MajorantView& grid) {
+  const typename L::Float at = (ray.origin[axis] + t * ray.direction[axis]) * inverseSize;
+  return truncated(clamp(at, 0.0f, float(grid.cells[axis] - 1)));
+}
+
 /// Visits the cells along a ray one after another. Where blocks of cells are empty, one step covers many
 /// cells, from the entry of the first to the exit of the last, and the last becomes the current cell. Cells
 /// that are not empty are visited exactly as without such leaps, to the last bit.
@@ -19,8 +27,8 @@ class CellWalk {
       : ray_(ray), grid_(grid), end_(inside.exit), enter_(inside.enter), inverseSize_(1.0f / grid.cellSize) {
     std::int64_t stride = 1;
     for (int axis = 0; axis < 3; ++axis) {
-      const float at = (ray.origin[axis] + inside.enter * ray.direction[axis]) * inverseSize_;
-      const int last = grid.cells[axis] - 1, cell = int(clamp(at, 0.0f, float(last)));
+      const int last = grid.cells[axis] - 1;
+      const int cell = macrocellAt<One>(ray, inside.enter, axis, inverseSize_, grid);
       const bool up = ray.direction[axis] > 0.0f;
       cell_[axis] = cell;
       last_[axis] = ray.direction[axis] == 0.0f ? cell : up ? last : 0;

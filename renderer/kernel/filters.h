@@ -13,9 +13,8 @@ SCOLOPAX_HD constexpr float roundingOf(Filter filter) {
 
 /// Index along an axis of the voxel nearest to x; of two, the later.
 SCOLOPAX_HD inline int nearestVoxel(float x, int size) {
-  const float inside = clamp(x, 0.0f, float(size - 1));
-  const int whole = int(inside);
-  return inside - float(whole) >= 0.5f ? whole + 1 : whole;  // x + 0.5 would be rounded
+  const AxisPoint point(x, size);
+  return point.past() >= 0.5f ? point.voxel + 1 : point.voxel;  // x + 0.5 would be rounded
 }
 
 /// One axis of a sample by the uniform cubic B-spline, which weighs four voxels: two linear interpolations,
@@ -59,10 +58,7 @@ struct SplineAxes {
   SplineAxis x, y, z;
   /// At a place in the cell that begins at voxel `low`, from (0,0,0) to (1,1,1).
   SCOLOPAX_HD SplineAxes(const FieldView& field, glm::ivec3 dims, glm::ivec3 low, glm::vec3 place)
-      : x(splineAxis(low.x, place.x, dims.x, std::size_t(field.stride))),
-        y(splineAxis(low.y, place.y, dims.y, std::size_t(field.stride) * std::size_t(dims.x))),
-        z(splineAxis(low.z, place.z, dims.z,
-                     std::size_t(field.stride) * std::size_t(dims.x) * std::size_t(dims.y))) {}
+      : SplineAxes(VoxelStrides(field, dims), dims, low, place) {}
 
   /// Calls f(j, k, of) for the 16 rows of voxels; of(i) is voxel i of the row.
   template <class F>
@@ -76,14 +72,21 @@ struct SplineAxes {
         }
     });
   }
+
+ private:
+  SCOLOPAX_PART SplineAxes(const VoxelStrides& strides, glm::ivec3 dims, glm::ivec3 low, glm::vec3 place)
+      : x(splineAxis(low.x, place.x, dims.x, strides.x)),
+        y(splineAxis(low.y, place.y, dims.y, strides.y)),
+        z(splineAxis(low.z, place.z, dims.z, strides.z)) {}
 };
 
 /// At a point in voxel coordinates.
 SCOLOPAX_HD inline SplineAxes splineAxesAt(const FieldView& field, glm::ivec3 dims, glm::vec3 point) {
   glm::ivec3 low;
   for (int axis = 0; axis < 3; ++axis) {
-    point[axis] = clamp(point[axis], 0.0f, float(dims[axis] - 1));
-    low[axis] = clampInt(int(point[axis]), 0, dims[axis] > 1 ? dims[axis] - 2 : 0);
+    const AxisPoint on(point[axis], dims[axis]);
+    point[axis] = on.at;
+    low[axis] = clampInt(on.voxel, 0, lastCell(dims[axis]));
   }
   return {field, dims, low, point - glm::vec3(low)};
 }

@@ -112,8 +112,7 @@ class PointWalk {
     meets_ = without(meets_, without(along, right));
   }
   SCOLOPAX_LANES Int cellAt(int axis, Float t) const {
-    const Float at = (rays_.origin[axis] + t * rays_.direction[axis]) * inverseSize_;
-    return truncated(clamp(at, 0.0f, float(grid_.cells[axis] - 1)));
+    return macrocellAt<L>(rays_, t, axis, inverseSize_, grid_);
   }
   SCOLOPAX_LANES void ask() {
     const Int index = (cell_[2] * Int(grid_.cells.y) + cell_[1]) * Int(grid_.cells.x) + cell_[0];

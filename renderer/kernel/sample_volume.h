@@ -9,6 +9,28 @@
 
 namespace scolopax::kernel {
 
+/// Distance in the array from a field's voxel to the next one along each axis.
+struct VoxelStrides {
+  std::size_t x, y, z;
+  SCOLOPAX_PART VoxelStrides(const FieldView& field, glm::ivec3 dims)
+      : x(std::size_t(field.stride)), y(x * std::size_t(dims.x)), z(y * std::size_t(dims.y)) {}
+};
+
+/// Number of the last cell along an axis, which lies between the last two voxels; 0 for a single voxel.
+SCOLOPAX_HD constexpr int lastCell(int size) { return size > 1 ? size - 2 : 0; }
+
+/// A coordinate along an axis, moved to the nearest point between the outermost voxel centres, and the voxel
+/// at or before it. CellPlaces and cpu/sample_lanes.h do the same for many lanes. Other code that looks alike
+/// differs on purpose: on a face, VoxelCell takes the cell that the ray enters; and VoxelWalk and SurfaceWalk
+/// look for planes between cells, from points that may be outside the volume.
+struct AxisPoint {
+  float at;
+  int voxel;
+  SCOLOPAX_PART AxisPoint(float x, int size) : at(clamp(x, 0.0f, float(size - 1))), voxel(int(at)) {}
+  /// Distance from the voxel, in [0,1).
+  SCOLOPAX_PART float past() const { return at - float(voxel); }
+};
+
 /// One axis of a fetch: the array offsets of the two neighbours, and the weight of the second. At the last
 /// voxel and beyond, axisWeight() swaps the neighbours and returns the weight 0, so that the last voxel's
 /// value comes out exactly, whatever finite value is beside it.
@@ -18,11 +40,10 @@ struct AxisWeight {
 };
 
 SCOLOPAX_HD inline AxisWeight axisWeight(float x, int size, std::size_t stride) {
-  const float inside = clamp(x, 0.0f, float(size - 1));
-  const int last = size > 1 ? size - 2 : 0;
-  const int whole = int(inside);
+  const AxisPoint point(x, size);
+  const int last = lastCell(size), whole = point.voxel;
   if (whole > last) return {std::size_t(whole) * stride, std::size_t(last) * stride, 0.0f};
-  return {std::size_t(whole) * stride, std::size_t(size > 1 ? whole + 1 : 0) * stride, inside - float(whole)};
+  return {std::size_t(whole) * stride, std::size_t(size > 1 ? whole + 1 : 0) * stride, point.past()};
 }
 
 /// Exact where a == b. Between a and b except for rounding, which the macrocells allow for.
@@ -44,10 +65,10 @@ SCOLOPAX_HD float trilinear(const T* v, const AxisWeight& x, const AxisWeight& y
 /// Stored value of a field at a point in voxel coordinates. Not finite if and only if one of the eight
 /// corners is not (differences cannot overflow: Volume keeps float voxels below 2^124).
 SCOLOPAX_HD inline float sampleTrilinear(const FieldView& field, glm::ivec3 dims, glm::vec3 point) {
-  const auto stride = std::size_t(field.stride);
-  const AxisWeight x = axisWeight(point.x, dims.x, stride);
-  const AxisWeight y = axisWeight(point.y, dims.y, stride * std::size_t(dims.x));
-  const AxisWeight z = axisWeight(point.z, dims.z, stride * std::size_t(dims.x) * std::size_t(dims.y));
+  const VoxelStrides strides(field, dims);
+  const AxisWeight x = axisWeight(point.x, dims.x, strides.x);
+  const AxisWeight y = axisWeight(point.y, dims.y, strides.y);
+  const AxisWeight z = axisWeight(point.z, dims.z, strides.z);
   return visitScalarType(field.type, [&](auto zero) {
     return trilinear(static_cast<const decltype(zero)*>(field.voxels) + field.lane, x, y, z);
   });
@@ -63,7 +84,7 @@ SCOLOPAX_HD inline void cellVoxels(const FieldView& field, glm::ivec3 dims, glm:
   auto stride = std::size_t(field.stride);
   for (int axis = 0; axis < 3; ++axis) {
     const int size = dims[axis];
-    low += std::size_t(int(clamp(point[axis], 0.0f, float(size > 1 ? size - 2 : 0)))) * stride;
+    low += std::size_t(int(clamp(point[axis], 0.0f, float(lastCell(size))))) * stride;
     step[axis] = size > 1 ? stride : 0;
     stride *= std::size_t(size);
   }
@@ -88,7 +109,7 @@ struct CellPlaces {
 
   SCOLOPAX_LANES CellPlaces(glm::ivec3 size, const typename L::Vec& point) : low(0.0f), dims(size) {
     for (int axis = 0; axis < 3; ++axis)
-      low[axis] = toFloat(truncated(clamp(point[axis], 0.0f, float(size[axis] > 1 ? size[axis] - 2 : 0))));
+      low[axis] = toFloat(truncated(clamp(point[axis], 0.0f, float(lastCell(size[axis])))));
   }
   SCOLOPAX_LANES typename L::Vec of(const typename L::Vec& point) const {
     typename L::Vec place(0.0f);
@@ -102,10 +123,9 @@ struct CellPlaces {
 template <class L>
 SCOLOPAX_LANES typename L::Float interpolate(const typename L::Float* corners, const typename L::Vec& place) {
   using Float = typename L::Float;
-  const auto mix = [](Float a, Float b, Float t) SCOLOPAX_LANES_LAMBDA { return a + t * (b - a); };
-  const Float c00 = mix(corners[0], corners[1], place[0]), c10 = mix(corners[2], corners[3], place[0]);
-  const Float c01 = mix(corners[4], corners[5], place[0]), c11 = mix(corners[6], corners[7], place[0]);
-  return mix(mix(c00, c10, place[1]), mix(c01, c11, place[1]), place[2]);
+  const Float c00 = lerp(corners[0], corners[1], place[0]), c10 = lerp(corners[2], corners[3], place[0]);
+  const Float c01 = lerp(corners[4], corners[5], place[0]), c11 = lerp(corners[6], corners[7], place[0]);
+  return lerp(lerp(c00, c10, place[1]), lerp(c01, c11, place[1]), place[2]);
 }
 
 }  // namespace scolopax::kernel

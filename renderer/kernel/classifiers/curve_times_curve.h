@@ -47,8 +47,8 @@ struct CellGradient {
 /// axis. So a step of one voxel along any axis changes it by at most the spread of those slopes.
 SCOLOPAX_RARE inline CellGradient gradientIn(const FieldView& field, glm::ivec3 dims,
                                              const glm::mat3& fromVoxel, glm::ivec3 cell, glm::vec3 point) {
-  const std::size_t strides[] = {std::size_t(field.stride), std::size_t(field.stride) * std::size_t(dims.x),
-                                 std::size_t(field.stride) * std::size_t(dims.x) * std::size_t(dims.y)};
+  const VoxelStrides all(field, dims);
+  const std::size_t strides[] = {all.x, all.y, all.z};
   glm::vec3 change(0.0f);
   float most = 0.0f;
   bool finite = true;

@@ -30,16 +30,15 @@ struct VoxelCell {
       : low(0), way(kInfinity), nearest(0) {
     const glm::ivec3 dims = scene.dims;
     for (int axis = 0; axis < 3; ++axis) {
-      const int last = dims[axis] > 1 ? dims[axis] - 2 : 0;
+      const int last = lastCell(dims[axis]);
       const float direction = ray.direction[axis];
-      const float inside = clamp(point[axis], 0.0f, float(dims[axis] - 1));
-      int whole = int(inside);
-      if (direction < 0.0f && float(whole) == inside) --whole;
-      low[axis] = clampInt(whole, 0, last);
+      const AxisPoint on(point[axis], dims[axis]);
+      const bool entersLower = direction < 0.0f && float(on.voxel) == on.at;
+      low[axis] = clampInt(entersLower ? on.voxel - 1 : on.voxel, 0, last);
       begin[axis] = low[axis] == 0 ? -0.5f : float(low[axis]);
       end[axis] = low[axis] + 2 >= dims[axis] ? float(dims[axis]) - 0.5f : float(low[axis] + 1);
       if (scene.hasNearest() && dims[axis] > 1) [[unlikely]]
-        if (takeHalf(axis, direction, inside, point[axis])) continue;
+        if (takeHalf(axis, direction, on.at, point[axis])) continue;
       if (direction == 0.0f || low[axis] == (direction > 0.0f ? last : 0)) continue;
       const int plane = direction > 0.0f ? low[axis] + 1 : low[axis];
       way = minimum(way, (float(plane) - point[axis]) / direction);
@@ -51,7 +50,8 @@ struct VoxelCell {
     for (int axis = 0; axis < 3; ++axis) point[axis] = clamp(point[axis], begin[axis], end[axis]);
     return point;
   }
-  /// Place of a point in the cell: 0 at the lower voxel, 1 at the upper one, if there is one.
+  /// Place of a point in the cell: 0 at the lower voxel, 1 at the upper one, if there is one. Unlike that of
+  /// CellPlaces, it is never outside the cell, whatever the rounding: samples stay between the cell's voxels.
   SCOLOPAX_HD glm::vec3 placeOf(glm::ivec3 dims, glm::vec3 point) const {
     for (int axis = 0; axis < 3; ++axis)
       point[axis] = clamp(point[axis] - float(low[axis]), 0.0f, dims[axis] > 1 ? 1.0f : 0.0f);
@@ -110,9 +110,8 @@ SCOLOPAX_HD inline CellValues valuesIn(const FieldView& field, glm::ivec3 dims, 
     const int low = cell.low[axis], high = low + 1 < dims[axis] ? low + 1 : low;
     return AxisWeight{std::size_t(low) * stride, std::size_t(high) * stride, place[axis]};
   };
-  const auto stride = std::size_t(field.stride);
-  const AxisWeight x = axisOf(0, stride), y = axisOf(1, stride * std::size_t(dims.x)),
-                   z = axisOf(2, stride * std::size_t(dims.x) * std::size_t(dims.y));
+  const VoxelStrides strides(field, dims);
+  const AxisWeight x = axisOf(0, strides.x), y = axisOf(1, strides.y), z = axisOf(2, strides.z);
   return visitScalarType(field.type, [&](auto zero) {
     const auto* v = static_cast<const decltype(zero)*>(field.voxels) + field.lane;
     CellValues values{trilinear(v, x, y, z), kInfinity, -kInfinity};
