@@ -17,8 +17,7 @@ constexpr std::size_t kLargeArray = std::size_t{256} << 10;
 
 /// Sets what a kernel computes per macrocell from what is on the device; returns the memory that holds it.
 DeviceBytes makeTotals(kernel::MajorantView* majorants, bool active, DeviceMemory& memory) {
-  const glm::ivec3 cells = majorants->cells;
-  const std::size_t count = std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z);
+  const std::size_t count = countOf(majorants->cells);
   const std::size_t activeBytes = active ? count * sizeof(std::uint32_t) : 0;
   DeviceBytes bytes = memory.allocate(activeBytes + count * sizeof(kernel::TotalCode));
   // The wider ones first, for their alignment.
@@ -71,11 +70,9 @@ class DeviceScene::Upload {
     add(&curve->buckets, std::size_t(kernel::kCurveBuckets + 1));
   }
   void add(kernel::MajorantView* majorants) {
-    const glm::ivec3 cells = majorants->cells;
-    const std::size_t count = std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z);
-    add(&majorants->intervals, count * std::size_t(majorants->columns));
+    add(&majorants->intervals, countOf(majorants->cells) * std::size_t(majorants->columns));
     add(&majorants->tables, std::size_t(majorants->tableCount));
-    add(&majorants->radii, CellBlocks(cells).count());
+    add(&majorants->radii, CellBlocks(majorants->cells).count());
   }
 
   void finish(DeviceMemory& memory, Uploader& uploader) {

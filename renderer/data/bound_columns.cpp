@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/data/bound_columns.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 
 #include "renderer/data/measuring.h"
@@ -23,13 +20,7 @@ std::shared_ptr<const CellColumn> buildBoundColumn(const MacrocellGrid& macrocel
   for (const float level : gradients.levels.values) factors.push_back(factor.largest(level));
   const std::size_t columns = macrocells.levels.size();
   std::vector<ValueInterval> bounds(cells);
-  const auto forCells = [&](auto&& f) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bounds.size(), 4096), [&](const auto& range) {
-      checkWanted(stop);
-      for (std::size_t cell = range.begin(); cell < range.end(); ++cell) f(cell);
-    });
-  };
-  forCells([&](std::size_t cell) {
+  forEachOf(cells, kManyCells, stop, [&](std::size_t cell) {
     // Both factors are bounds and rounding is monotone, so their product in float is a bound too.
     const float bound = ofValues.over(macrocells.intervals[cell * columns + std::size_t(column)]) *
                         factors[gradients.cells[cell]];
@@ -37,8 +28,8 @@ std::shared_ptr<const CellColumn> buildBoundColumn(const MacrocellGrid& macrocel
   });
   CellColumn result;
   result.levels.values = chooseLevels(bounds);
-  result.cells.resize(bounds.size());
-  forCells([&](std::size_t cell) {
+  result.cells.resize(cells);
+  forEachOf(cells, kManyCells, stop, [&](std::size_t cell) {
     const std::uint8_t level = encode(result.levels, bounds[cell]).hi;
     result.cells[cell] = {level, level};
   });
@@ -61,22 +52,19 @@ std::shared_ptr<const MacrocellGrid> withColumns(const std::shared_ptr<const Mac
   result.intervals.resize(macrocells->cellCount() * after);
   const CellBlocks blocks(macrocells->cells);
   result.blocks.resize(blocks.count() * after);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.count(), 64), [&](const auto& range) {
-    checkWanted(stop);
-    for (std::size_t block = range.begin(); block < range.end(); ++block) {
-      kernel::LevelInterval* all = &result.blocks[block * after];
-      std::copy_n(&macrocells->blocks[block * before], before, all);
-      std::fill_n(all + before, columns.size(), kernel::LevelInterval{255, 0});
-      blocks.visitCells(block, [&](std::size_t cell) {
-        kernel::LevelInterval* own = &result.intervals[cell * after];
-        std::copy_n(&macrocells->intervals[cell * before], before, own);
-        for (std::size_t i = 0; i < columns.size(); ++i) {
-          const kernel::LevelInterval one = own[before + i] = columns[i]->cells[cell];
-          kernel::LevelInterval& any = all[before + i];
-          any = {std::min(any.lo, one.lo), std::max(any.hi, one.hi)};
-        }
-      });
-    }
+  forEachOf(blocks.count(), kManyBlocks, stop, [&](std::size_t block) {
+    kernel::LevelInterval* all = &result.blocks[block * after];
+    std::copy_n(&macrocells->blocks[block * before], before, all);
+    std::fill_n(all + before, columns.size(), kernel::LevelInterval{255, 0});
+    blocks.visitCells(block, [&](std::size_t cell) {
+      kernel::LevelInterval* own = &result.intervals[cell * after];
+      std::copy_n(&macrocells->intervals[cell * before], before, own);
+      for (std::size_t i = 0; i < columns.size(); ++i) {
+        const kernel::LevelInterval one = own[before + i] = columns[i]->cells[cell];
+        kernel::LevelInterval& any = all[before + i];
+        any = {std::min(any.lo, one.lo), std::max(any.hi, one.hi)};
+      }
+    });
   });
   return withShare(std::move(share), std::move(result));
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/data/gradient_cells.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -133,7 +132,7 @@ GradientCells buildGradientCells(const Volume& volume, int channel, int size, In
                                  const std::stop_token& stop) {
   const Grid& grid = volume.grid();
   const glm::ivec3 cells = macrocellsOf(grid.dims, size), last = grid.dims - 1;
-  std::vector<ValueInterval> steepness(std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z));
+  std::vector<ValueInterval> steepness(countOf(cells));
   const VoxelView& view = volume.channels()[std::size_t(channel)].voxels;
   visitScalarType(view.type(), [&](auto zero) {
     const auto voxels = view.as<decltype(zero)>();
@@ -153,11 +152,8 @@ GradientCells buildGradientCells(const Volume& volume, int channel, int size, In
   GradientCells result;
   result.levels.values = chooseLevels(steepness);
   result.cells.resize(steepness.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, steepness.size(), 4096), [&](const auto& range) {
-    checkWanted(stop);
-    for (std::size_t cell = range.begin(); cell < range.end(); ++cell)
-      result.cells[cell] = encode(result.levels, steepness[cell]).hi;
-  });
+  forEachOf(steepness.size(), kManyCells, stop,
+            [&](std::size_t cell) { result.cells[cell] = encode(result.levels, steepness[cell]).hi; });
   return result;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/data/macrocell_grid.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -35,7 +34,6 @@ struct Cells {
   int size;
   glm::ivec3 count;
   kernel::Filter filter;
-  std::size_t total() const { return std::size_t(count.x) * std::size_t(count.y) * std::size_t(count.z); }
 };
 
 /// Calls visit(cell, interval) for every macrocell, from many threads. lo > hi where no voxel is finite.
@@ -95,17 +93,14 @@ ValueLevels measureChannel(const VoxelView& view, glm::ivec3 dims, const Cells& 
         put(cell, kernel::LevelInterval{std::uint8_t(v.lo), std::uint8_t(v.hi)});
       });
     } else {
-      std::vector<ValueInterval> measured(cells.total());
+      std::vector<ValueInterval> measured(countOf(cells.count));
       measure(voxels, dims, cells, stop, [&](std::size_t cell, ValueInterval v) {
         measured[cell] = std::is_same_v<T, float> ? widen(v, cells.filter) : v;
       });
       checkWanted(stop);
       levels.values = chooseLevels(measured);
-      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, measured.size(), 4096), [&](const auto& range) {
-        checkWanted(stop);
-        for (std::size_t cell = range.begin(); cell < range.end(); ++cell)
-          put(cell, encode(levels, measured[cell]));
-      });
+      forEachOf(measured.size(), kManyCells, stop,
+                [&](std::size_t cell) { put(cell, encode(levels, measured[cell])); });
     }
     if constexpr (std::is_integral_v<T>)
       levels.slack =
@@ -121,8 +116,7 @@ glm::ivec3 macrocellsOf(glm::ivec3 dims, int size) {
 }
 
 std::size_t intervalCount(const Volume& volume, int size) {
-  const glm::ivec3 cells = macrocellsOf(volume.grid().dims, size);
-  return std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z) * volume.channels().size();
+  return countOf(macrocellsOf(volume.grid().dims, size)) * volume.channels().size();
 }
 
 MacrocellGrid buildMacrocells(const Volume& volume, int size, const std::stop_token& stop) {
@@ -138,15 +132,14 @@ MacrocellGrid buildMacrocells(const Volume& volume, int size, const std::stop_to
         [&](std::size_t cell, kernel::LevelInterval v) { grid.intervals[cell * channels + n] = v; }));
   const CellBlocks blocks(grid.cells);
   grid.blocks.resize(blocks.count() * channels, {255, 0});
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.count(), 64), [&](const auto& range) {
-    for (std::size_t block = range.begin(); block < range.end(); ++block)
-      blocks.visitCells(block, [&](std::size_t cell) {
-        for (std::size_t n = 0; n < channels; ++n) {
-          kernel::LevelInterval& all = grid.blocks[block * channels + n];
-          const kernel::LevelInterval one = grid.intervals[cell * channels + n];
-          all = {std::min(all.lo, one.lo), std::max(all.hi, one.hi)};
-        }
-      });
+  forEachOf(blocks.count(), kManyBlocks, stop, [&](std::size_t block) {
+    blocks.visitCells(block, [&](std::size_t cell) {
+      for (std::size_t n = 0; n < channels; ++n) {
+        kernel::LevelInterval& all = grid.blocks[block * channels + n];
+        const kernel::LevelInterval one = grid.intervals[cell * channels + n];
+        all = {std::min(all.lo, one.lo), std::max(all.hi, one.hi)};
+      }
+    });
   });
   return grid;
 }
@@ -155,7 +148,7 @@ CellColumn buildSplineColumn(const Volume& volume, int channel, int size, const 
   const glm::ivec3 dims = volume.grid().dims;
   const Cells cells{size, macrocellsOf(dims, size), kernel::Filter::cubic};
   CellColumn column;
-  column.cells.resize(cells.total());
+  column.cells.resize(countOf(cells.count));
   column.levels = measureChannel(volume.channels()[std::size_t(channel)].voxels, dims, cells, stop,
                                  [&](std::size_t cell, kernel::LevelInterval v) { column.cells[cell] = v; });
   return column;

@@ -41,7 +41,7 @@ struct CellBlocks {
   glm::ivec3 cells, size;  ///< per axis: number of cells, and of blocks
   explicit CellBlocks(glm::ivec3 cellsOfGrid)
       : cells(cellsOfGrid), size((cellsOfGrid + (kernel::kBlockEdge - 1)) / kernel::kBlockEdge) {}
-  std::size_t count() const { return std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z); }
+  std::size_t count() const { return countOf(size); }
   /// Calls f(cell) for the cells of a block.
   template <class F>
   void visitCells(std::size_t block, F&& f) const {
@@ -65,7 +65,7 @@ struct MacrocellGrid {
   std::vector<kernel::LevelInterval> intervals;  ///< per cell, x fastest: one per channel
   std::vector<kernel::LevelInterval> blocks;     ///< per block (CellBlocks): the union over its cells
 
-  std::size_t cellCount() const { return std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z); }
+  std::size_t cellCount() const { return countOf(cells); }
   std::size_t sizeBytes() const { return (intervals.size() + blocks.size()) * sizeof(kernel::LevelInterval); }
   ValueInterval interval(std::size_t cell, std::size_t channel) const {
     return levels[channel].decode(intervals[cell * levels.size() + channel]);

@@ -19,14 +19,7 @@ using kernel::kMaxLevels;
 using kernel::LevelInterval;
 using kernel::TotalCode;
 
-/// Calls f(block) for all blocks, from many threads.
-template <class F>
-void forBlocks(const CellBlocks& blocks, const std::stop_token& stop, F&& f) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.count(), 256), [&](const auto& range) {
-    checkWanted(stop);
-    for (std::size_t block = range.begin(); block < range.end(); ++block) f(block);
-  });
-}
+constexpr std::size_t kBlocksAtOnce = 256;
 
 /// In: 0 for blocks that are not empty, kMaxEmptyRadius for the others. Out: the distance of each block to
 /// the nearest that is not empty, at most kMaxEmptyRadius. The distance is the largest along any axis, so it
@@ -188,7 +181,7 @@ std::size_t MajorantGrid::rebuild(const Changes& changes, Totals& totals, const 
   std::atomic<std::size_t> touched = 0;
   std::atomic<bool> other = changes.all;  // whether the set of empty blocks changes
   // Blocks first: most of them contain no value that an edit changes.
-  forBlocks(blocks, stop, [&](std::size_t block) {
+  forEachOf(blocks.count(), kBlocksAtOnce, stop, [&](std::size_t block) {
     radii[block] = totals.radii[block] > 0 ? kernel::kMaxEmptyRadius : 0;
     if (!changes.meet(&macrocells_->blocks[block * columns])) return;
     std::size_t count = 0;
@@ -212,7 +205,7 @@ std::size_t MajorantGrid::rebuild(const Changes& changes, Totals& totals, const 
     measureRadii(blocks.size, radii, scratch);
   else
     radii = totals.radii;
-  forBlocks(blocks, stop, [&](std::size_t block) {
+  forEachOf(blocks.count(), kBlocksAtOnce, stop, [&](std::size_t block) {
     if (radii[block] == totals.radii[block] && !(stale[block] && radii[block] > 0)) return;
     blocks.visitCells(block, [&](std::size_t cell) {
       if (radii[block] > 0)

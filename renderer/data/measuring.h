@@ -2,6 +2,8 @@
 // What measurements of volumes have in common: they stop when nobody needs the result, and run beside
 // rendering at low priority, few at once.
 #pragma once
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -23,6 +25,18 @@ inline void checkWanted(const std::stop_token& stop) {
   if (stop.stop_requested())
     throw Error(ErrorCode::cancelled, "measurement cancelled: its result is no longer needed");
 }
+
+/// Calls f(i) for every i below `count`, from many threads; `grain` calls are worth a task. Throws
+/// Error(cancelled) soon after `stop` is requested.
+template <class F>
+void forEachOf(std::size_t count, std::size_t grain, const std::stop_token& stop, F&& f) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& range) {
+    checkWanted(stop);
+    for (std::size_t i = range.begin(); i < range.end(); ++i) f(i);
+  });
+}
+/// Macrocells, and blocks of them with all their cells, that are worth a task.
+inline constexpr std::size_t kManyCells = 4096, kManyBlocks = 64;
 
 /// For all measurements of the process. Two on a single processor, so that a short one need not wait for a
 /// long one.

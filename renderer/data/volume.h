@@ -16,12 +16,17 @@
 
 namespace scolopax {
 
+/// Number of all voxels, or cells, of a grid with so many along each axis.
+constexpr std::size_t countOf(const glm::ivec3& size) {
+  return std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z);
+}
+
 /// Regular grid. Voxel centre (i,j,k), x fastest, lies at worldFromVoxel * (i,j,k,1) in world units.
 /// The box reaches half a voxel beyond the outer centres.
 struct Grid {
   glm::ivec3 dims{1};              ///< voxels per axis, each >= 1
   glm::dmat4 worldFromVoxel{1.0};  ///< affine, not singular
-  std::size_t voxelCount() const { return std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z); }
+  std::size_t voxelCount() const { return countOf(dims); }
   /// Lengths of one voxel step along each axis, world units.
   glm::dvec3 spacing() const;
   double smallestSpacing() const;
