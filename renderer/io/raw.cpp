@@ -73,67 +73,93 @@ glm::ivec3 sidecarDims(const fs::path& file, std::string_view field, std::string
   return checkedDims(shown(file) + ": " + std::string(field), dims[0], dims[1], dims[2]);
 }
 
-RawDescription fromDat(const fs::path& path, const Warn& warn) {
-  const std::string text = readSidecar(path);
-  std::map<std::string, std::string_view> fields;  // by key in lower case
-  for (std::string_view rest = text; !rest.empty();) {
-    const std::string_view line = rest.substr(0, rest.find('\n'));
-    rest.remove_prefix(std::min(rest.size(), line.size() + 1));
-    if (trimmed(line).empty() || trimmed(line).starts_with('#')) continue;
-    const auto colon = line.find(':');
-    if (colon == std::string_view::npos) throw badField(path, "header", "lines of \"Key: value\"", line);
-    const std::string key = lowerCase(trimmed(line.substr(0, colon)));
-    if (!fields.emplace(key, trimmed(line.substr(colon + 1))).second) {
-      throw badField(path, "header", "every key once", key);
+void setByteOffset(RawDescription& raw, const fs::path& file, std::string_view text) {
+  const auto bytes = parseInteger(trimmed(text));
+  if (!bytes || *bytes < 0) throw badField(file, "ByteOffset", "a whole number, 0 or more", text);
+  raw.byteOffset = std::uint64_t(*bytes);
+  raw.mayHoldMore = true;
+}
+
+/// The fields of a .dat file, by key in lower case.
+class DatFields {
+ public:
+  explicit DatFields(const fs::path& path) : path_(path), text_(readSidecar(path)) {
+    for (std::string_view rest = text_; !rest.empty();) {
+      const std::string_view line = rest.substr(0, rest.find('\n'));
+      rest.remove_prefix(std::min(rest.size(), line.size() + 1));
+      if (trimmed(line).empty() || trimmed(line).starts_with('#')) continue;
+      const auto colon = line.find(':');
+      if (colon == std::string_view::npos) throw badField(path, "header", "lines of \"Key: value\"", line);
+      const std::string key = lowerCase(trimmed(line.substr(0, colon)));
+      if (!left_.emplace(key, trimmed(line.substr(colon + 1))).second) {
+        throw badField(path, "header", "every key once", key);
+      }
     }
   }
-  const auto take = [&](std::initializer_list<const char*> names) -> std::optional<std::string_view> {
+  DatFields(const DatFields&) = delete;
+  DatFields& operator=(const DatFields&) = delete;
+
+  /// Takes the fields with these names out; returns the last one's value.
+  std::optional<std::string_view> take(std::initializer_list<const char*> names) {
     std::optional<std::string_view> value;
     for (const char* name : names) {
-      if (const auto field = fields.extract(name)) value = field.mapped();
+      if (const auto field = left_.extract(name)) value = field.mapped();
     }
     return value;
-  };
-  const auto required = [&](std::string_view shownName, std::initializer_list<const char*> names) {
+  }
+  /// The same for a field that must be there.
+  std::string_view required(std::string_view shownName, std::initializer_list<const char*> names) {
     const auto value = take(names);
     if (!value)
-      throw Error(ErrorCode::badInput, shown(path) + ": " + std::string(shownName) + ": is missing");
+      throw Error(ErrorCode::badInput, shown(path_) + ": " + std::string(shownName) + ": is missing");
     return *value;
-  };
+  }
+  /// Fields that nobody has taken.
+  const std::map<std::string, std::string_view>& left() const { return left_; }
 
+ private:
+  const fs::path& path_;
+  const std::string text_;
+  std::map<std::string, std::string_view> left_;
+};
+
+bool isBigEndian(const fs::path& path, std::string_view order) {
+  const std::string name = lowerCase(order);
+  if (!name.starts_with("big") && !name.starts_with("little")) {
+    throw badField(path, "ByteOrder", "LittleEndian or BigEndian", order);
+  }
+  return name.starts_with("big");
+}
+
+glm::dvec3 datSpacing(const fs::path& path, std::string_view thickness) {
+  const auto lengths = splitWords(thickness);
+  glm::dvec3 spacing;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto length = lengths.size() == 3 ? parseNumber(lengths[axis]) : std::nullopt;
+    if (!length || !(*length > 0) || !std::isfinite(*length)) {
+      throw badField(path, "SliceThickness", "three lengths above 0", thickness);
+    }
+    spacing[int(axis)] = *length;
+  }
+  return spacing;
+}
+
+RawDescription fromDat(const fs::path& path, const Warn& warn) {
+  DatFields fields(path);
   RawDescription raw;
-  const std::string_view resolution = required("Resolution", {"resolution"});
+  const std::string_view resolution = fields.required("Resolution", {"resolution"});
   const auto words = splitWords(resolution);
   if (words.size() != 3) throw badField(path, "Resolution", "three whole numbers", resolution);
   raw.layout.dims = sidecarDims(path, "Resolution", words[0], words[1], words[2]);
-  raw.layout.type = sidecarType(path, required("Format", {"format"}));
-
-  if (const auto order = take({"byteorder", "endianess", "endianness", "endian"})) {
-    const std::string name = lowerCase(*order);
-    raw.layout.bigEndian = name.starts_with("big");
-    if (!name.starts_with("big") && !name.starts_with("little")) {
-      throw badField(path, "ByteOrder", "LittleEndian or BigEndian", *order);
-    }
-  }
-  if (const auto thickness = take({"slicethickness", "spacing"})) {
-    const auto lengths = splitWords(*thickness);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto length = lengths.size() == 3 ? parseNumber(lengths[axis]) : std::nullopt;
-      if (!length || !(*length > 0) || !std::isfinite(*length)) {
-        throw badField(path, "SliceThickness", "three lengths above 0", *thickness);
-      }
-      raw.spacing[int(axis)] = *length;
-    }
-  }
-  if (const auto offset = take({"byteoffset"})) {
-    const auto bytes = parseInteger(*offset);
-    if (!bytes || *bytes < 0) throw badField(path, "ByteOffset", "a whole number, 0 or more", *offset);
-    raw.byteOffset = std::uint64_t(*bytes);
-    raw.mayHoldMore = true;
-  }
+  raw.layout.type = sidecarType(path, fields.required("Format", {"format"}));
+  if (const auto order = fields.take({"byteorder", "endianess", "endianness", "endian"}))
+    raw.layout.bigEndian = isBigEndian(path, *order);
+  if (const auto thickness = fields.take({"slicethickness", "spacing"}))
+    raw.spacing = datSpacing(path, *thickness);
+  if (const auto offset = fields.take({"byteoffset"})) setByteOffset(raw, path, *offset);
   raw.data = resolveDataFile(path, "ObjectFileName",
-                             required("ObjectFileName", {"objectfilename", "rawfile"}), ".gz");
-  for (const auto& [key, value] : fields) {
+                             fields.required("ObjectFileName", {"objectfilename", "rawfile"}), ".gz");
+  for (const auto& [key, value] : fields.left()) {
     if (warn) warn(shown(path) + ": " + cleanText(key) + ": is not used");
   }
   return raw;
@@ -161,14 +187,8 @@ RawDescription fromIvf(const fs::path& path) {
   raw.layout.dims = sidecarDims(path, "Dimension", required("Dimension", "x"), required("Dimension", "y"),
                                 required("Dimension", "z"));
   raw.layout.type = sidecarType(path, required("Format", "content"));
-  if (const pugi::xml_node offset = root.child("ByteOffset")) {
-    const auto bytes = parseInteger(trimmed(offset.attribute("content").value()));
-    if (!bytes || *bytes < 0) {
-      throw badField(path, "ByteOffset", "a whole number, 0 or more", offset.attribute("content").value());
-    }
-    raw.byteOffset = std::uint64_t(*bytes);
-    raw.mayHoldMore = true;
-  }
+  if (const pugi::xml_node offset = root.child("ByteOffset"))
+    setByteOffset(raw, path, offset.attribute("content").value());
   for (const pugi::xml_node item : root.child("MetaDataMap").children("MetaDataItem")) {
     if (std::string_view(item.attribute("key").value()) != "LittleEndian") continue;
     const std::string_view value = item.child("MetaData").attribute("content").value();

@@ -215,19 +215,8 @@ class PageReader {
   std::optional<ByteStream> behind_;
 };
 
-}  // namespace
-
-bool matchesTiff(const fs::path& path) { return hasEnding(path, ".tif") || hasEnding(path, ".tiff"); }
-
-LoadedFile loadTiff(const fs::path& path, std::uint64_t memoryLimitBytes, const Warn& warn) {
-  const std::string file = shown(path);
-  const auto say = [&](const std::string& text) {
-    if (warn) warn(file + ": " + text);
-  };
-  TiffPages pages(path);
-  const OIIO::ImageSpec first = openPage(pages, 0)->spec();
-  const Stack stack = describeStack(file, first, std::int64_t(pages.pageCount()));
-
+/// Layout of all samples of a stack.
+VoxelLayout layoutOf(const std::string& file, const OIIO::ImageSpec& first, const Stack& stack) {
   VoxelLayout layout;
   layout.type = storedType(file, first);
   layout.dims =
@@ -240,60 +229,104 @@ LoadedFile loadTiff(const fs::path& path, std::uint64_t memoryLimitBytes, const 
   }
   layout.channels = int(stack.channels * samples);
   layout.interleaved = true;  // all channels are read before any is converted
-  checkMemory(file, layout, memoryLimitBytes);
+  return layout;
+}
+
+void checkFileSize(const std::string& file, const TiffPages& pages, const OIIO::ImageSpec& first,
+                   const VoxelLayout& layout) {
   const std::uint64_t holds = saturatingProduct(pages.fileSize(), largestRatio(first));
   if (layout.sizeBytes() > holds) {
     throw Error(ErrorCode::badInput, file + ": " + layout.description() + " needs " +
                                          std::to_string(layout.sizeBytes()) +
                                          " bytes, the file holds at most " + std::to_string(holds));
   }
+}
+
+/// Whether the other images follow the first one without pages of their own. Throws Error(badInput) if they
+/// cannot.
+bool isContiguous(const std::string& file, const TiffPages& pages, const OIIO::ImageSpec& first,
+                  const Stack& stack) {
   const bool contiguous = std::int64_t(pages.pageCount()) < stack.pages();
   if (contiguous && (largestRatio(first) != 1 || first.tile_width != 0 || pages.stripOffset(0) == 0)) {
     throw Error(ErrorCode::badInput,
                 file + ": ImageDescription: expected a page for each image of a compressed file, found one");
   }
+  return contiguous;
+}
+
+/// Reads a stack into a buffer for every channel of the layout.
+std::vector<VoxelBuffer> readSamples(PageReader& reader, const OIIO::ImageSpec& first, const Stack& stack,
+                                     const VoxelLayout& layout) {
+  const std::size_t elementBytes = sizeBytes(layout.type),
+                    pixels = std::size_t(first.width) * std::size_t(first.height),
+                    samples = std::size_t(first.nchannels);
+  std::vector<VoxelBuffer> stored;
+  stored.reserve(std::size_t(layout.channels));
+  for (int c = 0; c < layout.channels; ++c) {
+    stored.push_back(makeStoredBuffer(layout.type, std::size_t(layout.voxelCount())));
+  }
+  std::vector<std::byte> page(pixels * samples * elementBytes);
+  for (std::size_t index = 0; index < std::size_t(stack.pages()); ++index) {
+    reader.read(index, page);
+    const std::size_t z = index / std::size_t(stack.channels), c = index % std::size_t(stack.channels);
+    for (std::size_t s = 0; s < samples; ++s) {
+      std::byte* to = stored[c * samples + s].data() + z * pixels * elementBytes;
+      for (std::size_t i = 0; i < pixels; ++i) {
+        std::memcpy(to + i * elementBytes, &page[(i * samples + s) * elementBytes], elementBytes);
+      }
+    }
+  }
+  return stored;
+}
+
+/// Names the samples and converts their type. Leaves out alpha.
+std::vector<ChannelSource> channelsOf(const fs::path& path, const OIIO::ImageSpec& first, const Stack& stack,
+                                      const VoxelLayout& layout, std::vector<VoxelBuffer> stored,
+                                      const Warn& warn) {
+  const std::string stem = stemOf(path);
+  const bool rgb = stack.channels == 1 && first.nchannels >= 3 && first.channelnames[0] == "R";
+  static constexpr std::array kColors{"red", "green", "blue"};
+  std::vector<ChannelSource> channels;
+  for (int c = 0; c < layout.channels; ++c) {
+    if (first.alpha_channel >= 0 && c % first.nchannels == first.alpha_channel) continue;
+    ChannelSource channel;
+    channel.voxels =
+        toKeptType(layout.type, std::move(stored[std::size_t(c)]), shown(path), c == 0 ? warn : Warn());
+    channel.name = layout.channels == 1
+                       ? stem
+                       : stem + " " + (rgb && c < 3 ? kColors[std::size_t(c)] : std::to_string(c));
+    channels.push_back(std::move(channel));
+  }
+  return channels;
+}
+
+}  // namespace
+
+bool matchesTiff(const fs::path& path) { return hasEnding(path, ".tif") || hasEnding(path, ".tiff"); }
+
+LoadedFile loadTiff(const fs::path& path, std::uint64_t memoryLimitBytes, const Warn& warn) {
+  const std::string file = shown(path);
+  const auto say = [&](const std::string& text) {
+    if (warn) warn(file + ": " + text);
+  };
+  TiffPages pages(path);
+  const OIIO::ImageSpec first = openPage(pages, 0)->spec();
+  const Stack stack = describeStack(file, first, std::int64_t(pages.pageCount()));
+  const VoxelLayout layout = layoutOf(file, first, stack);
+  checkMemory(file, layout, memoryLimitBytes);
+  checkFileSize(file, pages, first, layout);
+  const bool contiguous = isContiguous(file, pages, first, stack);
   if (stack.times > 1) {
     say("frames: the first of " + std::to_string(stack.times) + " time steps is loaded, " +
         std::to_string(stack.times - 1) + " are left out");
   }
   if (pages.hasPalette(0)) say("the indices are loaded, the palette is left out");
 
-  const std::size_t elementBytes = sizeBytes(layout.type),
-                    pixels = std::size_t(first.width) * std::size_t(first.height);
-  std::vector<VoxelBuffer> stored;
-  stored.reserve(std::size_t(layout.channels));
-  for (int c = 0; c < layout.channels; ++c) {
-    stored.push_back(makeStoredBuffer(layout.type, std::size_t(layout.voxelCount())));
-  }
-  std::vector<std::byte> page(pixels * std::size_t(samples) * elementBytes);
   PageReader reader(path, pages, first, layout.type, contiguous);
-  for (std::size_t index = 0; index < std::size_t(stack.pages()); ++index) {
-    reader.read(index, page);
-    const std::size_t z = index / std::size_t(stack.channels), c = index % std::size_t(stack.channels);
-    for (std::size_t s = 0; s < std::size_t(samples); ++s) {
-      std::byte* to = stored[c * std::size_t(samples) + s].data() + z * pixels * elementBytes;
-      for (std::size_t i = 0; i < pixels; ++i) {
-        std::memcpy(to + i * elementBytes, &page[(i * std::size_t(samples) + s) * elementBytes],
-                    elementBytes);
-      }
-    }
-  }
-
   LoadedFile loaded;
   loaded.grid.dims = layout.dims;
   for (int axis = 0; axis < 3; ++axis) loaded.grid.worldFromVoxel[axis][axis] = stack.spacing[axis];
-  const std::string stem = stemOf(path);
-  const bool rgb = stack.channels == 1 && samples >= 3 && first.channelnames[0] == "R";
-  static constexpr std::array kColors{"red", "green", "blue"};
-  for (int c = 0; c < layout.channels; ++c) {
-    if (first.alpha_channel >= 0 && c % int(samples) == first.alpha_channel) continue;
-    ChannelSource channel;
-    channel.voxels = toKeptType(layout.type, std::move(stored[std::size_t(c)]), file, c == 0 ? warn : Warn());
-    channel.name = layout.channels == 1
-                       ? stem
-                       : stem + " " + (rgb && c < 3 ? kColors[std::size_t(c)] : std::to_string(c));
-    loaded.channels.push_back(std::move(channel));
-  }
+  loaded.channels = channelsOf(path, first, stack, layout, readSamples(reader, first, stack, layout), warn);
   if (loaded.channels.empty())
     throw Error(ErrorCode::unsupported, file + ": expected a channel beside alpha, found none");
   if (int(loaded.channels.size()) < layout.channels) say("alpha is left out");
