@@ -28,7 +28,7 @@ SCOLOPAX_LANES Axis axisOf(Float x, int size) {
 /// One point per lane, and its neighbouring voxels.
 struct Points {
   glm::ivec3 dims;
-  Vec place;
+  Vec point;
   Axis x, y, z;
   std::size_t first;  ///< slice from which gathers count their 32-bit indices: that of lane 0
   float slices;       ///< upper limit of the number of slices that these indices span
@@ -36,7 +36,7 @@ struct Points {
 SCOLOPAX_LANES Points pointsAt(glm::ivec3 dims, const Vec& point) {
   Points points;
   points.dims = dims;
-  points.place = point;
+  points.point = point;
   points.x = axisOf(point[0], dims.x), points.y = axisOf(point[1], dims.y),
   points.z = axisOf(point[2], dims.z);
   points.first = std::size_t(firstOf(points.z.low));
@@ -123,7 +123,7 @@ SCOLOPAX_LANES Float sampleChannel(const Points& at, const kernel::FieldView& fi
   if (!canGather(at, field)) {
     Float values;
     for (int i = 0; i < kLanes; ++i)
-      put(kernel::sampleTrilinear(field, at.dims, pointIn(at.place, i)), i, &values);
+      put(kernel::sampleTrilinear(field, at.dims, pointIn(at.point, i)), i, &values);
     return values;
   }
   switch (field.type) {
@@ -315,7 +315,7 @@ SCOLOPAX_LANES void cellVoxelsOfChannel(const kernel::SceneView& scene, const Po
   }
   for (int i = 0; i < kLanes; ++i) {
     float own[kernel::kCorners];
-    kernel::cellVoxels(field, scene.dims, pointIn(at.place, i), own);
+    kernel::cellVoxels(field, scene.dims, pointIn(at.point, i), own);
     for (int c = 0; c < kernel::kCorners; ++c) put(own[c], i, &corners[c]);
   }
 }

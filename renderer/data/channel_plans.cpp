@@ -74,7 +74,7 @@ bool ChannelPlans::nextTakesLong(const Scene& scene) const {
   constexpr std::size_t kManyIntervals = 4 << 20;
   if (macrocells_->size != scene.macrocell || macrocells_->intervals.size() > kManyIntervals) return true;
   const std::size_t count = std::min(scene.channels.size(), appearances_.size());
-  // With a gamma, the place of a knot is found by trial.
+  // With a gamma, the stored value of a knot is found by trial.
   constexpr std::size_t kManyKnots = 2048;
   std::size_t knots = 0;
   for (std::size_t i = 0; i < count; ++i)

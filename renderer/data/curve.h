@@ -21,8 +21,8 @@ struct Curve {
   }
 };
 
-/// Owner of the opacity and colour curves, both given at the knots of either. The knots' places are their
-/// positions, until a TransferFunction sets others.
+/// Owner of the opacity and colour curves, both given at the knots of either. A knot's stored value equals
+/// its position until a TransferFunction sets it.
 struct OpticalCurve {
   std::vector<kernel::OpticalKnot> knots;
   std::vector<std::uint16_t> buckets;

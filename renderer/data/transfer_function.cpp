@@ -25,15 +25,15 @@ float leastThat(float guess, const Reaches& reaches) {
   return guess;
 }
 
-/// Sets the places of the knots, so that kernels find the same values before and behind a knot whether they
-/// compare places or positions. `channel` has the placement and the gamma.
-void setPlaces(OpticalCurve& curve, const kernel::ChannelView& channel) {
+/// Sets the stored values of the knots, so that kernels find the same opacity and colour before and behind a
+/// knot whether they compare stored values or positions. `channel` has the placement and the gamma.
+void setStoredValues(OpticalCurve& curve, const kernel::ChannelView& channel) {
   kernel::ChannelView linear = channel;
   linear.gamma = 1;
   for (kernel::OpticalKnot& knot : curve.knots) {
     const double position = std::pow(double(knot.position), 1.0 / double(channel.gamma));
     const double stored = (position - double(channel.offset)) / std::abs(double(channel.scale));
-    // With a gamma, all places before the range have the position 0.
+    // With a gamma, all values before the range have the position 0.
     const kernel::ChannelView& compared = knot.position > 0 ? channel : linear;
     knot.stored = leastThat(float(stored), [&](float at) {
       return kernel::positionAt<kernel::One>(compared, at) >= knot.position;
@@ -64,7 +64,7 @@ TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearan
   const double lo = (a.rangeLo - channel.intercept) / channel.slope;
   const double hi = (a.rangeHi - channel.intercept) / channel.slope;
   placement_ = Placement(lo, hi, (channel.slope > 0) == (a.rangeLo <= a.rangeHi));
-  setPlaces(optical_, placed());
+  setStoredValues(optical_, placed());
   inverseRange_ = float(1.0 / std::abs(hi - lo));
 }
 

@@ -72,7 +72,7 @@ template <class Tracker, class Blend, class Lighting, class View>
 SCOLOPAX_HD glm::vec3 radiance(const View& scene, const Ray& ray, const Collision& hit,
                                const SurfaceHit<One>* surface, Sampler& sampler, SampleCost* cost) {
   const bool onSurface = surface != nullptr;
-  const LitPoint<One> at{ray, hit.place.t(), insideOf<One>(scene.clip, hit.point)};
+  const LitPoint<One> at{ray, hit.distance.t(), insideOf<One>(scene.clip, hit.point)};
   Visibility<One> visibility;
   if constexpr (Lighting::kAny)
     visibility = visibilityAt(scene, at, true, [&](const Ray& shadowRay, Interval part) {
@@ -124,7 +124,7 @@ struct Analog {
         hit = Collision{
             {surface->t, 0.0f}, ray.origin + surface->t * ray.direction, surface->surface.channel, 0.0f};
       }
-      if (first) keepNearer(first, true, hit->place.t(), hit->channel);
+      if (first) keepNearer(first, true, hit->distance.t(), hit->channel);
       const glm::vec3 color = radiance<Tracker, Blend, Lighting>(scene, ray, *hit, ending, sampler, cost);
       *sum = glm::vec4(glm::vec3(*sum) + color, 1.0f);
     };

@@ -12,17 +12,17 @@ namespace scolopax::kernel {
 
 /// A distance along a ray, in world units, stored as the entry of a macrocell and the distance past it. So
 /// free flights far shorter than the float resolution of the sum can still be told apart.
-struct Place {
+struct RayDistance {
   float enter, past;
   SCOLOPAX_HD float t() const { return enter + past; }
 };
-SCOLOPAX_HD inline bool nearer(const Place& a, const Place& b) {
+SCOLOPAX_HD inline bool nearer(const RayDistance& a, const RayDistance& b) {
   return a.enter < b.enter || (a.enter == b.enter && a.past < b.past);
 }
 
 /// An accepted collision along a ray.
 struct Collision {
-  Place place;
+  RayDistance distance;
   glm::vec3 point;  ///< voxel coordinates
   int channel;      ///< index among the visible channels
   float position;   ///< position on that channel's curves
@@ -41,7 +41,7 @@ struct PickOneChannel {
   /// bound exceeds the sum of the channels' bounds, the excess belongs to no channel.
   template <class Channels, class View>
   SCOLOPAX_HD static std::optional<Collision> test(const View& scene, Channels channels, std::size_t cell,
-                                                   float bound, Place place, glm::vec3 point,
+                                                   float bound, RayDistance distance, glm::vec3 point,
                                                    const RandomBlock& random, SampleCost* cost) {
     float pick = uniformOf(random.y) * bound;
     for (int n = 0; n < scene.channelCount; ++n) {
@@ -50,7 +50,7 @@ struct PickOneChannel {
       if (pick < own) {
         const Classified c = classify(scene, n, point, cost);
         if (!(uniformOf(random.z) * own < c.extinction)) return std::nullopt;
-        return Collision{place, point, n, c.position};
+        return Collision{distance, point, n, c.position};
       }
       pick -= own;
     }
@@ -61,13 +61,13 @@ struct TestAllChannels {
   /// Fetches channel after channel until the drawn share of the bound is used up.
   template <class Channels, class View>
   SCOLOPAX_HD static std::optional<Collision> test(const View& scene, Channels channels, std::size_t,
-                                                   float bound, Place place, glm::vec3 point,
+                                                   float bound, RayDistance distance, glm::vec3 point,
                                                    const RandomBlock& random, SampleCost* cost) {
     float left = uniformOf(random.y) * bound;
     for (int n = 0; n < scene.channelCount; ++n) {
       if (!channels.has(n)) continue;
       const Classified c = classify(scene, n, point, cost);
-      if (left < c.extinction) return Collision{place, point, n, c.position};
+      if (left < c.extinction) return Collision{distance, point, n, c.position};
       left -= c.extinction;
     }
     return std::nullopt;
@@ -77,11 +77,11 @@ struct TestAllChannels {
 struct TestLargest {
   template <class Channels, class View>
   SCOLOPAX_HD static std::optional<Collision> test(const View& scene, Channels channels, std::size_t,
-                                                   float bound, Place place, glm::vec3 point,
+                                                   float bound, RayDistance distance, glm::vec3 point,
                                                    const RandomBlock& random, SampleCost* cost) {
     const Largest largest = largestOf(scene, channels, point, cost);
     if (!(uniformOf(random.z) * bound < largest.extinction)) return std::nullopt;
-    return Collision{place, point, largest.channel, largest.position};
+    return Collision{distance, point, largest.channel, largest.position};
   }
 };
 
@@ -89,8 +89,8 @@ struct TestLargest {
 /// where its extinction is the largest among `channels` (Eq. 8).
 template <class Blend, class Channels, class View>
 SCOLOPAX_HD std::optional<Collision> testChannel(const View& scene, Channels channels, int n, float bound,
-                                                 Place place, glm::vec3 point, const RandomBlock& random,
-                                                 SampleCost* cost) {
+                                                 RayDistance distance, glm::vec3 point,
+                                                 const RandomBlock& random, SampleCost* cost) {
   const Classified c = classify(scene, n, point, cost);
   if (!(uniformOf(random.z) * bound < c.extinction)) return std::nullopt;
   if constexpr (!Blend::kSums)
@@ -99,7 +99,7 @@ SCOLOPAX_HD std::optional<Collision> testChannel(const View& scene, Channels cha
       const float extinction = classify(scene, other, point, cost).extinction;
       if (extinction > c.extinction || (extinction == c.extinction && other < n)) return std::nullopt;
     }
-  return Collision{place, point, n, c.position};
+  return Collision{distance, point, n, c.position};
 }
 
 }  // namespace scolopax::kernel

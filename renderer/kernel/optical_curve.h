@@ -249,7 +249,7 @@ SCOLOPAX_LANES typename L::Int pieceAt(const ChannelView& channel, typename L::F
   const OpticalCurveView& curve = channel.optical;
   Int piece = pointOn<L>(curve, positionAt<L>(channel, stored)).piece;
   if (channel.gamma == 1.0f) return piece;
-  // The position is rounded, and it is 0 at all places before the range.
+  // The position is rounded, and it is 0 for all values before the range.
   Knots<L> a, b;
   knotsOf<L>(curve, piece, L::everywhere(), &a, &b);
   piece = piece + onesOf((Int(curve.count - 1) > piece) & (stored >= b.stored)) -

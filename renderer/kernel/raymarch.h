@@ -118,7 +118,7 @@ SCOLOPAX_LANES_RARE void meetSurfaces(const View& scene, const Blend& blend, con
   using Word = typename L::Word;
   using Mask = typename L::Mask;
   using Vec = typename L::Vec;
-  [[maybe_unused]] StratumPlaces<L> places;
+  [[maybe_unused]] StratumPoints<L> points;
   for (;;) {
     const SurfaceHit<L>& hit = ahead.hit();
     const Mask met =
@@ -126,17 +126,17 @@ SCOLOPAX_LANES_RARE void meetSurfaces(const View& scene, const Blend& blend, con
     if (!any(met)) return;
     Vec radiance = hit.color;
     if constexpr (Lighting::kAny) {
-      places.t = hit.t;
-      places.offset = offset;
-      places.kept = Word(0u);
+      points.t = hit.t;
+      points.offset = offset;
+      points.kept = Word(0u);
       for (int n = 0; n < scene.channelCount; ++n) {
         const Mask here = met & (hit.surface.channel == typename L::Int(n));
         if (!any(here)) continue;
-        places.kept = places.kept | where(here, Word(1u << n));
-        places.share[n] = Float(1.0f);
-        places.color[n] = hit.color;
+        points.kept = points.kept | where(here, Word(1u << n));
+        points.share[n] = Float(1.0f);
+        points.color[n] = hit.color;
       }
-      findLight<Steps, L>(scene, blend, ray, channels, places, hit.surface, met, cost, &radiance);
+      findLight<Steps, L>(scene, blend, ray, channels, points, hit.surface, met, cost, &radiance);
     }
     const Float absorbedHere = where(met, light.transmittance * hit.opacity);
     light.color = light.color + radiance * absorbedHere;

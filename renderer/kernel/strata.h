@@ -58,7 +58,7 @@ SCOLOPAX_LANES Float placeOfAbsorption(Float depth, Float centre, Float share) {
 
 /// The point of each ray at which a stratum is lit, and the channels there.
 template <class L>
-struct StratumPlaces {
+struct StratumPoints {
   using Float = typename L::Float;
   Float mass;                        ///< what the stratum absorbs of the ray's light
   typename L::Vec emission;          ///< emission of the whole stratum, without lighting
@@ -73,24 +73,24 @@ struct StratumPlaces {
 /// surface on which the points lie, if any.
 template <class Steps, class L, class Blend, class View>
 SCOLOPAX_LANES_APART void findLight(const View& scene, const Blend& blend, const RayOf<L>& ray,
-                                    std::uint32_t channels, const StratumPlaces<L>& places,
+                                    std::uint32_t channels, const StratumPoints<L>& points,
                                     const SurfaceStart<L>& surface, const typename L::Mask& which,
                                     CostOf<L>* cost, typename L::Vec* radiance) {
   using Vec = typename L::Vec;
-  const LitPoint<L> hit{ray, places.t, insideOf<L>(scene.clip, ray.origin + places.t * ray.direction)};
+  const LitPoint<L> hit{ray, points.t, insideOf<L>(scene.clip, ray.origin + points.t * ray.direction)};
 
   const Visibility<L> visibility = visibilityAt(
       scene, hit, which, [&](const RayOf<L>& shadow, const IntervalOf<L>& part) SCOLOPAX_LANES_LAMBDA {
-        return marchTransmittance<L, Steps>(scene, blend, shadow, part, channels, places.offset, surface,
+        return marchTransmittance<L, Steps>(scene, blend, shadow, part, channels, points.offset, surface,
                                             cost);
       });
   const typename L::Mask onSurface = surface.channel > typename L::Int(-1);
   Vec sum(0.0f);
   for (int n = 0; n < scene.channelCount; ++n) {
-    const typename L::Mask here = which & hasBit(places.kept, n);
+    const typename L::Mask here = which & hasBit(points.kept, n);
     if (!any(here)) continue;
-    const Vec light = places.share[n] *
-                      lit(scene, scene.channels[n], places.color[n], hit, visibility, here, onSurface, cost);
+    const Vec light = points.share[n] *
+                      lit(scene, scene.channels[n], points.color[n], hit, visibility, here, onSurface, cost);
     sum = select(here, sum + light, sum);
   }
   *radiance = sum;
@@ -159,9 +159,9 @@ class Strata {
   /// Arrays indexed by variables, apart from the rest as in SegmentEnds.
   struct Memory {
     PartOf<L> parts[kMaxVisibleChannels];  ///< per channel, of the current segment
-    StratumPlaces<L> places;
+    StratumPoints<L> points;
     struct Waiting {
-      StratumPlaces<L> places;
+      StratumPoints<L> points;
       Int ray;
       StrataSum sums[L::kLanes];  ///< per ray, like the colours
       glm::vec3 color[L::kLanes];
@@ -251,7 +251,7 @@ class Strata {
 
   /// Moves the stratum's point to the place in the segment up to which it absorbs `share` of its light.
   SCOLOPAX_LANES void keep(Mask which, const Segment<L>& segment, Float extinction, Float share) {
-    StratumPlaces<L>& places = memory_.places;
+    StratumPoints<L>& points = memory_.points;
     Float opacity(0.0f), moment(0.0f);
     kept_ = select(which, Word(0u), kept_);
     radiance_ = select(which, Vec(0.0f), radiance_);
@@ -263,39 +263,39 @@ class Strata {
       const Mask seen = which & (own.opacity > kLeastNormal);  // else its colour might be NaN
       if (!any(seen)) continue;
       kept_ = kept_ | where(seen, Word(1u << n));
-      places.share[n] = select(seen, own.opacity / extinction, places.share[n]);
-      places.color[n] = select(seen, own.emission * (1.0f / own.opacity), places.color[n]);
-      radiance_ = select(seen, radiance_ + places.color[n] * places.share[n], radiance_);
+      points.share[n] = select(seen, own.opacity / extinction, points.share[n]);
+      points.color[n] = select(seen, own.emission * (1.0f / own.opacity), points.color[n]);
+      radiance_ = select(seen, radiance_ + points.color[n] * points.share[n], radiance_);
     }
     const Float length = segment.length();
     const Float place = segment.start + length * placeOfAbsorption(extinction * length,
                                                                    minimum(moment / opacity, 1.0f), share);
-    place_ = select(which, place, place_);
+    t_ = select(which, place, t_);
   }
 
   /// Lights the strata of the rays in `which`, or queues them.
   SCOLOPAX_LANES void light(Mask which, Float mass, Vec& color) {
-    StratumPlaces<L>& places = memory_.places;
-    places.mass = mass;
-    places.t = place_;
-    places.offset = offset_;
-    places.kept = kept_;
-    places.radiance = radiance_;
-    places.emission = emission_;
+    StratumPoints<L>& points = memory_.points;
+    points.mass = mass;
+    points.t = t_;
+    points.offset = offset_;
+    points.kept = kept_;
+    points.radiance = radiance_;
+    points.emission = emission_;
     if constexpr (L::kLanes == 1) {
       if (which) {
         Vec lit;
-        findLight<Steps, L>(scene_, blend_, ray_, channels_, places, {}, which, cost_, &lit);
+        findLight<Steps, L>(scene_, blend_, ray_, channels_, points, {}, which, cost_, &lit);
         sum_.add({lit, radiance_, emission_, mass}, color);
       }
     } else {
       for (unsigned left = bitsOf(which); left != 0; left &= left - 1) {
         if (count_ == L::kLanes) shine();
         const int i = lowestBit(left), slot = count_++;
-        StratumPlaces<L>& waiting = memory_.waiting.places;
+        StratumPoints<L>& waiting = memory_.waiting.points;
         put(i, slot, &memory_.waiting.ray);
         put(at(mass, i), slot, &waiting.mass);
-        put(at(place_, i), slot, &waiting.t);
+        put(at(t_, i), slot, &waiting.t);
         put(at(offset_, i), slot, &waiting.offset);
         const std::int32_t kept = at(kept_, i);
         put(kept, slot, &waiting.kept);
@@ -305,8 +305,8 @@ class Strata {
         }
         for (std::uint32_t bits = std::uint32_t(kept); bits != 0; bits &= bits - 1) {
           const int n = lowestBit(bits);
-          put(at(places.share[n], i), slot, &waiting.share[n]);
-          for (int c = 0; c < 3; ++c) put(at(places.color[n][c], i), slot, &waiting.color[n][c]);
+          put(at(points.share[n], i), slot, &waiting.share[n]);
+          for (int c = 0; c < 3; ++c) put(at(points.color[n][c], i), slot, &waiting.color[n][c]);
         }
       }
     }
@@ -323,7 +323,7 @@ class Strata {
     }
     CostOf<L> spent{};
     Vec sum;
-    findLight<Steps, L>(scene_, blend_, rays, channels_, waiting.places, {}, Int(count_) > L::laneNumbers(),
+    findLight<Steps, L>(scene_, blend_, rays, channels_, waiting.points, {}, Int(count_) > L::laneNumbers(),
                         &spent, &sum);
     for (int i = 0; i < count_; ++i) {
       const int to = at(ray, i);
@@ -331,7 +331,7 @@ class Strata {
       const auto of = [i](const Vec& v)
                           SCOLOPAX_LANES_LAMBDA { return glm::vec3(at(v[0], i), at(v[1], i), at(v[2], i)); };
       waiting.sums[to].add(
-          {of(sum), of(waiting.places.radiance), of(waiting.places.emission), at(waiting.places.mass, i)},
+          {of(sum), of(waiting.points.radiance), of(waiting.points.emission), at(waiting.points.mass, i)},
           waiting.color[to]);
       cost_->fetches = cost_->fetches + where(lane, Int(at(spent.fetches, i)));
       cost_->cellSteps = cost_->cellSteps + where(lane, Int(at(spent.cellSteps, i)));
@@ -368,7 +368,7 @@ class Strata {
   Float next_{0.0f};   // record at which the point moves on; 0: none has been drawn
   Float first_{0.0f}, offset_{0.0f}, shared_{0.0f};
   Word chain_{0u};
-  Float place_{0.0f};  // the point, world units along the ray
+  Float t_{0.0f};  // the point, world units along the ray
   Word kept_{0u};
   Vec radiance_{0.0f};  // radiance there, without lighting
   Vec emission_{0.0f};  // emission of the whole stratum, without lighting

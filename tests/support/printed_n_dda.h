@@ -31,10 +31,10 @@ struct PrintedNDda {
       while (true) {
         const kernel::RandomBlock random = sampler.next();
         t += kernel::opticalDepth(kernel::uniformOf(random.x)) / bound;
-        if (*nearest && t > (*nearest)->place.t()) return;  // in the printed order
+        if (*nearest && t > (*nearest)->distance.t()) return;  // in the printed order
         if (!(t < walk.exit())) break;
-        const kernel::Place place{t, 0};
-        if (const auto hit = kernel::testChannel<Blend>(scene, kernel::AllChannels{}, n, bound, place,
+        const kernel::RayDistance distance{t, 0};
+        if (const auto hit = kernel::testChannel<Blend>(scene, kernel::AllChannels{}, n, bound, distance,
                                                         walk.pointAt(t), random, cost)) {
           *nearest = hit;
           return;

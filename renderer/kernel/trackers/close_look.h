@@ -158,8 +158,8 @@ SCOLOPAX_HD float boundAhead(const View& scene, int n, const Ray& ray, const Vox
 
 /// Tracks through the walk's macrocell, from distance `past` after its entry to distance `end`, in stretches
 /// with bounds of their own. On entry and exit, `random` and `depth` belong to the next tentative collision.
-/// `boundOf(cell, point, least, &way)` bounds a stretch as boundAhead does; `test(bound, place, point,
-/// random)` tests a tentative collision.
+/// `boundOf(cell, point, least, &way)` bounds a stretch as boundAhead does; `test(bound, distance,
+/// point, random)` tests a tentative collision.
 template <class Bound, class Test, class View>
 SCOLOPAX_HD CellOutcome trackCellClosely(const View& scene, const Ray& ray, const CellWalk& walk, float past,
                                          float end, Sampler& sampler, RandomBlock* random, float* depth,
@@ -178,8 +178,8 @@ SCOLOPAX_HD CellOutcome trackCellClosely(const View& scene, const Ray& ray, cons
     float passed = 0.0f;
     while (*depth < total - passed) {
       passed += *depth;
-      const Place place{walk.enter(), past + passed / bound};
-      if (const auto found = test(bound, place, cell.inside(walk.pointAt(place.t())), *random)) {
+      const RayDistance distance{walk.enter(), past + passed / bound};
+      if (const auto found = test(bound, distance, cell.inside(walk.pointAt(distance.t())), *random)) {
         *hit = found;
         return CellOutcome::hit;
       }
@@ -251,8 +251,10 @@ SCOLOPAX_HOT std::optional<Collision> trackWithPatience(const Track& track, cons
   if (!again.hit) return std::nullopt;
   // Member by member: copying the whole keeps every ray's collision in memory (g++ 12).
   const Collision& met = *again.hit;
-  return Collision{
-      {met.place.enter, met.place.past}, {met.point.x, met.point.y, met.point.z}, met.channel, met.position};
+  return Collision{{met.distance.enter, met.distance.past},
+                   {met.point.x, met.point.y, met.point.z},
+                   met.channel,
+                   met.position};
 #endif
 }
 

@@ -63,9 +63,9 @@ struct OneProcess {
       std::uint32_t limit = patienceAfter(tentative);
       while (depth < total - passed) {
         passed += depth;
-        const Place place{walk.enter(), passed / bound};
-        if (const auto hit = Test::test(scene, channels, walk.index(), bound, place, walk.pointAt(place.t()),
-                                        random, cost))
+        const RayDistance distance{walk.enter(), passed / bound};
+        if (const auto hit = Test::test(scene, channels, walk.index(), bound, distance,
+                                        walk.pointAt(distance.t()), random, cost))
           return hit;
         random = sampler.next();
         depth = opticalDepth(uniformOf(random.x));
@@ -88,7 +88,7 @@ struct OneProcess {
                   return boundAheadOf<kSums>(channels, scene, walk.index(), ray, cell, point, least, way,
                                              cost);
                 },
-                [&](float all, Place at, glm::vec3 point, const RandomBlock& numbers) {
+                [&](float all, RayDistance at, glm::vec3 point, const RandomBlock& numbers) {
                   return TestClosely::test(scene, channels, walk.index(), all, at, point, numbers, cost);
                 });
             if (outcome == CellOutcome::exhausted) cost->truncated = 1;

@@ -25,10 +25,10 @@ SCOLOPAX_HD CellOutcome trackCell(const View& scene, Channels channels, int n,
     // if it overshoots the nearest collision so far. (Listing 3 prints the opposite order, and loses
     // collisions.)
     if (!(passed < total)) return CellOutcome::nothing;
-    const Place place{walk.enter(), passed / bound};
-    if (*nearest && !nearer(place, (*nearest)->place)) return CellOutcome::nothing;
-    if (const auto hit =
-            testChannel<Blend>(scene, channels, n, bound, place, walk.pointAt(place.t()), random, cost)) {
+    const RayDistance distance{walk.enter(), passed / bound};
+    if (*nearest && !nearer(distance, (*nearest)->distance)) return CellOutcome::nothing;
+    if (const auto hit = testChannel<Blend>(scene, channels, n, bound, distance, walk.pointAt(distance.t()),
+                                            random, cost)) {
       *nearest = hit;
       return CellOutcome::hit;
     }
@@ -41,13 +41,14 @@ SCOLOPAX_HD CellOutcome trackCell(const View& scene, Channels channels, int n,
     } else {
       random = sampler.next();
       float depth = opticalDepth(uniformOf(random.x)), end = walk.exit() - walk.enter();
-      if (*nearest && (*nearest)->place.enter == walk.enter()) end = minimum(end, (*nearest)->place.past);
+      if (*nearest && (*nearest)->distance.enter == walk.enter())
+        end = minimum(end, (*nearest)->distance.past);
       return trackCellClosely(
           scene, ray, walk, passed / bound, end, sampler, &random, &depth, tentative, nearest,
           [&](const VoxelCell& cell, glm::vec3 point, float least, float* way) {
             return boundAhead(scene, n, ray, cell, point, least, way, cost);
           },
-          [&](float own, Place at, glm::vec3 point, const RandomBlock& numbers) {
+          [&](float own, RayDistance at, glm::vec3 point, const RandomBlock& numbers) {
             return testChannel<Blend>(scene, channels, n, own, at, point, numbers, cost);
           });
     }
@@ -67,7 +68,7 @@ struct AlongChannel {
     std::optional<Collision> hit = nearest;
     std::uint32_t tentative = 0;
     do {
-      if (hit && nearer(hit->place, {walk.enter(), 0.0f})) return hit;
+      if (hit && nearer(hit->distance, {walk.enter(), 0.0f})) return hit;
       ++cost->cellSteps;
       const CellOutcome outcome = trackCell<kClosely, Blend>(scene, channelsFor<kClosely>(inside), n, ray,
                                                              walk, sampler, &hit, &tentative, cost);

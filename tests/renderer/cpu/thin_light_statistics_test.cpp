@@ -90,7 +90,7 @@ struct LitAtPlacesApart {
     auto other = track(ray, inside);
     while (!other) other = track(ray, inside);
     const auto place = [&](const kernel::Collision& of) {
-      return kernel::LitPoint<kernel::One>{ray, of.place.t(), of.point};
+      return kernel::LitPoint<kernel::One>{ray, of.distance.t(), of.point};
     };
     const auto visibility = kernel::visibilityAt(
         scene, place(*other), true,

@@ -83,8 +83,8 @@ TYPED_TEST(Draws, AtTheirEndsOnlyHitChannelsThatHaveExtinction) {
               density > 16.7 / 4) {  // the flight ends within one macrocell of 4 voxels for any tracker
             ASSERT_TRUE(found.hit) << density << " " << x << " " << y << " " << z;
             EXPECT_TRUE(found.hit->channel == 1 || found.hit->channel == 2);
-            EXPECT_GE(found.hit->place.t(), 2.5f);
-            EXPECT_LE(found.hit->place.t(), 2.5 + depth / density + 1e-6);
+            EXPECT_GE(found.hit->distance.t(), 2.5f);
+            EXPECT_LE(found.hit->distance.t(), 2.5 + depth / density + 1e-6);
           } else if (density < 1) {
             EXPECT_FALSE(found.hit);
           }
@@ -128,7 +128,7 @@ TYPED_TEST(Draws, EndTheFlightWhereTheOpticalDepthSaysFromOneMillionthToOneMilli
           const double depth = -std::log1p(-double(uniformOf(middle)));
           // Half an ulp lost per cell, and a few in the logarithm and t.
           const double tolerance = (40.0 / macrocell + 8) * 43 * 0x1p-24;
-          EXPECT_NEAR(double(hit->place.t()), 2.5 + depth / thickness * 40, tolerance);
+          EXPECT_NEAR(double(hit->distance.t()), 2.5 + depth / thickness * 40, tolerance);
           low = middle + 1;
         } else {
           high = middle;
