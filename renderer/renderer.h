@@ -23,7 +23,7 @@ namespace scolopax {
 class Launcher;
 
 /// Memory, in bytes, that a renderer's film takes for each pixel, with a volume of so many channels and with
-/// AOVs if they are recorded. The corrections of Method::automatic take more if there is more.
+/// AOVs if they are recorded. The corrections of Method::automatic take more where memory is left.
 std::size_t filmPixelBytes(std::size_t channels, bool aovs);
 
 /// Counts over all samples since the film was reset. Trackers give the same counts on every machine. For

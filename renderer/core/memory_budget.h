@@ -24,7 +24,7 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
   /// small ones. A film of 1920x1080 pixels takes 192 MiB.
   static constexpr std::uint64_t kOrdinaryBytes = 256 << 20;
 
-  /// For callers: scenes and answers that take no more are not charged, so that ordinary requests need no
+  /// Callers do not charge scenes and answers up to this size, so that ordinary requests do not depend on
   /// memory that others may hold.
   static constexpr std::uint64_t kFreeBytes = 64 << 10;
 
@@ -61,7 +61,7 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
   void setRelease(std::function<bool()> release);
 
   std::uint64_t limit() const { return limit_; }
-  /// The most that may be in use, once a share of so many bytes has been taken.
+  /// The most that may be in use after a share of this size has been taken.
   std::uint64_t most(std::uint64_t bytes) const { return bytes <= kOrdinaryBytes ? limit_ : limit_ / 4 * 3; }
   std::uint64_t used(MemoryUse use) const;
 

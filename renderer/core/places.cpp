@@ -17,7 +17,7 @@ Places::Place::Place(Places& places, const std::stop_token& stop) : places_(plac
       lock, stop, [&] { return places_.free_ > 0 && places_.waiting_.front() == this; });
   std::erase(places_.waiting_, this);
   if (free) --places_.free_;
-  places_.changed_.notify_all();  // another may be the first now
+  places_.changed_.notify_all();  // the next one may now be the first
   if (!free) throw Error(ErrorCode::cancelled, "cancelled before there was a place for it");
 }
 

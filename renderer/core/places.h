@@ -9,13 +9,12 @@
 
 namespace scolopax {
 
-/// A number of places, which are given in the order in which they are asked for. Every function may be called
-/// from any thread.
+/// A fixed number of places, first come, first served. Every function may be called from any thread.
 class Places {
  public:
-  /// `count`: from 1.
+  /// `count` must be at least 1.
   explicit Places(int count) : free_(count) {}
-  /// Number of those who wait for a place.
+  /// Number of threads that wait for a place.
   std::size_t waiting() const;
 
   /// One of the places, for the lifetime of this object.

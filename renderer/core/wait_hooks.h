@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lets others work in the place of a thread that only waits: SharedBuilds tells, and a pool of threads
-// listens.
+// Lets a pool of threads run other work while one of its threads only waits. SharedBuilds calls the hooks;
+// the pool sets them.
 #pragma once
 
 namespace scolopax {
@@ -13,7 +13,7 @@ class WaitHooks {
   virtual void afterWait() noexcept = 0;
 };
 
-/// The calling thread's; null: nobody needs to know.
+/// Those of the calling thread; null if it has none.
 inline thread_local WaitHooks* waitHooks = nullptr;
 
 /// Exists while the calling thread waits. No lock may be held that others need.

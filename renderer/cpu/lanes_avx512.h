@@ -39,8 +39,7 @@ SCOLOPAX_LANES Int operator*(Int a, Int b) { return {_mm512_mullo_epi32(a.v, b.v
 SCOLOPAX_LANES Int operator&(Int a, Int b) { return {_mm512_and_si512(a.v, b.v)}; }
 SCOLOPAX_LANES Int operator^(Int a, Int b) { return {_mm512_xor_si512(a.v, b.v)}; }
 SCOLOPAX_LANES Int operator|(Int a, Int b) { return {_mm512_or_si512(a.v, b.v)}; }
-// Some intrinsics are the masked ones: in GCC 12, the others start from a vector that its warnings take to be
-// uninitialised.
+// Some intrinsics are the masked ones, because GCC 12 warns that the others use an uninitialised vector.
 template <int kBits>
 SCOLOPAX_LANES Int left(Int a) {
   return {_mm512_maskz_slli_epi32(0xffff, a.v, kBits)};

@@ -7,8 +7,9 @@
 
 namespace scolopax {
 
-/// One line per entry: C++ name, wire name, description. To add a tracker or blend mode, add a line here and
-/// a struct in renderer/kernel; the instantiations expand these lists.
+/// One line per entry: C++ name, wire name, description. To add a tracker or blend mode, add a line here, a
+/// struct in renderer/kernel, and its cases in data/instances.h. A tracker is compiled in files of its own:
+/// cpu/kernels_*.cpp and those that cuda/kernels.cmake lists.
 #define SCOLOPAX_BLEND_MODES(X) /* Eq. 6-7; Eq. 8-9; Eq. 8 and 10; section 4.2 */                          \
   X(density, "density",                                                                                    \
     "all channels share the space: each is seen through the others, and where they overlap their colours " \

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Picking: what is visible at a place of the picture. Chooses which pixels are sampled, and which sample
+// Picking: what is visible at a point of the picture. Chooses which pixels are sampled, and which sample
 // represents a pixel. A backend takes the samples.
 #pragma once
 #include <chrono>

@@ -55,8 +55,8 @@ constexpr Columns kColumns = [] {
 }();
 
 /// The dimensions of the sequence for the words of each block. The best ones go where most depends on them:
-/// to the position in the pixel, then to the first collision. The other sampler's words are the places and
-/// jitters of lit strata.
+/// to the position in the pixel, then to the first collision. The other sampler's words are the points
+/// and jitters of lit strata.
 constexpr int kDimensions[][3] = {{0, 1, 8}, {2, 3, 4}, {5, 6, 7}, {9, 10, 11}, {12, 13, 14}, {15, 16, 17}};
 static_assert(3 * std::size(kDimensions) == kSobolDimensions);
 

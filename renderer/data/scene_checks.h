@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a scene must fulfil to be rendered, apart from its camera and curves, which are checked where they are
-// converted.
+// Checks of scenes. Cameras and curves are checked where they are converted for the kernels.
 #pragma once
 #include "renderer/data/scene.h"
 #include "renderer/data/volume.h"

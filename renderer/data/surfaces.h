@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The surfaces of a channel in the form that the kernels meet them: at its isovalues and at the peaks of its
-// opacity curve.
+// The surfaces of a channel in the form that kernels read: at its isovalues and at the peaks of its opacity
+// curve.
 #pragma once
 #include <vector>
 

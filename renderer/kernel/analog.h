@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sample by analog tracking: the ray ends at its first collision and has the lit colour there. With every
-// tracker its expected value is the exact picture, whatever the lighting.
+// A sample by analog tracking: the ray ends at its first collision and has the lit colour there. Its expected
+// value is the exact picture, with every tracker and in any light.
 #pragma once
 #include "renderer/kernel/sample_records.h"
 #include "renderer/kernel/shade.h"

@@ -10,7 +10,7 @@ namespace scolopax::kernel {
 /// and counts as truncated.
 inline constexpr int kMaxSegments = 1 << 20;
 
-/// Index along an axis of the macrocell that rays are in at t. `inverseSize`: 1 / MajorantView::cellSize.
+/// Index, along an axis, of the macrocell in which rays are at t. `inverseSize`: 1 / MajorantView::cellSize.
 template <class L>
 SCOLOPAX_LANES_PART typename L::Int macrocellAt(const RayOf<L>& ray, typename L::Float t, int axis,
                                                 typename L::Float inverseSize, const MajorantView& grid) {

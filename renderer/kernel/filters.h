@@ -137,8 +137,8 @@ SCOLOPAX_RARE inline void findSplineGradient(const FieldView& field, glm::ivec3 
                    smoothY, [&](auto&& of) { return slopeOver(axes.z, of); }, rows)};
 }
 
-/// Stored value of a field at a point in voxel coordinates, by its filter. Not finite if one of the voxels is
-/// not that the filter reads: eight, the 64 of the B-spline, or one.
+/// Stored value of a field at a point in voxel coordinates, by its filter. Not finite if one of the voxels
+/// that the filter reads is not: eight, the 64 of the B-spline, or one.
 template <class L>
 SCOLOPAX_LANES typename L::Float sampleStored(const FieldView& field, glm::ivec3 dims,
                                               const typename L::Vec& point) {

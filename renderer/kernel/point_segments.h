@@ -42,7 +42,7 @@ class PointSegments {
       const Float start = k_ > 0 ? endOf(k_ - 1) : inside_.enter, end = endOf(k_);
       if (!meetsSomething(start, end)) {
         const int first = firstSegment(select(walk_.full(), walk_.enter(), walk_.exit()));
-        // Where floats cannot tell segments apart, this might go on for ever.
+        // Where floats cannot tell segments apart, this loop might never end.
         if (first <= k_ + 1 && ++idle_ > kMaxSegments) giveUp(live_);
         k_ = k_ > first - 1 ? k_ : first - 1;
         continue;

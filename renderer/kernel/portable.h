@@ -22,10 +22,11 @@ inline constexpr bool kPlainDevice = false;
 }  // namespace scolopax::kernel
 
 // SCOLOPAX_HOT marks functions in which most of the time is spent; everything that they call is inlined.
-// SCOLOPAX_PART marks parts of one long function: they are inlined wherever they are called, so that what
-// they take by reference stays in registers. SCOLOPAX_APART and SCOLOPAX_RARE mark functions that are seldom
-// called and are not inlined. On a device, everything is inlined except SCOLOPAX_RARE functions, which only
-// few scenes need. With sanitizers, whose code is long, no inlining is forced.
+// SCOLOPAX_PART marks parts of a function that are functions only for the reader. They are inlined wherever
+// they are called, so that what they take by reference stays in registers. SCOLOPAX_APART and SCOLOPAX_RARE
+// mark functions that are seldom called and are not inlined. On a device, everything is inlined except
+// SCOLOPAX_RARE functions, which only few scenes need. With sanitizers, whose code is long, no inlining is
+// forced.
 #if defined(__CUDACC__)
 #define SCOLOPAX_HOT SCOLOPAX_HD
 #define SCOLOPAX_PART SCOLOPAX_HD __attribute__((always_inline))

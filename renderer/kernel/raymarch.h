@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Ray marching by quadrature, one ray per lane. Segments are of equal length, from a jittered start, and
-// their scalars taken to be linear; or they end at the faces of voxel cells, between which scalars are
-// cubics, and are shorter where matter is dense. Curves are integrated over each (the paper's baseline
-// of 5.2-5.3 takes one point instead). Lighting is computed once per stratum of absorbed light. Biased; the
-// error is of second order in the segments' length.
+// scalars are taken to be linear on them; or segments end at the faces of voxel cells, between which scalars
+// are cubics, and are shorter where matter is dense. Curves are integrated over each segment (the paper's
+// baseline of 5.2-5.3 takes one point instead). Lighting is computed once per stratum of absorbed light.
+// Biased; the error is of second order in the segments' length.
 #pragma once
 #include "renderer/kernel/sample_records.h"
 #include "renderer/kernel/strata.h"

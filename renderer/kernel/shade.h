@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lighting at a point of a ray: gradient shading and shadows (renderer section 4.6).
+// Lighting at a point of a ray: gradient shading and shadows.
 #pragma once
 #include "renderer/kernel/clip.h"
 #include "renderer/kernel/gradient.h"

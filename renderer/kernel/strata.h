@@ -141,10 +141,10 @@ class StrataSum {
 /// absorbs. The random numbers depend only on the sample and on j, so that pictures with different steps
 /// light nearly the same points.
 ///
-/// The mass of a stratum is known only at its end, and keeping every segment until then is out of the
-/// question. This is weighted reservoir sampling, with a reservoir of one: the candidate places of stratum j
-/// are the records u1, u1 u2, u1 u2 u3, ... of a unit interval, with u uniform. The largest record that is at
-/// most m is uniform in [0, m), whatever m is (the records of a Poisson process are scale-free). When
+/// The mass of a stratum is known only at its end, and keeping every segment until then would take too much
+/// memory. So this is weighted reservoir sampling, with a reservoir of one: the candidate points of stratum j
+/// are at the records u1, u1 u2, u1 u2 u3, ... of a unit interval, with u uniform. The largest record that is
+/// at most m is uniform in [0, m), whatever m is (the records of a Poisson process are scale-free). When
 /// absorption passes a record, the point moves on to that record's segment.
 ///
 /// With one lane, strata are lit as they end. With many, they wait until there is one for every lane.

@@ -39,7 +39,7 @@ struct ChannelView {
   bool dataFalls;  ///< data values fall as stored values rise
 };
 
-/// Matter behind this much is not marched.
+/// How much matter a ray is marched through: what lies behind it is left out.
 struct OpacityLimit {
   float transmittance, depth;  ///< the same limit twice: depth = -log(transmittance)
 };

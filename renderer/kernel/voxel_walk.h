@@ -87,8 +87,8 @@ class VoxelWalk {
     more_ = without(more_, which);
   }
 
-  /// Where each ray meets the next plane through voxel centres after t; with
-  /// nearest-voxel interpolation, also the next plane between them.
+  /// Where each ray meets the next plane through voxel centres after t or, with nearest-voxel interpolation,
+  /// the next one through them or between them.
   SCOLOPAX_LANES Float faceAfter(Float t) const {
     Float face(kInfinity);
     for (int axis = 0; axis < 3; ++axis) {
@@ -139,8 +139,8 @@ SCOLOPAX_HD inline unsigned cubicFetches(const FieldView& field) {
 }
 
 /// Samples `channels` at the nodes of a cubic on the parts of rays from `start` to `end`, each in a cell of
-/// eight voxels and, for fields of which the nearest voxel counts, nearest to one of them. Calls visit(n,
-/// points, values) for every channel: the nodes in voxel coordinates, and stored values less the channel's
+/// eight voxels and, with nearest-voxel interpolation, nearest to one of them. Calls visit(n, points, values)
+/// for every channel: the nodes in voxel coordinates, and stored values less the channel's
 /// origin; NaN where a value is not finite. Trilinear interpolation is a cubic there, and the nearest voxel's
 /// value a constant; the cubic B-spline is of degree 9, so that the cubic through its nodes approximates it.
 template <class L, class Visit>

@@ -80,7 +80,7 @@ double sumOf(const Taps& taps) {
   return sum;
 }
 
-/// The scalars `values` filtered along x by one row of taps and along y by another; borders are repeated.
+/// Filters `values` along x with one row of taps and along y with another; borders are repeated.
 std::vector<double> filtered(const std::vector<double>& values, int width, int height, const Taps& alongX,
                              const Taps& alongY) {
   const auto pass = [&](const std::vector<double>& in, const Taps& taps, int dx, int dy) {
@@ -109,7 +109,7 @@ constexpr Sensitivity kAchromatic[] = {{1, 0.0047}}, kRedGreen[] = {{1, 0.0053}}
                       kBlueYellow[] = {{34.1, 0.04}, {13.5, 0.025}};
 constexpr double kWidestB = 0.04;
 
-/// What the eye cannot resolve at this distance, taken away from one component.
+/// Removes from one component what the eye cannot resolve at this distance.
 template <std::size_t N>
 void filterBySensitivity(Planes& image, int component, const Sensitivity (&terms)[N],
                          double pixelsPerDegree) {
@@ -180,7 +180,7 @@ Planes ycxczOf(const Image& image) {
   return planes;
 }
 
-/// What is seen of the colours, in Hunt-adjusted L*a*b*.
+/// The colours as the eye sees them, in Hunt-adjusted L*a*b*.
 std::vector<glm::dvec3> seenColors(Planes ycxcz, double pixelsPerDegree) {
   filterBySensitivity(ycxcz, 0, kAchromatic, pixelsPerDegree);
   filterBySensitivity(ycxcz, 1, kRedGreen, pixelsPerDegree);
@@ -192,8 +192,8 @@ std::vector<glm::dvec3> seenColors(Planes ycxcz, double pixelsPerDegree) {
   return ycxcz.pixels;
 }
 
-/// Distance of two colours to [0,1]: the largest there is, from green to blue, becomes 1, and all above
-/// kColorKnee of it are pressed into the last 0.05.
+/// Maps the distance of two colours to [0,1]. The largest one, from green to blue, becomes 1; distances above
+/// kColorKnee of it are compressed into the last 0.05.
 double colorError(const glm::dvec3& a, const glm::dvec3& b) {
   static const double largest =
       std::pow(hyab(huntLabFromRgb({0, 1, 0}), huntLabFromRgb({0, 0, 1})), kColorExponent);

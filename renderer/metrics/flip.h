@@ -17,7 +17,8 @@ struct Flip {
 };
 
 /// Colours are what an 8-bit picture over black would show, without its rounding: linear premultiplied RGB
-/// clipped to [0,1]. A NaN in either picture makes the error NaN where it is felt, and the mean.
+/// clipped to [0,1]. A NaN in either picture makes the mean NaN, and all errors on which it has an
+/// influence.
 /// Throws Error(badInput) when the sizes differ or there is no pixel, or pixelsPerDegree is not in [1, 1000].
 Flip flipDifference(const Image& a, const Image& b, double pixelsPerDegree = kFlipPixelsPerDegree);
 

@@ -8,9 +8,9 @@ namespace scolopax {
 /// Squared relative errors are (a - b)^2 / (b^2 + this): what is darker than a tenth counts less.
 inline constexpr double kRelativeEpsilon = 0.01;
 
-/// Differences over linear premultiplied RGB and alpha, with a peak value of 1: over which background a
-/// picture will be seen is not known. A component that is not finite is never passed over: an infinite one
-/// makes rmse, maximum and relative infinite, a NaN all of them NaN.
+/// Differences over linear premultiplied RGB and alpha, because the background of a picture is not known. The
+/// peak value is 1. Components that are not finite are not ignored: an infinite one makes rmse, maximum and
+/// relative infinite, and a NaN makes all of them NaN.
 struct ImageDifference {
   double rmse = 0;      ///< square root of the mean squared difference over all pixels and 4 components
   double psnr = 0;      ///< -20 log10(rmse), dB; infinite for equal pictures

@@ -9,8 +9,8 @@
 namespace scolopax::reference {
 namespace {
 
-// Voxels; where a ray meets an edge of voxels, rounding may make it pass by the side of one through which it
-// does not go.
+// In voxels. Where a ray meets an edge of voxels, rounding may put a very short part of it into a voxel that
+// it does not enter.
 constexpr double kLeastOfVoxel = 1e-9;
 
 /// Follows one scalar along a ray, and notes where it crosses a value.

@@ -280,8 +280,8 @@ double Integrator::transmittance(const glm::dvec3& pointVoxel, bool onSurface, c
     if (!onSurface || crossing.t > cells.cuts.front() + kSamePlace * smallestSpacing_)
       passes *= 1 - crossing.surface->opacity;
   if (passes == 0) return 0;
-  // A third of kShadowError each: for cutting off the darkness, for the absolute errors of all cells on the
-  // way, and for the relative error of the whole depth.
+  // A third of kShadowError each: for ending in the dark, for the absolute errors of all cells on the way,
+  // and for the relative error of the whole depth.
   const double dark = -std::log(kShadowError / 3 * tolerance_);
   const double allowed = kShadowError / 3 * tolerance_ / double(std::max<std::size_t>(cells.cuts.size(), 1));
   double depth = 0;

@@ -18,13 +18,13 @@ inline constexpr float kFewCollisions = 2.0f;
 enum class CellOutcome { nothing, hit, exhausted, stuck };
 
 /// A voxel cell, which lies between eight voxels: the one that a ray passes through after a point. `way` is
-/// how far the ray goes in it, in world units. Outer cells extend to the faces of the box. With fields of
-/// which the nearest voxel counts, it is the part of the cell that is nearest to one of the eight.
+/// how far the ray goes in it, in world units. Outer cells extend to the faces of the box. With
+/// nearest-voxel interpolation, it is the part of the cell that is nearest to one of the eight.
 struct VoxelCell {
   glm::ivec3 low;
   float way;
   glm::vec3 begin, end;  ///< first and last points, in voxel coordinates
-  glm::ivec3 nearest;    ///< the nearest voxel; only with such fields
+  glm::ivec3 nearest;    ///< the nearest voxel, with such interpolation
 
   SCOLOPAX_HD VoxelCell(const SceneView& scene, const Ray& ray, glm::vec3 point)
       : low(0), way(kInfinity), nearest(0) {
