@@ -53,7 +53,7 @@ class Bench:
     def __init__(self, folder, truths, quick):
         self.folder, self.truths, self.quick = folder, truths or folder, quick
         os.makedirs(self.truths, exist_ok=True)
-        # A reference picture has only every third pixel: with shadows and many curves, a ray takes seconds.
+        # A reference picture has only every third pixel, because a ray takes seconds with shadows and many curves.
         self.side, self.truth_side = (48, 16) if quick else (96, 32)
         self.repetitions = 2 if quick else 3
         self.scenes = [name for name in SCENES if not quick or name in ("orbitals", "cells", "bonsai")]

@@ -22,7 +22,7 @@ def main(out):
                     [PROGRAM, "render", os.path.join(HERE, "scenes/orbitals.json"), "--data", data, "-o", pictures[-1],
                      "--samples", "160", "--set", f"blend.mode={blend}", "--set", f"shading={light}",
                      "--set", f"shadows={light}"], check=True)
-        # From Debian's openimageio-tools: places pictures side by side.
+        # oiiotool, from Debian's openimageio-tools, places pictures side by side.
         subprocess.run(["oiiotool", *pictures, "--mosaic:pad=4", "4x2", "--nosoftwareattrib", "--compression", "jpeg:88", "-o", out],
                        check=True)
 

@@ -83,7 +83,7 @@ def blends(bench):
 
 
 def memory(bench):
-    """Table 1: bytes of data, macrocells and majorants at the default macrocell size, and of the film."""
+    """Table 1: bytes of the data, of macrocells and majorants at the default macrocell size, and of the film."""
     found = {}
     for name in bench.scenes:
         result = bench.bench(name, truth=False, methods=["superposed"], samples=[1], repetitions=2, side=512)
@@ -110,7 +110,7 @@ def sizes(bench):
                          for method, points in row["points"].items()}
         command = [PROGRAM, "render", bench.scene("orbitals"), "--data", *bench.orbitals(4, edge), "-o",
                    bench.path("sizes.exr"), "--samples", "1"]
-        # Less what the program and its libraries need before they do anything.
+        # Without the memory that the program and its libraries need before they do anything.
         row["peakBytes"] = resources(command)[1] - resources([PROGRAM, "--version"])[1]
     return rows
 

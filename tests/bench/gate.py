@@ -5,7 +5,7 @@ gate.py compare OLD.json NEW.json
 
 `record` hashes float pictures of every scene in every blend mode, light and method, on every instruction set that this
 processor has; `compare` lists the pictures that differ. The scene `features` has every field that the scenes of the
-report leave alone. Reads SCOLOPAX, SCOLOPAX_DATA_DIR; fails if a scene's data is missing."""
+report do not have. Reads SCOLOPAX, SCOLOPAX_DATA_DIR; fails if a scene's data is missing."""
 import argparse
 import hashlib
 import http.client
@@ -21,7 +21,7 @@ import serving  # noqa: E402
 from common import LIGHTS, SCENES, Bench, scratch  # noqa: E402
 
 BLENDS = ("density", "max", "mix", "composite")
-# Each with the flag of /proc/cpuinfo without which the program would quietly take the one before it.
+# Each with its flag in /proc/cpuinfo. Without the flag, the program would silently use the previous one.
 INSTRUCTIONS = {"baseline": None, "avx2": "avx2", "avx512": "avx512f"}
 SIZE = {"width": 40, "height": 31}  # not a multiple of tiles or packets
 

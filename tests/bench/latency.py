@@ -146,7 +146,7 @@ def cases(counts):
 
 def main(out, counts):
     paths = [os.path.join(DATA, file) for file in SCENES["tcga"]]
-    results, load = [], os.getloadavg()[1]  # other load on the machine
+    results, load = [], os.getloadavg()[1]  # the load by other processes
     with serving.Server(paths=paths) as server:
         for case, rate in cases(counts):
             rows = asyncio.run(measure(server, case["edit"], rate, case["clients"], case["shared"], case["stalled"]))

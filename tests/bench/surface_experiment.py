@@ -13,7 +13,7 @@ from surface_scenes import VOLUMES, scene, vti_to_nrrd, with_isovalues
 
 PEAKS = os.path.join(os.path.dirname(PROGRAM), "bench_peaks")
 TILE = 160  # edge of a picture in the contact sheets
-# The paper's step is 4 footprints of pixels of pictures about this high; ours are smaller, and keep the step.
+# The paper's step is 4 pixel footprints, for pictures about this high. Ours are smaller, with the same step.
 PAPER_HEIGHT, PAPER_FOOTPRINTS = 1024, 4
 
 
@@ -97,7 +97,7 @@ def sheet(bench, paths, columns):
 
 
 def integral_settings():
-    """Of the curve alone. Equal steps of one voxel show what classification changes, and nothing else."""
+    """The curve alone. Equal steps of one voxel show only the effect of classification."""
     return [post("postclassification", step=1), preintegrated(256, step=1), preintegrated(1024, step=1),
             marched("raymarch", "off"), automatic("auto", "off")]
 
@@ -129,7 +129,7 @@ def figure3(bench, volumes):
 
 
 def spikes(bench, volumes):
-    """Peaks of constant area: the narrower, the denser, so that the integral keeps what it shows."""
+    """Peaks of constant area: narrower peaks are denser, so that the integral stays the same."""
     volume, files = next(iter(volumes.items()))
     return [{"volume": volume, "light": "unlit", "width": width,
              "rows": measure(bench, f"spikes, {width:g}", files,
@@ -151,8 +151,8 @@ def figure4(bench, volumes):
 
 
 def figure5(bench, volumes):
-    """Left: peaks close to each other, one or four a segment, at a wide step. Right: what peak finding changes where the
-    curve is smooth, with ours at 16 times the peaks' extinction."""
+    """Left: peaks close to each other, one or four a segment, at a wide step. Right: the effect of peak finding where
+    the curve is smooth; ours with 16 times the peaks' extinction."""
     volume, files = next(iter(volumes.items()))
     base = VOLUMES[volume]["peak"]
     near = {"peaks": [base + 0.02 * i for i in range(6)], "width": 1e-3, "extinction": 0.3, "smooth": 0.02}
@@ -185,7 +185,7 @@ def sampling(bench, volumes, view, names):
             growing = [{**post("differential", peaks, **footprints(bench.side, count)), "count": count} for count in counts]
             rows = measure(bench, f"{view} view, {volume}, {name}", volumes[volume], made, equal + growing)
             found.append({"volume": volume, "view": view, "name": name, "rows": rows})
-            # Equal steps with about as many samples as the paper's differential sampling takes.
+            # Equal steps with about as many samples as the paper's differential sampling.
             wanted = next(row for row in rows if row.get("count") == PAPER_FOOTPRINTS)["samplesPerPixel"]
             nearest = min(rows[:len(equal)], key=lambda row: abs(row["samplesPerPixel"] - wanted))
             shown += [post("uniform", peaks, step=nearest["step"]), post("differential", peaks, **footprints(TILE))]
@@ -209,8 +209,8 @@ def table1(bench, volumes):
 
 
 def adaptive(bench, volumes):
-    """Steps that follow the data or the ray, on a smooth curve, with preintegration: what classification loses does not
-    count. All are multiples of a quarter of a voxel."""
+    """Steps that follow the data or the ray, on a smooth curve, with preintegration, so that errors of classification
+    do not count. All are multiples of a quarter of a voxel."""
     steps = (4, 1, 0.25) if bench.quick else (8, 4, 2, 1, 0.5, 0.25)
     switches = {"variance": (0,), "bounds": (1e-2,) if bench.quick else (1e-1, 1e-2, 1e-3, 1e-4), "opacity": (0,),
                 "gradient": (0.03,) if bench.quick else (0.1, 0.03, 0.01, 0.003)}

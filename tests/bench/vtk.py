@@ -21,14 +21,14 @@ SINGLE = {name: [f"scalar/{name}.nii.gz"] for name in ("heptane", "bonsai", "eng
 MULTIPLE = {"tcga": SCENES["tcga"]}
 STEPS = [8, 4, 2, 1, 0.5]  # in voxels
 FRAME_STEPS = STEPS[1:]  # with four channels
-BETWEEN = [6, 3, 1.5, 0.75, 0.25, 0.125]  # Scolopax's further steps: the fastest sufficient one, convergence
-ROUNDS = 5  # VTK's rounds before Scolopax's, and as many after
+BETWEEN = [6, 3, 1.5, 0.75, 0.25, 0.125]  # further steps of Scolopax: the fastest sufficient one, convergence
+ROUNDS = 5  # of VTK before Scolopax's turn, and as many after it
 COLORS = ["#ff4030", "#40c060", "#4080ff", "#ffd040"]
 
 
 def padded(voxels):
-    """Adds an empty layer: VTK's box ends at the outer voxels' centres, Scolopax's half a voxel beyond; with an empty
-    border both show the same."""
+    """Adds an empty layer. VTK's box ends at the centres of the outer voxels, Scolopax's half a voxel beyond. With an
+    empty border both show the same."""
     return numpy.pad(voxels, 1, constant_values=0)
 
 

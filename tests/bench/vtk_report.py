@@ -60,7 +60,7 @@ def summary(rows, ratio, what):
 
 
 def floor(measured):
-    """A sentence with the least errors of both."""
+    """A sentence with the smallest errors of both."""
     singles = [found for found in measured if "lights" not in found]
     vtk = [min(point["rmse"] for point in found["vtk"]) for found in singles]
     ours = [min(point["rmse"] for point in found["scolopax"]) for found in singles]

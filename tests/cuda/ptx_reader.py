@@ -16,7 +16,7 @@ class Array:
     name: str
     size: int
     align: int
-    values: str = ""  # of a table: what stands between its braces
+    values: str = ""  # of a table: the text between its braces
     element: str = "b8"
 
 
@@ -66,7 +66,7 @@ def read_array(text):
 
 
 def matching(text, start, opening, closing):
-    """Index just behind the bracket that closes the one at `start`."""
+    """Index after the bracket that closes the one at `start`."""
     depth = 0
     for i in range(start, len(text)):
         depth += text[i] == opening
@@ -102,7 +102,7 @@ def read_statements(body):
 
 
 def read_function(text, start):
-    """The function whose `.entry` or `.func` is at `start`, and the index behind it."""
+    """The function whose `.entry` or `.func` is at `start`, and the index after it."""
     is_kernel = text.startswith(".entry", start)
     at = start + len(".entry" if is_kernel else ".func")
     result, parameters = [], []

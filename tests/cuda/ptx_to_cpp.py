@@ -17,7 +17,7 @@ CPP_TYPES = {"u8": "std::uint8_t", "s8": "std::int8_t", "u16": "std::uint16_t", 
 WIDER = {"u16": "u32", "s16": "s32", "u32": "u64", "s32": "s64"}
 COMPARISONS = {"eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">=",
                "lo": "<", "ls": "<=", "hi": ">", "hs": ">="}
-# True also when an operand is NaN: the opposite comparison is false.
+# Also true if an operand is NaN: the opposite comparison is false.
 UNORDERED = {"neu": "==", "ltu": ">=", "leu": ">", "gtu": "<=", "geu": "<"}
 TO_INTEGER = {"rni": "rint", "rzi": "trunc", "rmi": "floor", "rpi": "ceil"}
 ROUNDED = {"add", "sub", "mul", "fma", "div", "rcp", "sqrt"}
@@ -388,7 +388,7 @@ def label(name):
 
 
 def translate(text, allow_contraction=False):
-    """C++ of a module's functions and a table of its kernels. Raises Refused, naming everything that is."""
+    """C++ of a module's functions and a table of its kernels. Raises Refused, which names all refused statements."""
     module = read_module(text)
     defined = [function for function in module.functions if function.defined]
     names = {function.name: f"function{i}" for i, function in enumerate(defined)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the translator has to refuse, so that a kernel with it cannot pass the other tests."""
+"""Checks that the translator refuses unwanted instructions, so that a kernel with them cannot pass the other tests."""
 import unittest
 
 from ptx_to_cpp import Refused, translate

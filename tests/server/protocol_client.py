@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A client written from protocol/PROTOCOL.md alone, and a TCP proxy that makes its connection slow. The client checks
-every frame for what the document promises of all frames."""
+in every frame the promises that the document makes for all frames."""
 import asyncio
 import http.client
 import json
@@ -11,7 +11,7 @@ import zlib
 
 import websockets
 
-PATIENCE = 30  # seconds for one answer; only a server that hangs takes that long
+PATIENCE = 30  # seconds to wait for an answer; only a server that hangs takes so long
 INTERACTIVE, FINAL = 1, 2
 
 # "Frame header": offset, type.
@@ -31,7 +31,7 @@ class Frame:
         self.image = message[self.headerBytes:]
 
     def problems(self, before):
-        """Names of the promises that are broken, given the stream's previous frame (or None)."""
+        """Names of the broken promises, given the stream's previous frame (or None)."""
         size = jpeg_size(self.image) if self.codec == 1 else png_size(self.image)
         found = {
             "magic": self.magic == b"SCLX", "version": self.version == 1, "headerBytes": self.headerBytes >= 48,
@@ -170,7 +170,7 @@ class Viewer:
         return frame
 
     async def until(self, wanted, ack=True):
-        """All messages up to the first one that is `wanted`, which is a type or a predicate."""
+        """All messages up to the first one that is `wanted` (a type or a predicate)."""
         messages = []
         async with asyncio.timeout(PATIENCE):
             while True:

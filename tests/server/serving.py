@@ -12,7 +12,7 @@ import urllib.error
 import urllib.request
 
 PROGRAM = os.environ["SCOLOPAX"]
-# What renders in the servers of these tests.
+# The device on which the servers of these tests render.
 DEVICE = os.environ.get("SCOLOPAX_TEST_DEVICE", "cpu")
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The option --device: without CUDA, and, in a program with a CUDA device, what that device renders and what happens
-when it fails. SCOLOPAX_TEST_DEVICE tells whether the program has one."""
+"""The option --device: without CUDA and, in a program with a CUDA device, the device's pictures and its failures.
+SCOLOPAX_TEST_DEVICE states whether the program has one."""
 import os
 import sys
 import unittest

@@ -22,7 +22,7 @@ class Render(CommandTest):
             told[error] = self.stats("--error", str(error), "--seconds", "60", "--set", "image.filter=point")
             self.assertEqual(told[error]["method"], "raymarch")
             self.assertLessEqual(told[error]["estimatedError"], error)
-        # The step is the scene's alone; what is left of its bias is corrected.
+        # The step depends only on the scene; its remaining bias is corrected.
         self.assertEqual(told[2e-4]["step"], told[2e-2]["step"])
         for level in told[2e-4]["corrections"]:
             self.assertGreater(level["passes"], 0)

@@ -112,7 +112,7 @@ class Tls(unittest.TestCase):
         plain.close()
         self.assertEqual(self.server.call("GET", "/healthz", token=False)[0], 200)
         silent.settimeout(60)
-        self.assertEqual(silent.recv(1000), b"")  # the time limit of the handshake has passed
+        self.assertEqual(silent.recv(1000), b"")  # the time limit of the handshake is over
         silent.close()
 
     def test_it_stops_in_order(self):

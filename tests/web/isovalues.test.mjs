@@ -30,7 +30,7 @@ before(async () => {
   browser = await launchBrowser();
   ({ page, faults } = await openPage(browser, server.url));
   await steadyPicture(page, 1);
-  // Nothing is seen of any channel, so that pictures differ by what surfaces show.
+  // All channels are transparent, so that pictures differ only by the surfaces.
   const { channels } = (await sceneOnServer(page)).scene;
   const nothing = channels.map((_, i) => [i, { visible: i === 0, opacity: [[0, 0], [1, 0]] }]);
   await patchFromOutside(page, { channels: Object.fromEntries(nothing) });

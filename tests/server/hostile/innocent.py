@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A client that works with the server while others attack it, and the effect of the attack on it and on the process."""
+"""A client that uses the server while others attack it; measures the effect of the attack on it and on the process."""
 import argparse
 import asyncio
 import contextlib
@@ -21,13 +21,13 @@ SANITIZED = bool(os.environ.get("SCOLOPAX_SANITIZED"))
 FULL = bool(os.environ.get("SCOLOPAX_HOSTILE_FULL"))
 SECONDS = 10 if FULL else 3
 ORBITALS = 256 if FULL else 128
-SESSIONS = 31 if FULL else 8  # of attackers who have many
-PERIOD = 0.05  # between two edits
-# An edit is late if it takes three times as long as the slowest twentieth without an attack, but no less than this: on
-# a busy machine the system itself delays a few.
+SESSIONS = 31 if FULL else 8  # of attackers that have many sessions
+PERIOD = 0.05  # seconds between two edits
+# An edit is late if it takes three times as long as the slowest twentieth without an attack, but at least this long,
+# because on a busy machine the system itself delays a few edits.
 LATE = 0.09
-LATE_SHARE = 0.05  # p95 within three times that without an attack
-# MiB that sockets, stacks and the allocator may add to what an attack may take.
+LATE_SHARE = 0.05  # p95 is within three times the value without an attack
+# MiB that sockets, stacks and the allocator may take in addition to the limit for an attack.
 SLACK = 100
 
 
@@ -95,7 +95,7 @@ async def work(server, dataset):
 
 
 class Repeated:
-    """`with Repeated(action) as work:` does it again and again in a thread, and notes how long it takes each time."""
+    """`with Repeated(action) as work:` repeats the action in a thread and records how long it takes each time."""
 
     def __init__(self, action):
         self.action, self.seconds, self.over, self.failures = action, [], threading.Event(), []
@@ -156,7 +156,7 @@ class HostileTest(unittest.TestCase):
             return next(int(line.split()[1]) for line in file if line.startswith(field)) / 1024
 
     def assert_memory_below(self, found, bound):
-        """Checks nothing with sanitizers, whose own memory is unknown."""
+        """Does nothing with sanitizers, whose own memory is unknown."""
         if not SANITIZED:
             self.assertLess(found, bound)
 
@@ -172,7 +172,7 @@ class HostileTest(unittest.TestCase):
         self.fail(f"{self.descriptors()} descriptors, expected at most {bound}")
 
     def picture(self, session, patch):
-        """Edits a session and waits for its picture, as somebody does who looks at it at rest."""
+        """Edits a session and waits for its picture, like a user who looks at pictures at rest."""
         path = f"/api/v1/sessions/{session['id']}"
         status, _, body = self.server.call("PATCH", path + "/scene", patch)
         self.assertEqual(status, 200, body)
@@ -188,13 +188,13 @@ class HostileTest(unittest.TestCase):
         self.server.call("DELETE", f"/api/v1/sessions/{session['id']}")
 
     def resting(self, width, height, **integrator):
-        """Looks at a picture of its own until it rests, changes it, and so on."""
+        """Repeatedly waits until its own picture is at rest and changes it."""
         session = self.session(image={"width": width, "height": height}, stop={"samples": 1}, integrator=integrator)
         self.addCleanup(self.server.call, "DELETE", f"/api/v1/sessions/{session['id']}")
         return lambda seeds=itertools.count(1): self.picture(session, {"integrator": {"seed": next(seeds)}})
 
     def beside(self):
-        """What those do who wait for pictures at rest: for the small ones, the server chooses the method (auto)."""
+        """The actions of users who wait for pictures at rest. The small pictures use the method auto."""
         return {"page": self.page, "resting": self.resting(256, 256),
                 "1920x1080": self.resting(1920, 1080, method="raymarch", step=2)}
 
@@ -205,7 +205,7 @@ class HostileTest(unittest.TestCase):
         more; and that it closed all descriptors."""
         descriptors, before = self.descriptors(), self.memory()
         with open(f"/proc/{self.server.process.pid}/clear_refs", "w", encoding="utf-8") as file:
-            file.write("5")  # VmHWM begins anew
+            file.write("5")  # resets VmHWM
         self.latencies_under(attack, seconds, beside or {}, late_share)
         print(f"memory: {before:.0f} MiB before, {self.memory():.0f} MiB after, at most {self.memory('VmHWM'):.0f} MiB",
               flush=True)
@@ -213,7 +213,7 @@ class HostileTest(unittest.TestCase):
         self.assert_descriptors_at_most(descriptors + 4)
 
     def done(self, works, count):
-        """How long each work took, each time since the last call; waits until it has been done `count` times."""
+        """The durations of each work since the last call; waits until each has been done `count` times."""
         for _ in range(1200):
             if all(len(work.seconds) >= count or work.failures for work in works.values()):
                 break

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes that take long to build: no other client waits for them, and a build ends when no client needs it."""
+"""Scenes that take long to build: they delay no other client, and a build ends when no client needs it."""
 import asyncio
 import itertools
 import json
@@ -56,7 +56,7 @@ class Builds(HostileTest):
 
     def test_many_sessions_that_toggle_the_macrocells_keep_nobody_waiting(self):
         patches = [{"integrator": {"macrocell": size}} for size in (2, 3)]
-        # All who edit have an equal share of the time, so that any frame may be late.
+        # All editing clients have an equal share of the time, so any frame may be late.
         self.under(lambda over: self.toggle(over, patches, SESSIONS), GRIDS + FILMS, beside=self.beside(), late_share=1)
 
     def test_toggling_the_macrocells_stalls_nobody(self):
@@ -109,8 +109,8 @@ class Ending(HostileTest):
         threading.Event().wait(0.2)
         begin = time.monotonic()
         self.server.process.send_signal(signal.SIGTERM)
-        # The grace period of 3 s, and the time of thread joins on a busy machine. That builds see the stop is tested
-        # without a clock by ApplicationTest.EndsAllBuildsWhenItStops.
+        # The grace period of 3 s plus the time of thread joins on a busy machine.
+        # ApplicationTest.EndsAllBuildsWhenItStops tests without a clock that builds stop.
         self.assertEqual(self.server.process.wait(timeout=10), 0)
         print(f"\nSIGTERM during builds: {time.monotonic() - begin:.2f} s of a grace of 3 s")
         for thread in threads:

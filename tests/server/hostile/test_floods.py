@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Clients that ask for very much: their requests wait for each other, and no other client waits for them."""
+"""Clients with very many or large requests: these wait for each other and delay no other client."""
 import asyncio
 import http.client
 import json

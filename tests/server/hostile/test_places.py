@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Clients without a token take no connections from those with one; a token does not make forbidden input valid."""
+"""Clients without a token cannot use up the connections of those with one. A token does not make forbidden input
+valid."""
 import asyncio
 import os
 import socket

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes of which a single ray takes long: they keep nobody else waiting."""
+"""Scenes in which a single ray takes long: they delay no other client."""
 import asyncio
 import os
 import sys
@@ -9,14 +9,14 @@ import unittest
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from innocent import SESSIONS, HostileTest, Viewer, reading  # noqa: E402
 
-# Thousands of short steps, and as many again for every shadow ray from each lit part to each light.
+# Thousands of short steps, and as many for every shadow ray from each lit part to each light.
 SLOW = {
     "dataset": "orbitals", "image": {"width": 256, "height": 256}, "shadows": True, "shading": True,
     "integrator": {"method": "raymarch", "step": 0.01},
     "channels": [{"density": 0.02, "opacity": [[0, 0.5], [1, 1]]} for _ in range(4)],
     "lights": [{"type": "directional", "direction": [0.1 * i - 0.4, 0.3, -1]} for i in range(8)],
 }
-# All points of the curves are in one small part of the range, beside which the data is.
+# All points of the curves are in one small part of the range, and the data is next to that part.
 CROWDED = [[0.5 + i / 1e7, i % 2] for i in range(4096)]
 
 
@@ -27,7 +27,7 @@ class Rays(HostileTest):
     options = ("--max-sessions", "40")
 
     def edit(self, scene, patch_of):
-        """Edits a session all the time, and asks for its pictures."""
+        """Continuously edits a session and requests its pictures."""
         session = self.session(**scene)
         path = f"/api/v1/sessions/{session['id']}"
 

@@ -18,7 +18,7 @@ from protocol_client import connect  # noqa: E402
 
 CLIENTS = 8 if FULL else 3
 CURVE = [[i / 4096, 0.12345678901] for i in range(4096)]
-# MiB that the clients may make the server keep: for each two texts and a socket's buffers.
+# MiB that the clients may make the server hold: two texts and a socket's buffers for each.
 UNREAD = 64 + 16 * CLIENTS
 TEXTS = 6000  # their answers are far more than 256 and what sockets hold
 
@@ -31,7 +31,7 @@ class Unread(HostileTest):
         return connect(self.server, session["stream"], max_queue=1, read_limit=1024)
 
     def assert_closed(self, codes):
-        """1008, or 1006 if a client did not even read the reason for 5 s."""
+        """The close code: 1008, or 1006 if a client did not even read the reason for 5 s."""
         self.assertGreaterEqual(len(codes), CLIENTS)
         self.assertIn(1008, codes)
         self.assertLessEqual(set(codes), {1006, 1008})
@@ -57,7 +57,7 @@ class Unread(HostileTest):
                 while sent < 100 and not over.is_set():
                     await asyncio.wait_for(viewer.send(text), 20)
                     sent += 1
-                # The answers are so short that they may all wait: the server has not closed the connection.
+                # The answers are so short that all may wait, so the server has not closed the connection.
                 await viewer.send(json.dumps({"type": "ping", "id": 0}))
                 refusals = 0
                 while True:
@@ -121,7 +121,7 @@ class Unread(HostileTest):
         async def round_of_edits(over):
             stalled = [await self.stall(session) for _ in range(CLIENTS)]
             most = number = 0
-            # The texts of a connection are dropped when it is closed: until then one holds some most / CLIENTS.
+            # The texts of a connection are dropped when it is closed. Until then it holds about most / CLIENTS.
             while not over.is_set() and (now := await asyncio.to_thread(unread)) >= most / (2 * CLIENTS):
                 most, number = max(most, now), number + 1
                 status, _, _ = await asyncio.to_thread(
@@ -141,11 +141,11 @@ class Unread(HostileTest):
 
 
 class UnreadAnswers(HostileTest):
-    """Answers that are not read leave most of the memory to others."""
+    """Answers that are not read take only a small part of the memory."""
     orbitals = 64
 
     def send(self, connections, head, body=b"", times=1):
-        """A socket that has sent a request this many times, and reads nothing unless it is told to."""
+        """A socket that has sent a request this many times and reads nothing by itself."""
         client = connections.enter_context(socket.socket())
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         client.settimeout(300)
@@ -160,7 +160,7 @@ class UnreadAnswers(HostileTest):
         before, used, renders = self.memory(), [], []
         with contextlib.ExitStack() as connections:
             leave_unread(connections)
-            # Until the most that was in use is known for a while.
+            # Until the peak of the memory in use has not changed for a while.
             while len(used) < 600 and not (any(used) and max(used) == max(used[:-10], default=0)):
                 used.append(self.metric('scolopax_memory_bytes{use="answers"}'))
                 renders.append(self.server.call("POST", "/api/v1/render", {
@@ -207,7 +207,7 @@ class Edits(UnreadAnswers):
             for _ in range(100 if FULL else 24):
                 self.send(connections, "PATCH " + path, b"{}", times=6)
         self.check(leave_unread)
-        # A script that makes an edit learns its revision in any case.
+        # A script that makes an edit always gets the new revision.
         status, answer = self.server.json("PATCH", path, {})
         self.assertEqual(status, 200)
         self.assertGreater(answer["revision"], 5)
