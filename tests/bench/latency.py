@@ -169,14 +169,15 @@ def report(path):
               "frames/s"]
     size = measured["size"]
     print(f"# From an edit to its picture\nMachine: {measured['machine']}, load average {measured['load']:.1f} before. "
-          f"Four-channel MRI (tcga) at {size}x{size}.\nMilliseconds from a patch being sent to the first frame received "
-          "that contains it; then medians of what that frame's\nheader tells and of what is left, its width, and the "
-          "frames with a new edit that each client got a second. All clients\nare one Python process on the same "
-          "processors. Made by `tests/bench/latency.py out.json` and\n`tests/bench/latency.py --report out.json`.\n\n"
+          f"Four-channel MRI (tcga) at {size}x{size}.\nThe columns p50 to p99 are milliseconds from sending a patch to receiving "
+          "the first frame that contains it. The next ones\nare medians: the times in that frame's header, the rest, its "
+          "width, and the number of frames with a new edit that each\nclient got per second. All clients are one Python "
+          "process on the same processors. Made by\n`tests/bench/latency.py out.json` and "
+          "`tests/bench/latency.py --report out.json`.\n\n"
           "Interactive pictures are not denoised. On this scene (RMSE after cubic enlargement, 256x256, one sample a "
-          "pixel)\na bilateral filter of 5x5 raises the marcher's 0.0027 to 0.0028 and more. A tracker's 0.084 it lowers "
-          "only by as much\nas it disregards edges, to 0.026 as a plain blur; a marcher at a third of the width has less "
-          f"(0.0050 at 171x171).\n\n{table(header, rows)}", end="")
+          "pixel)\na bilateral filter of 5x5 raises the marcher's error from 0.0027 to at least 0.0028. It lowers a tracker's "
+          "error of 0.084\nonly as far as it ignores edges, to 0.026 as a plain blur. A marcher at a third of the width has a "
+          f"smaller error (0.0050\nat 171x171).\n\n{table(header, rows)}", end="")
 
 
 if __name__ == "__main__":

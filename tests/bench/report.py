@@ -21,9 +21,9 @@ def remarks():
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("measured", metavar="MEASURED.json", nargs="+", help="of run.py; later files take the place of earlier")
-    parser.add_argument("--rebuild", metavar="REBUILD.json", help="what bench_rebuild --json printed")
-    parser.add_argument("--layout", metavar="LAYOUT.json", help="what bench_layout --json printed")
+    parser.add_argument("measured", metavar="MEASURED.json", nargs="+", help="files of run.py; later ones replace earlier ones")
+    parser.add_argument("--rebuild", metavar="REBUILD.json", help="output of bench_rebuild --json")
+    parser.add_argument("--layout", metavar="LAYOUT.json", help="output of bench_layout --json")
     parser.add_argument("--out", metavar="FOLDER", default=os.path.join(HERE, "report"))
     options = parser.parse_args()
     measured = {}

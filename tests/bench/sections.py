@@ -42,11 +42,12 @@ def speed(entry, plot):
                                number(best.get("efficiencyToSyncDda"))])
     header = ["scene", "light", "sync-dda", *(m for m in methods if m != "sync-dda")]
     return (f"## Time to RMSE 1e-2\n\n{table(header, rows['0.01'])}\n## Time to RMSE 1e-3\n\n{table(header, rows['0.001'])}\n"
-            "Times of sync-dda, and how many times less the others take in the same run. Of unbiased methods by the law of "
-            "their noise\nfrom the most samples measured; of methods with a step at the best step measured, their noise "
-            "brought down by more samples\nwhere the bias leaves room (-: nothing measured gets there).\n\n## Counts and errors\n"
-            "The most samples measured, steps of one voxel; fetches, macrocells and random blocks are per ray, the last column is "
-            "1 / (MSE x seconds)\nas a ratio to sync-dda.\n\n" +
+            "The time of sync-dda, and how many times less the other methods take in the same run. For unbiased methods it is "
+            "extrapolated\nby the law of their noise from the most samples measured. For methods with a step it is that of the "
+            "best measured step, where\nmore samples reduce the noise if the bias is small enough (-: no measured step reaches the "
+            "error).\n\n## Counts and errors\n"
+            "The most samples measured, steps of one voxel. Fetches, macrocells and random blocks are per ray. The last column is "
+            "the ratio of\n1 / (MSE x seconds) to that of sync-dda.\n\n" +
             table(["scene", "light", "method", "samples", "ns/ray", "RMSE", "FLIP", "bias", "fetches", "cells", "randoms",
                    "to sync"], counts))
 
@@ -96,8 +97,8 @@ def channels(entry, plot):
                         [number(points["superposed"].get("efficiencyToSyncDda")), number(points["superposed"]["fetchesPerRay"]),
                          number(sync["fetchesPerRay"])])
         panels.append((light, [(m, *xy) for m, xy in series.items()]))
-        text += (f"## {light}\nns/ray, and in brackets how many times less than sync-dda; 1 / (MSE x seconds) of superposed to "
-                 "sync-dda where a truth was\nrendered; fetches per ray:\n\n" +
+        text += (f"## {light}\nns/ray, and in brackets how many times less than sync-dda; the ratio of 1 / (MSE x seconds) of superposed "
+                 "and sync-dda, if\nthere is a reference picture; fetches per ray:\n\n" +
                  table(["channels", *series, "efficiency", "fetches, superposed", "fetches, sync-dda"], rows) + "\n")
     return plot("channels", lines(panels, "channels", "ns/ray", logx=False)) + "\n\n" + text
 
@@ -143,7 +144,7 @@ def memory(entry, plot):
         ("NASA ROI (4)", "2990", "375.98", "187.99", "18.86 %"), ("NYX (4)", "2048", "64.00", "32.00", "4.69 %"),
         ("Hurricane (4)", "381.47", "11.92", "5.96", "4.69 %"), ("Miranda (4)", "576", "18.00", "9.00", "4.69 %"),
         ("Zebrafish (3)", "567.15", "2.19", "1.01", "0.56 %"))]
-    return ("MB and, in the last columns, bytes per voxel and channel (film: per pixel), as the heap grows by each, at macrocells of "
+    return ("Growth of the heap in MB and, in the last columns, bytes per voxel and channel (film: per pixel), with macrocells of "
             "4 voxels:\n\n" + table(["scene (channels)", "data", "macrocells", "majorants", "share", "data B", "macrocells B",
                                      "majorants B", "film B"], rows))
 
@@ -196,7 +197,7 @@ def loading(entry, plot):
         rows.append([case, f"{t['bytes'] / 1e6:.2f}", f"{1e3 * t['read']:.2f}", "-" if t["gzip"] is None else f"{1e3 * t['gzip']:.0f}",
                      f"{1e3 * load:.0f}", f"x{number(load / t['read'])}", "-" if t["gzip"] is None else f"x{number(load / t['gzip'])}"])
     start = 1e3 * next(iter(entry["found"].values()))["start"]
-    return (f"Warm cache, medians, milliseconds; the program's own start, {start:.0f} ms, is taken off:\n\n" +
+    return (f"Warm cache, medians, milliseconds, without the program's own start of {start:.0f} ms:\n\n" +
             table(["files", "MB", "read", "gzip -d", "load", "load / read", "load / gzip"], rows))
 
 

@@ -64,7 +64,7 @@ def floor(measured):
     singles = [found for found in measured if "lights" not in found]
     vtk = [min(point["rmse"] for point in found["vtk"]) for found in singles]
     ours = [min(point["rmse"] for point in found["scolopax"]) for found in singles]
-    return (f"Least error measured: VTK's {min(vtk):.1e} to {max(vtk):.1e}, "
+    return (f"Smallest error measured: VTK's {min(vtk):.1e} to {max(vtk):.1e}, "
             f"Scolopax's {min(ours):.1e} to {max(ours):.1e}.")
 
 
@@ -83,15 +83,15 @@ def one_channel(measured):
                      table(["VTK", "time", "RMSE", "time here to that RMSE", "ratio of times", "RMSE here in that time",
                             "ratio of errors"], rows))
     return (f"""## One channel: speed against error
-Emission and absorption, curve from 15 % of the range up to an extinction of 0.05 per voxel, a layer of nothing around
-the volume so that both boxes end alike; errors against the double-precision reference, through pixel centres. VTK gets
-the volume also as 16 bits (u16), because it interpolates in the voxels' type: slower, and more accurate. In bold: less
-than {BAR} times faster. -: no step measured does.
+Emission and absorption. The curve rises from 15 % of the range to an extinction of 0.05 per voxel. An empty layer around
+the volume makes both boxes end at the same place. Errors are against the double-precision reference, with rays through
+pixel centres. VTK also gets the volume as 16 bits (u16), which is slower and more accurate, because it interpolates in
+the voxels' type. In bold: less than {BAR} times faster. -: no measured step is that accurate or that fast.
 
 {summary(all_rows, 4, "errors that VTK reaches")} {floor(measured)}
-VTK adds 15-bit numbers, looked up by rounded values, so that smaller steps stop lowering its error: it has a floor. The
-marcher here goes on converging. Its start is jittered per pixel: at large steps its error is a blur along the ray and some
-noise, VTK's is rings.
+VTK adds 15-bit numbers, which it looks up by rounded values. Its error has a floor, which smaller steps do not lower. The
+marcher here keeps converging. Its start is jittered per pixel: at large steps its error is a blur along the ray and some
+noise, while VTK's pictures have rings.
 
 """ + "\n".join(parts))
 
@@ -101,8 +101,8 @@ def channels_together(measured):
     size = measured[0]["size"]
     return f"""## Four channels: time per frame at equal step
 MRI (tcga_du_7294: fla, t1, t1c, t2; i16) at {size}x{size}, one sample a pixel. VTK gets one volume of four independent
-components. It sums them in its own way, so that only times are compared: it looks normals up that it has computed and
-quantised before the first frame, which is not counted; the gradients here are computed where they are needed.
+components. It sums them in its own way, so only times are compared. Its normals are computed and quantised before the
+first frame, which is not counted, and then looked up. Here, gradients are computed where they are needed.
 
 {summary(rows, 4, "frames")}
 
@@ -114,9 +114,9 @@ def main(path):
         found = json.load(file)
     measured = found["measured"]
     parts = [f"""# Beside VTK
-Machine: {found['machine']}. VTK {found['vtk']}, vtkFixedPointVolumeRayCastMapper on all threads: the time of its ray
-casting alone, without display. Medians; VTK's are of as many rounds before Scolopax's as after, whose medians differ
-by {100 * (drift(measured) - 1):.0f} % at most. Steps in voxels. Made by `tests/bench/vtk.py out.json` and
+Machine: {found['machine']}. VTK {found['vtk']}, vtkFixedPointVolumeRayCastMapper on all threads: only the time of its
+ray casting, without display. All times are medians. VTK has as many rounds before Scolopax as after it; their medians
+differ by {100 * (drift(measured) - 1):.0f} % at most. Steps in voxels. Made by `tests/bench/vtk.py out.json` and
 `tests/bench/vtk_report.py out.json`.
 """]
     singles = [part for part in measured if "lights" not in part]
