@@ -22,7 +22,7 @@ std::optional<std::size_t> indexOf(std::string_view key) {
 std::size_t indexBelow(const std::string& key, std::size_t count, const Path& list) {
   const std::optional<std::size_t> index = indexOf(key);
   if (!index) fail(list / key, "expected the index of an entry");
-  if (*index >= count) fail(list / key, "the list has room for " + std::to_string(count) + " entries");
+  if (*index >= count) fail(list / key, "expected an index below " + std::to_string(count));
   return *index;
 }
 
@@ -72,8 +72,7 @@ struct PatchValue<std::vector<T>> {
     if constexpr (std::is_same_v<T, Channel>) room = std::min(room, channelCount);
     if (patch.is_array()) {
       target = nlohmann::json::array();
-      if (patch.size() > room)
-        fail(path / room, "the list has room for " + std::to_string(room) + " entries");
+      if (patch.size() > room) fail(path / room, "expected at most " + std::to_string(room) + " entries");
       for (std::size_t i = 0; i < patch.size(); ++i) patchEntry(target, i, patch[i], path / i, channelCount);
     } else if (patch.is_object()) {
       if (!target.is_array()) target = nlohmann::json::array();

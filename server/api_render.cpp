@@ -119,7 +119,7 @@ void throwIfUnwanted(const ApiContext& context, const net::Request& request) {
 ProtocolError tooLate(double limit, std::uint32_t samples) {
   return ProtocolError(
       422, "/stop",
-      "the render did not end within " + shortText(limit) + " seconds; " + std::to_string(samples) +
+      "the render did not finish within " + shortText(limit) + " seconds; " + std::to_string(samples) +
           " samples were done by then; request fewer samples or pixels, or set stop.seconds");
 }
 

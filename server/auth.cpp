@@ -155,7 +155,7 @@ bool Authorizer::knows(const net::Request& request) const {
 
 std::optional<net::Response> Authorizer::operator()(const net::Request& request) const {
   if (!isHostAllowed(request)) {
-    return problemResponse(421, "This server answers to localhost only, but Host names another host.");
+    return problemResponse(421, "This server is for localhost only, but Host names another host.");
   }
   const bool reading = request.method == "GET" || request.method == "HEAD";
   if (reading && (request.path == "/healthz" || request.path == "/readyz")) return std::nullopt;
@@ -169,7 +169,8 @@ std::optional<net::Response> Authorizer::operator()(const net::Request& request)
     // server's page.
     if (reading || (request.header("Origin") && net::originAllowed(request, allowedOrigins_)))
       return std::nullopt;
-    return problemResponse(403, "A write that is authorised by the cookie needs the Origin of this page.");
+    return problemResponse(403,
+                           "A write that is authorised by the cookie must have the Origin of this page.");
   }
   net::Response response = problemResponse(
       401, "A token is needed: open the URL that the server printed, or send Authorization: Bearer TOKEN.");

@@ -39,7 +39,7 @@ std::vector<std::uint8_t> encodeJpeg(const Image8& image, int quality, ChromaSam
                                          std::to_string(image.width) + " x " + std::to_string(image.height) +
                                          " with " + std::to_string(image.rgb.size()) + " bytes");
   if (image.width > kMaxSide || image.height > kMaxSide)
-    throw Error(ErrorCode::tooLarge, "JPEG: at most 65500 pixels a side, found " +
+    throw Error(ErrorCode::tooLarge, "JPEG: expected at most 65500 pixels on a side, found " +
                                          std::to_string(image.width) + " x " + std::to_string(image.height));
   const int subsampling = sampling == ChromaSampling::full444 ? TJSAMP_444 : TJSAMP_420;
   std::vector<std::uint8_t> bytes(tjBufSize(image.width, image.height, subsampling));

@@ -169,7 +169,8 @@ void resolveClipping(protocol::Scene& scene, Scene& render, const Volume& volume
     if (!ends) ends = {-0.5, grid.dims[axis] - 0.5};
     const auto [low, high] = *ends;
     if (low > high)
-      throw ProtocolError(422, std::string("/crop/") + name, "expected two numbers that do not decrease");
+      throw ProtocolError(422, std::string("/crop/") + name,
+                          "expected two numbers, the second not below the first");
     keepsAll = keepsAll && low <= -0.5 && high >= grid.dims[axis] - 0.5;
     crop.low[axis] = low;
     crop.high[axis] = high;
@@ -354,7 +355,7 @@ std::optional<std::string> SceneResolver::tooLarge(const Scene& scene, bool aovs
     held += part;
     const std::uint64_t most = options_.memory->most(part);
     if (held <= most) continue;
-    return "expected a picture for which " + mebibytes(most) + " of memory are enough, found " +
+    return "expected a picture that needs at most " + mebibytes(most) + " of memory, found " +
            std::to_string(scene.width) + " x " + std::to_string(scene.height) + " pixels, which need " +
            mebibytes(held) + (aovs ? " with this quantity" : "");
   }

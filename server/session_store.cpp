@@ -18,7 +18,7 @@ void SessionStore::checkRoom() const {
   if (sessions_.size() >= options_.maxSessions)
     throw protocol::ProtocolError(
         503, "",
-        "there are " + std::to_string(sessions_.size()) + " sessions, as many as this server allows");
+        "the limit of " + std::to_string(options_.maxSessions) + " sessions is reached; retry later");
 }
 
 std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene) {

@@ -213,7 +213,7 @@ net::WebSocketEvents StreamHub::join(const std::shared_ptr<Session>& session,
     if (streams_.size() >= options_.maxClients)
       throw ProtocolError(
           503, "",
-          "there are " + std::to_string(streams_.size()) + " streams, as many as this server allows");
+          "the limit of " + std::to_string(options_.maxClients) + " streams is reached; retry later");
     streams_.push_back(stream);
   }
   try {

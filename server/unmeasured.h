@@ -15,7 +15,7 @@ class Unmeasured : public Error {
  public:
   using Measure = std::function<void(const std::stop_token&)>;
   explicit Unmeasured(Measure measure)
-      : Error(ErrorCode::busy, "the statistics of the data that the scene needs are not measured yet"),
+      : Error(ErrorCode::busy, "the statistics that the scene needs have not been measured yet"),
         measure_(std::move(measure)) {}
   /// Measures the statistics and stores them, or waits until another thread has done so. Throws Error:
   /// cancelled once `stop` is requested, busy and tooLarge if there is not enough memory.

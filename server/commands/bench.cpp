@@ -125,7 +125,7 @@ std::vector<Point> pointsOf(const BenchOptions& options, const Renderers& render
     }
   }
   if (leftOut > 0)
-    fmt::print(stderr, "scolopax: {} points left out that would take longer than {:g} s\n", leftOut,
+    fmt::print(stderr, "scolopax: skipped {} points that would take longer than {:g} s\n", leftOut,
                options.longest);
   return points;
 }
@@ -276,24 +276,21 @@ CLI::App* addBenchCommand(CLI::App& root) {
       ->capture_default_str();
   command
       ->add_option("--longest", o->longest,
-                   "Leave out sample counts that would take more seconds than this, except the smallest")
+                   "Skip sample counts that would take more seconds than this, except the smallest")
       ->check(numberUpTo(1e9, false))
       ->capture_default_str();
-  auto* truth = command->add_option("--truth", o->truth,
-                                    "Reference picture for the errors, made by scolopax reference with "
-                                    "image.filter=point; it may be smaller by an odd "
-                                    "factor:\nthen only the pixels at the centres of its pixels "
-                                    "count. By default the reference is rendered");
+  auto* truth =
+      command->add_option("--truth", o->truth,
+                          "Reference picture for the errors, made by scolopax reference with "
+                          "image.filter=point. It may be smaller by an odd factor;\nthen only the pixels at "
+                          "the centres of its pixels count. By default, the reference is rendered");
   command->add_flag("--times-only", o->timesOnly, "Times and counts only, no reference and no errors")
       ->excludes(truth);
   command->add_option("--json", o->json, "Write the numbers to this file instead of printing a table");
   command->footer(
-      "Samples go through the pixels' centres, where the reference has no noise. Methods without a step are "
-      "unbiased and\n"
-      "compared by 1 / (MSE x seconds) with sync-dda at the same number of samples (to sync). The bias is "
-      "what "
-      "remains\n"
-      "when the pictures of all repetitions are averaged.");
+      "Samples go through the pixels' centres, where the reference has no noise. Methods without a step are\n"
+      "unbiased; their 1 / (MSE x seconds) is compared with that of sync-dda at the same number of samples\n"
+      "(to sync). The bias is the error that remains when the pictures of all repetitions are averaged.");
   command->callback([o] { run(*o); });
   return command;
 }

@@ -38,12 +38,13 @@ CLI::App* addInfoCommand(CLI::App& root) {
   };
   CLI::App* command = root.add_subcommand(
       "info",
-      "Print what volume files contain: dimensions, spacing, and each channel's name, type and range");
+      "Print the contents of volume files: dimensions, spacing, and each channel's name, type and range");
   const auto options = std::make_shared<InfoOptions>();
   command->add_option("PATH", options->paths, "Volume files; files with the same grid form one data set");
   command->add_flag("--json", options->json,
-                    "Print a JSON list of what GET /api/v1/datasets/ID returns for each");
-  command->add_flag("--devices", options->devices, "Print what can render, with the names for --device");
+                    "Print a JSON list with the answer of GET /api/v1/datasets/ID for each data set");
+  command->add_flag("--devices", options->devices,
+                    "Print the devices that can render, with their names for --device");
   command->callback([options] {
     if (options->devices) fmt::print("{}", describeDevices());
     if (options->paths.empty() && !options->devices)

@@ -58,7 +58,8 @@ CLI::App* addReferenceCommand(CLI::App& root) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   command->footer(
-      "Prints the largest estimated error of a ray, and the noise left by sampling the pixels' areas.\n"
+      "Prints the largest estimated error of a ray, and the noise that remains from sampling the pixels' "
+      "areas.\n"
       "The scene's integrator.method, .step and .macrocell have no effect.");
   command->callback([o] { renderTruth(*o); });
   return command;

@@ -200,11 +200,9 @@ CLI::App* addRenderCommand(CLI::App& root) {
       ->allow_extra_args(false);
   command->add_option("--stats", o->stats, "Write counts and times as JSON");
   command->footer(
-      "Rendering stops when the first of several stop rules is met; without any, the scene's apply (64 "
-      "samples).\n"
-      "Ctrl-C and SIGTERM stop it as well: the picture is written as it is, and the status is 130 or 143. "
-      "A "
-      "second one ends the program at once.");
+      "Rendering stops at the first limit given here that is reached; without any, at those of the scene\n"
+      "(default: 64 samples). Ctrl-C and SIGTERM stop it as well: the picture is written as it is, and the\n"
+      "status is 130 or 143. A second signal ends the program at once.");
   // With this callback, CLI11 reads the environment only when this command is parsed, and not for every
   // command.
   command->parse_complete_callback([] {});

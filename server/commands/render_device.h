@@ -16,8 +16,8 @@ namespace scolopax {
 
 /// The documentation of --device.
 inline constexpr const char* kDeviceDoc =
-    "What renders: cpu; cuda or cuda:N, one CUDA device; all, every CUDA device together; auto, the first "
-    "CUDA device or, without one, the CPU";
+    "Device that renders: cpu; cuda or cuda:N (one CUDA device); all (all CUDA devices together); auto (the "
+    "first CUDA device or, if there is none, the CPU)";
 
 /// Adds a check of the values of an option --device; returns the option.
 CLI::Option* checkDevice(CLI::Option* option);

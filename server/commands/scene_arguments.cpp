@@ -48,7 +48,7 @@ json patchOf(const std::string& assignment) {
 
 void addSceneArguments(CLI::App& command, SceneArguments& arguments) {
   command.add_option("SCENE", arguments.scene,
-                     "Scene file (JSON, see PROTOCOL.md); by default, a good first picture");
+                     "Scene file (JSON, see PROTOCOL.md); by default, all values are chosen automatically");
   command.add_option("--data", arguments.data, "Volume files; files with the same grid form one data set")
       ->required();
   command
@@ -82,7 +82,7 @@ void checkOutputs(const std::vector<std::filesystem::path>& outputs, const Scene
   if (!arguments.scene.empty()) taken.push_back(canonical(arguments.scene));
   for (const auto& path : outputs) {
     if (std::find(taken.begin(), taken.end(), canonical(path)) != taken.end())
-      throw CLI::ValidationError(path.string(), "expected a file that is not also read or written otherwise");
+      throw CLI::ValidationError(path.string(), "expected a file that is not another input or output");
     taken.push_back(canonical(path));
   }
 }

@@ -151,10 +151,10 @@ CLI::App* addServeCommand(CLI::App& root) {
       ->type_name("FOLDER");
   checkDevice(add("device", options->device, kDeviceDoc));
   add("when-device-fails", options->whenDeviceFails,
-      "What sessions do once a CUDA device has failed: go on on the CPU, or end with the error")
+      "What sessions do after a CUDA device has failed: continue on the CPU, or end with the error")
       ->check(CLI::IsMember({"cpu", "end"}));
   add("threads", config.threads, "Threads for rendering; 0: all")->check(CLI::Range(0, 1024))->type_name("N");
-  add("log-level", options->logLevel, "Least severe messages to log on standard error")
+  add("log-level", options->logLevel, "Lowest level of the messages that are logged on standard error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "critical", "off"}));
   add("allow-origin", config.allowedOrigins, "Another site whose pages may use this server; can be repeated")
       ->type_name("https://HOST");
@@ -177,7 +177,7 @@ CLI::App* addServeCommand(CLI::App& root) {
   limit("max-message", config.maxMessageBytes, "Bytes of one WebSocket message")->check(CLI::PositiveNumber);
   limit("max-json-depth", config.maxJsonDepth, "Nesting depth of lists and objects")
       ->check(CLI::PositiveNumber);
-  limit("keep-session", options->keepSeconds, "Seconds for which a session outlives its last client")
+  limit("keep-session", options->keepSeconds, "Seconds until a session without clients ends")
       ->check(numberUpTo(1e9, true));
 
   command->add_option("--config", options->configFile, "File with lines such as: port = 8081")
@@ -187,11 +187,9 @@ CLI::App* addServeCommand(CLI::App& root) {
   command->footer(
       "Macrocells smaller than 4 voxels are refused if a data set would have more than " +
       std::to_string(server::SceneResolver::Options().maxIntervals) +
-      " of them, counted once\n"
-      "for each channel.\n"
-      "Each option can also be set in the environment (--max-body as SCOLOPAX_MAX_BODY) or in the file of "
-      "--config;\n"
-      "the command line takes precedence over the environment, the environment over the file.\n"
+      " of them, counted once\nfor each channel.\n"
+      "Each option can also be set in the environment (--max-body as SCOLOPAX_MAX_BODY) or in the file of\n"
+      "--config; the command line takes precedence over the environment, the environment over the file.\n"
       "The ready line on standard output contains the address of the page, with its token.\n"
       "SIGTERM and Ctrl-C shut the server down in order.");
   // With this callback, CLI11 reads the environment only when this command is parsed, and not for every

@@ -51,7 +51,8 @@ class WebSocketConnection : public PreparedWebSocket,
   void sendText(SharedText text) override {
     const std::lock_guard lock(mutex_);
     if (ended_) return;
-    if (!outbox_.pushText(std::move(text))) outbox_.close({1008, "too many messages wait to be read"}, true);
+    if (!outbox_.pushText(std::move(text)))
+      outbox_.close({1008, "too many messages have not been read"}, true);
     wake();
   }
   void offerFrame(Frame frame) override {

@@ -452,7 +452,7 @@ TEST(SceneResolver, RefusesPicturesForWhichThereIsNeverMemory) {
     EXPECT_EQ(error.pointer, "/image");
     EXPECT_STREQ(
         error.what(),
-        "expected a picture for which 64 MiB of memory are enough, found 890 x 700 pixels, which need 65 "
+        "expected a picture that needs at most 64 MiB of memory, found 890 x 700 pixels, which need 65 "
         "MiB");
   }
   EXPECT_EQ(resolve.tooLarge(fits->render, false), std::nullopt);
