@@ -7,7 +7,7 @@ import type { JsonObject } from './merge-patch';
 export interface Named {
   name: string;
   doc?: string;
-  /** Control points of a colour map, where the server gives them. */
+  /** Control points of a colour map, if the server gives them. */
   points?: [number, string][];
 }
 

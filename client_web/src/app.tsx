@@ -13,7 +13,7 @@ import { StatusBar } from './status-bar';
 import type { Store } from './store';
 import { Toasts } from './toasts';
 
-/** Up to this many channels are all shown opened; of more, only the first is. */
+/** With at most this many channels, all are shown opened; with more, only the first. */
 const kOpenChannels = 2;
 
 export function App({ store, attach }: { store: Store; attach(view: FrameView): void }) {

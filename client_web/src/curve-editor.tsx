@@ -9,7 +9,7 @@ import { histogramPath, type Histogram } from './histogram';
 import { shortNumber } from './controls';
 
 interface Props {
-  /** What the curve's values are, such as "Opacity". */
+  /** The name of the curve's values, such as "Opacity". */
   label: string;
   curve: Curve;
   range: readonly [number, number];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines across the plot of a curve, one for every isovalue: as far to the right as its value, as high as its opacity.
-// Their handles are dragged, or moved by the arrow keys.
+// Lines across the plot of a curve, one for every isovalue: at the position of its value, and as high as its opacity.
+// Their handles can be dragged, or moved by the arrow keys.
 import type { RefObject } from 'preact';
 import { useRef } from 'preact/hooks';
 import { fractionIn, followPointer } from './drag';
@@ -11,7 +11,7 @@ export interface CurveLine {
   at: Point;
   /** CSS colour. */
   color: string;
-  /** What the line is, such as "isovalue 120, opacity 0.5". */
+  /** A description of the line, such as "isovalue 120, opacity 0.5". */
   text: string;
 }
 
@@ -35,7 +35,7 @@ export function CurveLines({ plot, lines, onMove }: Props) {
   return (
     <>
       {lines.map(({ at, color, text }, index) => (
-        // The index is the item's in the scene: lines outside the plot are left out, but counted.
+        // The index is that of the item in the scene: lines outside the plot are not drawn, but counted.
         at[0] >= 0 && at[0] <= 1 && (
           <div key={index} class="curve-mark" style={{ left: `${at[0] * 100}%`, height: `${at[1] * 100}%`, background: color }}>
             <div

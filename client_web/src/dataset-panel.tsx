@@ -6,7 +6,7 @@ import type { Store } from './store';
 export function DatasetPanel({ store }: { store: Store }) {
   const dataset = store.datasets.shown.value;
   const datasets = store.datasets.all.value;
-  // Channels and camera belong to the volume they were set for.
+  // Channels and camera are not kept, because they were set for another volume.
   const choose = (id: string) => store.edit({ dataset: id, channels: null, camera: null });
   return (
     <section class="group dataset" aria-label="Data set">

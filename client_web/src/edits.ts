@@ -70,7 +70,7 @@ export class Edits {
 
   /** The server has refused the patch with this id: no picture will show it. */
   refused(id: number): void {
-    this.inFlight.delete(id); // those before it may still wait
+    this.inFlight.delete(id); // earlier ones may still wait
     this.sentAt.delete(id);
     if (!this.scheduled) this.flush();
   }
@@ -96,7 +96,7 @@ export class Edits {
     return [...this.inFlight.values(), ...this.waiting];
   }
 
-  /** On a new stream to the same session: sends again what may be lost. Applying a patch twice does no harm. */
+  /** On a new stream to the same session: sends edits again that may be lost. Applying a patch twice does no harm. */
   resend(): void {
     this.waiting = this.unconfirmed;
     this.inFlight.clear();

@@ -24,7 +24,7 @@ function pause(milliseconds: number, abort: AbortSignal): Promise<void> {
 }
 
 export class GradientHistograms {
-  /** Keyed by the list entry, not by its id: after reloading the list, the same id may be another volume. */
+  /** Keyed by the list entry, not by its id, because after a reload of the list the same id may be another volume. */
   private readonly known = new WeakMap<DatasetInfo, Signal<Histogram | undefined>[]>();
 
   /** `say` receives the reason if fetching fails; a lost connection is reported by Connection instead. */

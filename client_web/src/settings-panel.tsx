@@ -16,7 +16,7 @@ const kElsewhere = new Set(['dataset', 'image.width', 'image.height', ...kFirst.
 
 const isList = (path: Path) => fieldAt(path).kind === 'list';
 
-/** Every list of objects, such as the lights, has its own section, except the channels, which have cards. */
+/** Every list of objects, such as the lights, has its own section. The channels have cards instead. */
 const lists = leavesBelow([]).filter((path) => isList(path) && path[0] !== 'channels');
 
 /** One group for each object of the scene that has fields left. */

@@ -36,7 +36,7 @@ function setUp() {
   return { asked, said, histograms };
 }
 
-/** Promises that are settled have told so. */
+/** Lets the reactions to settled promises run. */
 const settled = () => new Promise((resolve) => setTimeout(resolve, 0));
 
 describe('the histogram of the gradient', () => {

@@ -19,6 +19,6 @@ it('a spot on the page is a pixel of the picture in the middle of its box', () =
   expect(pictureSpot({ x: 109, y: 50 }, box, picture)).toBeUndefined();
   expect(pictureSpot({ x: 310, y: 50 }, box, picture)).toBeUndefined();
   expect(pictureSpot({ x: 200, y: 120 }, box, picture)).toBeUndefined();
-  // At two device pixels to one of the page.
+  // Two device pixels per CSS pixel.
   expect(pictureSpot({ x: 10, y: 45 }, box, { width: 800, height: 200 })).toEqual({ x: 0, y: 50 });
 });

@@ -61,7 +61,7 @@ describe('what is under the pointer', () => {
     vi.advanceTimersByTime(kRestMs);
     answer(asked[0]!.id, false);
     expect(pick.shown.value).toBeUndefined();
-    pick.answered({ id: asked[0]!.id }); // in vain: it has a problem instead
+    pick.answered({ id: asked[0]!.id }); // the request failed: there is no answer
     expect(pick.shown.value).toBeUndefined();
   });
 });
