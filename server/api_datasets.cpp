@@ -6,19 +6,51 @@
 #include "server/api.h"
 
 namespace scolopax::server {
+namespace {
+
+std::shared_ptr<const Dataset> datasetAt(const ApiContext& context, const net::Request& request) {
+  auto found = context.datasets.find(request.matches.at(1));
+  if (!found)
+    throw protocol::ProtocolError(404, "",
+                                  "there is no data set " + protocol::shortened(request.matches.at(1)));
+  return found;
+}
+
+net::Response listDatasets(const ApiContext& context) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const auto& one : context.datasets.all()) list.push_back(describeJson(*one));
+  return jsonResponse(200, {{"datasets", std::move(list)}});
+}
+
+net::Response histogramAnswer(const ApiContext& context, const net::Request& request) {
+  const auto dataset = datasetAt(context, request);
+  return jsonResponse(200, histogramJson(*dataset, int(queryUnsigned(request, "channel", 0))));
+}
+
+net::Response gradientHistogramAnswer(const ApiContext& context, const net::Request& request) {
+  const auto dataset = datasetAt(context, request);
+  const int channel = int(queryUnsigned(request, "channel", 0));
+  const bool joint = queryFlag(request, "joint");
+  auto gradients = context.datasets.gradients(*dataset, channel);
+  if (!gradients)
+    gradients = inLongRequest(context, request, [&](const std::stop_token& stop) {
+      return context.datasets.measuredGradients(*dataset, channel, stop);
+    });
+  return jsonResponse(200, gradientHistogramJson(*dataset, channel, *gradients, joint));
+}
+
+net::Response probeAnswer(const ApiContext& context, const net::Request& request) {
+  const auto dataset = datasetAt(context, request);
+  return jsonResponse(200, probeJson(*dataset, queryNumber(request, "x"), queryNumber(request, "y"),
+                                     queryNumber(request, "z")));
+}
+
+}  // namespace
 
 std::vector<Route> datasetRoutes(ApiContext& context) {
-  using nlohmann::json;
-  const auto dataset = [&context](const net::Request& request) {
-    auto found = context.datasets.find(request.matches.at(1));
-    if (!found)
-      throw protocol::ProtocolError(404, "",
-                                    "there is no data set " + protocol::shortened(request.matches.at(1)));
-    return found;
-  };
   const Parameter id{"id", "path", "string", "Id of the data set"};
+  const Parameter channel{"channel", "query", "integer", "Index of the channel, from 0 (default)"};
   const std::vector<std::string> kJson{"application/json"};
-
   return {
       {"GET",
        "/api/v1/datasets",
@@ -27,11 +59,7 @@ std::vector<Route> datasetRoutes(ApiContext& context) {
        "",
        kJson,
        {},
-       [&context](const net::Request&) {
-         json list = json::array();
-         for (const auto& one : context.datasets.all()) list.push_back(describeJson(*one));
-         return jsonResponse(200, {{"datasets", std::move(list)}});
-       }},
+       [&context](const net::Request&) { return listDatasets(context); }},
       {"GET",
        "/api/v1/datasets/{id}",
        "One data set",
@@ -39,39 +67,28 @@ std::vector<Route> datasetRoutes(ApiContext& context) {
        "",
        kJson,
        {},
-       [dataset](const net::Request& request) { return jsonResponse(200, describeJson(*dataset(request))); }},
+       [&context](const net::Request& request) {
+         return jsonResponse(200, describeJson(*datasetAt(context, request)));
+       }},
       {"GET",
        "/api/v1/datasets/{id}/histogram",
        "Histogram of one channel's values",
-       {id, {"channel", "query", "integer", "Index of the channel, from 0 (default)"}},
+       {id, channel},
        "",
        kJson,
        {},
-       [dataset](const net::Request& request) {
-         return jsonResponse(200,
-                             histogramJson(*dataset(request), int(queryUnsigned(request, "channel", 0))));
-       }},
+       [&context](const net::Request& request) { return histogramAnswer(context, request); }},
       {"GET",
        "/api/v1/datasets/{id}/gradient-histogram",
        "Histogram of the magnitude of one channel's gradient",
        {id,
-        {"channel", "query", "integer", "Index of the channel, from 0 (default)"},
+        channel,
         {"joint", "query", "boolean",
          "Whether to return it for every bin of values as well; false if absent"}},
        "",
        kJson,
        {},
-       [&context, dataset](const net::Request& request) {
-         const auto found = dataset(request);
-         const int channel = int(queryUnsigned(request, "channel", 0));
-         const bool joint = queryFlag(request, "joint");
-         auto gradients = context.datasets.gradients(*found, channel);
-         if (!gradients)
-           gradients = inLongRequest(context, request, [&](const std::stop_token& stop) {
-             return context.datasets.measuredGradients(*found, channel, stop);
-           });
-         return jsonResponse(200, gradientHistogramJson(*found, channel, *gradients, joint));
-       }},
+       [&context](const net::Request& request) { return gradientHistogramAnswer(context, request); }},
       {"GET",
        "/api/v1/datasets/{id}/probe",
        "The channels' values at a point",
@@ -82,10 +99,7 @@ std::vector<Route> datasetRoutes(ApiContext& context) {
        "",
        kJson,
        {},
-       [dataset](const net::Request& request) {
-         return jsonResponse(200, probeJson(*dataset(request), queryNumber(request, "x"),
-                                            queryNumber(request, "y"), queryNumber(request, "z")));
-       }},
+       [&context](const net::Request& request) { return probeAnswer(context, request); }},
   };
 }
 

@@ -164,6 +164,17 @@ struct Application::Impl {
                 [this] { return server->requestBodyBytes(); }},
         authorizer(config.token, isLoopback(config.host), config.allowedOrigins,
                    !config.certificateFile.empty()) {
+    net::Options options = networkOptions();
+    const bool hasPage = !options.staticRoot.empty();
+    server.emplace(std::move(options));
+    if (!hasPage)
+      server->route("GET", "/", [](const net::Request&) {
+        return net::Response{200, "text/plain; charset=utf-8", std::string(kNoPage), {}};
+      });
+    addApi(*server, context);
+  }
+
+  net::Options networkOptions() {
     net::Options options;
     options.host = config.host;
     options.port = config.port;
@@ -185,13 +196,7 @@ struct Application::Impl {
       response.headers.emplace_back("Referrer-Policy", "no-referrer");
     };
     options.log = log;
-    const bool hasPage = !options.staticRoot.empty();
-    server.emplace(std::move(options));
-    if (!hasPage)
-      server->route("GET", "/", [](const net::Request&) {
-        return net::Response{200, "text/plain; charset=utf-8", std::string(kNoPage), {}};
-      });
-    addApi(*server, context);
+    return options;
   }
 };
 

@@ -121,25 +121,26 @@ void serve(ServeOptions options) {
   application.stop();
 }
 
-}  // namespace
+/// Adds the option --`name`, which can also be set in the environment.
+template <class Value>
+CLI::Option* addOption(CLI::App& command, const std::string& name, Value& value, const std::string& doc) {
+  std::string variable = "SCOLOPAX_";
+  for (const char c : name) variable += c == '-' ? '_' : char(std::toupper(static_cast<unsigned char>(c)));
+  return command.add_option("--" + name, value, doc)->envname(variable)->capture_default_str();
+}
 
-CLI::App* addServeCommand(CLI::App& root) {
-  auto options = std::make_shared<ServeOptions>();
-  server::Config& config = options->config;
-  CLI::App* command = root.add_subcommand("serve", "Serve volumes to browsers and scripts until stopped");
-  const auto add = [command](const std::string& name, auto& value, const std::string& doc) {
-    std::string variable = "SCOLOPAX_";
-    for (const char c : name) variable += c == '-' ? '_' : char(std::toupper(static_cast<unsigned char>(c)));
-    return command->add_option("--" + name, value, doc)->envname(variable)->capture_default_str();
+void addServerOptions(CLI::App& command, ServeOptions& options) {
+  server::Config& config = options.config;
+  const auto add = [&command](const std::string& name, auto& value, const std::string& doc) {
+    return addOption(command, name, value, doc);
   };
-
-  command->add_option(
-      "PATH", options->paths,
+  command.add_option(
+      "PATH", options.paths,
       "Volume files, at least one. Files with the same grid become the channels of one data set");
   add("host", config.host, "Address to listen on; 0.0.0.0: all addresses of this machine")
       ->type_name("ADDRESS");
   add("port", config.port, "Port to listen on; 0: any free one")->type_name("PORT");
-  add("token-file", options->tokenFile,
+  add("token-file", options.tokenFile,
       "File with the token that opens the server, one line of 16 to 512 letters, digits and -._~+/=; by "
       "default, a new random token at each start")
       ->type_name("FILE");
@@ -147,26 +148,28 @@ CLI::App* addServeCommand(CLI::App& root) {
       ->type_name("FILE");
   add("tls-key", config.keyFile, "Private key of that certificate (PEM, without a password)")
       ->type_name("FILE");
-  add("data-root", options->dataRoot, "Folder that contains every PATH and that they are relative to")
+  add("data-root", options.dataRoot, "Folder that contains every PATH; the PATHs are relative to it")
       ->type_name("FOLDER");
-  checkDevice(add("device", options->device, kDeviceDoc));
-  add("when-device-fails", options->whenDeviceFails,
+  checkDevice(add("device", options.device, kDeviceDoc));
+  add("when-device-fails", options.whenDeviceFails,
       "What sessions do after a CUDA device has failed: continue on the CPU, or end with the error")
       ->check(CLI::IsMember({"cpu", "end"}));
   add("threads", config.threads, "Threads for rendering; 0: all")->check(CLI::Range(0, 1024))->type_name("N");
-  add("log-level", options->logLevel, "Lowest level of the messages that are logged on standard error")
+  add("log-level", options.logLevel, "Lowest level of the messages that are logged on standard error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "critical", "off"}));
   add("allow-origin", config.allowedOrigins, "Another site whose pages may use this server; can be repeated")
       ->type_name("https://HOST");
+}
 
-  const std::string limits = "Limits";
-  const auto limit = [&](const std::string& name, auto& value, const std::string& doc) {
-    return add(name, value, doc)->group(limits)->type_name("N");
+void addLimits(CLI::App& command, ServeOptions& options) {
+  server::Config& config = options.config;
+  const auto limit = [&command](const std::string& name, auto& value, const std::string& doc) {
+    return addOption(command, name, value, doc)->group("Limits")->type_name("N");
   };
   limit("max-sessions", config.maxSessions, "Sessions at once")->check(CLI::PositiveNumber);
   limit("max-clients", config.maxClients, "Streams at once")->check(CLI::PositiveNumber);
   limit("max-image", config.maxPixels, "Pixels of one picture")->check(CLI::PositiveNumber);
-  limit("max-memory", options->maxMemoryMebibytes,
+  limit("max-memory", options.maxMemoryMebibytes,
         "MiB of memory for films, pictures, encodings, macrocells, gradient histograms, scenes with long "
         "curves and long answers, without the volumes; a quarter of the machine's by default")
       ->check(CLI::Range(std::uint64_t(64), std::uint64_t(1) << 32));
@@ -177,9 +180,17 @@ CLI::App* addServeCommand(CLI::App& root) {
   limit("max-message", config.maxMessageBytes, "Bytes of one WebSocket message")->check(CLI::PositiveNumber);
   limit("max-json-depth", config.maxJsonDepth, "Nesting depth of lists and objects")
       ->check(CLI::PositiveNumber);
-  limit("keep-session", options->keepSeconds, "Seconds until a session without clients ends")
+  limit("keep-session", options.keepSeconds, "Seconds until a session without clients ends")
       ->check(numberUpTo(1e9, true));
+}
 
+}  // namespace
+
+CLI::App* addServeCommand(CLI::App& root) {
+  auto options = std::make_shared<ServeOptions>();
+  CLI::App* command = root.add_subcommand("serve", "Serve volumes to browsers and scripts until stopped");
+  addServerOptions(*command, *options);
+  addLimits(*command, *options);
   command->add_option("--config", options->configFile, "File with lines such as: port = 8081")
       ->envname("SCOLOPAX_CONFIG")
       ->check(CLI::ExistingFile)
