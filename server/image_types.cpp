@@ -14,7 +14,7 @@ namespace {
 
 using net::trimmed;
 
-/// Bytes of a file besides its pixels, at most.
+/// Maximum size of a file without its pixels, in bytes.
 constexpr std::uint64_t kFileBytes = 1 << 20;
 
 constexpr ImageType kImageTypes[] = {

@@ -13,7 +13,7 @@ constexpr double kDivisors[] = {1, 1.5, 2, 2.5, 3, 4, 6, 8, 12, kMaxDivisor};
 constexpr double kProbeDivisor = 4;
 /// Largest ratio of the pixels of a picture to those of the next coarser one, plus a margin.
 constexpr double kLargestStep = 2.3;
-/// The target is at least so many times the fixed cost.
+/// The target is at least this many times the fixed cost.
 constexpr double kOverFixed = 1.6;
 constexpr double kFiner = 0.8, kKept = 1.2;  ///< shares of the target at which the divisor changes
 

@@ -40,7 +40,7 @@ struct RenderOptions {
   std::string device = "auto";
 };
 
-/// An AOV to be written beside the picture.
+/// An AOV to be written in addition to the picture.
 struct AovFile {
   Aov aov;
   std::filesystem::path path;

@@ -87,7 +87,7 @@ class Core {
   std::atomic<std::size_t> bodyBytes{0};
   FairPool workers;
   FairPool bulkWorkers;
-  /// The pool for quick work on so many bytes. Large requests have their own pool and wait only for each
+  /// The pool for quick work on this many bytes. Large requests have their own pool and wait only for each
   /// other.
   FairPool& workersFor(std::size_t bytes) { return bytes > kBulkBytes ? bulkWorkers : workers; }
   asio::thread_pool longWorkers;

@@ -25,8 +25,8 @@ class Router {
  public:
   Router();
   ~Router();
-  /// Of the patterns that match a path, the first one added is used, whatever methods it has. Throws NetError
-  /// for an unknown method or an invalid regex.
+  /// If several patterns match a path, the one that was added first is used, even if it lacks the method.
+  /// Throws NetError for an unknown method or an invalid regex.
   void add(const std::string& method, const std::string& pattern, const Route& route);
   /// `path` is decoded. Thread-safe once all routes are added.
   RouteMatch find(const std::string& method, const std::string& path) const;

@@ -61,7 +61,7 @@ class WebSocket {
   virtual void withdrawFrame() = 0;
   /// The client has shown `number` and thereby all frames sent before it; anything else is ignored.
   virtual void acknowledge(std::uint32_t number) = 0;
-  /// Sends what is queued as text, then the close frame. `reason` is cut to 123 bytes.
+  /// Sends the queued texts, then the close frame. `reason` is cut to 123 bytes.
   virtual void close(std::uint16_t code, std::string reason) = 0;
   virtual WebSocketStats stats() const = 0;
 };

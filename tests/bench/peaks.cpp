@@ -44,7 +44,7 @@ double secondsSince(Clock::time_point begin) {
 
 [[noreturn]] void fail(const std::string& what) { throw Error(ErrorCode::badInput, "bench_peaks: " + what); }
 
-/// A picture and what it cost.
+/// A picture and its costs.
 struct Drawn {
   Image image;
   double seconds = 0, prepareSeconds = 0;  ///< of the picture, and of tables or plans before it

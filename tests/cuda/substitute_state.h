@@ -72,7 +72,7 @@ struct Memory {
 using Heap = std::map<const std::byte*, Memory>;  ///< by address
 
 struct State {
-  std::deque<Device> devices;  ///< at least deviceCount, so that what is on them can be freed
+  std::deque<Device> devices;  ///< at least deviceCount, so that objects on them can be freed
   int deviceCount = 1;
   cudaError_t deviceCountResult = cudaSuccess;
   std::size_t limit = std::size_t(1) << 32;  ///< of devices added later

@@ -32,7 +32,7 @@ class Commands : public testing::Test {
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
-  /// Runs `scolopax ARGUMENTS...` and returns what it prints.
+  /// Runs `scolopax ARGUMENTS...` and returns its output.
   static std::string run(std::vector<std::string> arguments) {
     CLI::App app;
     addGenerateCommand(app);

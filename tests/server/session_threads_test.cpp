@@ -107,7 +107,7 @@ TEST(SessionThreads, KeepRevisionsApartWhateverComesTogether) {
     number = frame.info.number;
     revision = frame.info.revision;
   }
-  // The viewer was told of each edit, in order.
+  // The viewer was notified of each edit, in order.
   ASSERT_EQ(watching->scenes.size(), 180u);
   for (std::size_t i = 0; i < watching->scenes.size(); ++i) EXPECT_EQ(watching->scenes[i].first, i + 2);
 }

@@ -51,7 +51,8 @@ inline glm::dvec4 largestSample(const Scene& scene) {
 
 namespace detail {
 
-/// Deviations of replicates from what they are compared with; their expected value is 0 if both agree.
+/// Deviations of replicates from the values with which they are compared; their expected value is 0 if both
+/// agree.
 struct Deviations {
   std::vector<std::vector<glm::dvec4>> ofReplicate;
   std::vector<glm::dvec4> mean;

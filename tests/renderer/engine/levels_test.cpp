@@ -64,7 +64,8 @@ TEST(Schedule, BeginsALevelWhenItIsWorthMoreThanSamples) {
   EXPECT_GT(noisy[0].from, levels[0].from);
   EXPECT_FALSE(isEnough(noisy[0], 1, 4));
   EXPECT_TRUE(isEnough(noisy[0], std::uint32_t(noisy[0].first), 4));
-  // But with so many samples that their noise is smaller than the level's share of it, it is not.
+  // If there are so many samples that their noise is smaller than the level's share of it, fewer corrections
+  // are enough.
   EXPECT_TRUE(isEnough(noisy[0], 100, std::uint32_t(100 / noisy[0].perSample) + 1));
 }
 

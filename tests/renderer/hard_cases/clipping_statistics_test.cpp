@@ -72,7 +72,7 @@ TEST(Clipping, OfEverythingLeavesNothing) {
         ASSERT_EQ(pixel, glm::vec4(0)) << nameOf(method) << ' ' << what;
   };
   const glm::dvec3 eye = scene.camera.eye, forward = scene.camera.target - eye;
-  scene.clip = {{eye, -forward, {}}};  // what is behind the eye
+  scene.clip = {{eye, -forward, {}}};  // cuts away everything behind the eye
   expectNothing("a plane through the eye");
   scene.clip = {{eye + 1e9 * forward, forward, {}}};
   expectNothing("a plane far away");

@@ -73,8 +73,8 @@ TEST(Filters, OfTheNearestVoxelShowABlockOfVoxels) {
 }
 
 TEST(Filters, OfTheNearestVoxelKeepLabelsApart) {
-  // Labels 0 and 2 beside each other; 1, which has all the opacity, is nowhere. Trilinear interpolation would
-  // show it between them.
+  // Labels 0 and 2 are neighbours, and label 1, which has all the opacity, does not occur. Trilinear
+  // interpolation would show it between them.
   const glm::ivec3 dims(8);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int x, int y, int z) {
                                  return (x / 2 + y / 2 + z / 2) % 2 * 2;

@@ -216,7 +216,7 @@ TEST(Picture, HasOnlyColoursOfThePalette) {
     scene.method = method;
     const auto renderer = makeCpuRenderer(volume, 0);
     renderer->setScene(scene);
-    renderer->renderSample(false);  // one, whatever SCOLOPAX_STATISTICS
+    renderer->renderSample(false);  // one sample with any SCOLOPAX_STATISTICS
     int seen[4] = {};
     for (const glm::vec4& p : renderer->image().pixels) {
       if (p == glm::vec4(0))

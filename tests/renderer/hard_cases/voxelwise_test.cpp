@@ -187,7 +187,7 @@ TEST(Voxelwise, SplitsAtKnotsOfTheGradientFactor) {
       seen = std::max(seen, double(expected.pixels[i].a));
     }
     EXPECT_GT(seen, 1e-3);
-    // |gradient| within a cell is taken for a cubic, which it is not quite.
+    // |gradient| within a cell is assumed to be a cubic, which is an approximation.
     EXPECT_LT(largest, 0.05 * seen) << width;
   }
 }

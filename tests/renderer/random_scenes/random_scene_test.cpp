@@ -42,7 +42,7 @@ void forEachField(const json& schema, const json& object, const std::string& pat
   }
 }
 
-/// Adds the values at a path of a scene; `#` stands for every element.
+/// Adds the values at a path of a scene; `#` means every element.
 void collect(const json& value, const std::string& path, std::set<std::string>* found) {
   if (path.empty()) {
     found->insert(value.dump());

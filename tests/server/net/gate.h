@@ -24,7 +24,7 @@ class Gate {
     open_ = true;
     changed_.notify_all();
   }
-  /// Waits until so many have arrived.
+  /// Waits until this many callers have arrived.
   void waitFor(int count) {
     std::unique_lock lock(mutex_);
     ASSERT_TRUE(changed_.wait_for(lock, kPatience, [&] { return arrived_ >= count; }));

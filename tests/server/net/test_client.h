@@ -126,7 +126,7 @@ class TestClient {
     return answer(head.rfind("HEAD", 0) == 0);
   }
 
-  /// Reads at most so many bytes, and discards them; the number that came, 0 if the connection ended.
+  /// Reads at most so many bytes and discards them. Returns their number; 0 if the connection has ended.
   std::size_t receiveSome(std::size_t most) {
     std::string bytes(most, 0);
     return static_cast<std::size_t>(std::max<ssize_t>(0, ::recv(socket_, bytes.data(), most, 0)));
