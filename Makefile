@@ -46,7 +46,7 @@ test: test-deps web
 	cmake --build --preset release -j $(JOBS)
 	$(call run-tests,release,-j $(JOBS) -LE hostile)
 
-# A target's variables hold for what it needs, too, unless that has its own: these are for test.
+# A target's variables also apply to its prerequisites, unless these have their own: the first two are for test.
 check: export SCOLOPAX_COMBINATIONS := all
 check: export SCOLOPAX_RANDOM_SCENES := 2000
 check-asan-ubsan: export SCOLOPAX_COMBINATIONS := pairs
@@ -63,7 +63,7 @@ passed-%:
 
 check-test: test
 
-# Benchmarks are built for a report only: this shows that they still can be.
+# Benchmarks are otherwise built only for a report. This checks that they still compile.
 check-bench: test-deps
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null
 	cmake --build --preset release -j $(JOBS) --target bench_rebuild bench_layout bench_resolutions bench_peaks
@@ -112,7 +112,7 @@ soak: test-deps
 	  first=$$((first + 500)); echo $$first > build/soak/next; echo "scenes below $$first are done"; \
 	done; exit $$failed
 
-# Needs nvcc; without it, configuring prints a notice and nothing is checked.
+# Needs nvcc. Without it, configuring prints a notice and nothing is checked.
 check-cuda: test-deps
 	cmake --preset cuda > /dev/null
 	cmake --build --preset cuda -j $(JOBS) --target cuda_checks
@@ -123,7 +123,7 @@ check-cuda: test-deps
 TIDY := clang-tidy --quiet --extra-arg=-Wno-unknown-warning-option \
   --extra-arg=-D__cpp_impl_coroutine=201902L --extra-arg=-DBOOST_ASIO_HAS_CO_AWAIT=1 --extra-arg=-DBOOST_ASIO_HAS_STD_COROUTINE=1
 
-# Reads what the build compiles, in the same units.
+# Checks the sources that the build compiles, in the same units.
 check-tidy: build test-deps
 	sed -n 's/^ *"file": "\(.*\)".*/\1/p' build/release/compile_commands.json | grep -v /tests/ | sort -u \
 	  | xargs -P $(JOBS) -n 1 $(TIDY) -p build/release
