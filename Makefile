@@ -66,7 +66,8 @@ check-test: test
 # Benchmarks are otherwise built only for a report. This checks that they still compile.
 check-bench: test-deps
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null
-	cmake --build --preset release -j $(JOBS) --target bench_rebuild bench_layout bench_resolutions bench_peaks
+	cmake --build --preset release -j $(JOBS) --target bench_rebuild bench_layout bench_resolutions bench_peaks \
+	  ptx_costs
 
 check-hostile: test-deps
 	cmake --preset release -DBUILD_TESTING=ON > /dev/null

@@ -30,15 +30,21 @@ __global__ void __launch_bounds__(kBlockWidth* kBlockHeight)
   if (x < width && row < band.rows) band.render((band.firstRow + row) * width + x, row * width + x);
 }
 
+/// `view`: the band's scene.
 template <class Integrator, class Blend, class Lighting, class View>
-cudaError_t launch(const DeviceBand& given, cudaStream_t stream) {
+cudaError_t launchView(const View& view, const DeviceBand& given, cudaStream_t stream) {
   RenderBand<Integrator, Blend, Lighting, View> band{
-      {View{given.scene}, given.number, given.pixels, given.cost, given.first}, given.firstRow, given.rows};
+      {view, given.number, given.pixels, given.cost, given.first}, given.firstRow, given.rows};
   const dim3 block(kBlockWidth, kBlockHeight);
   const dim3 grid((unsigned(given.scene.width) + block.x - 1) / block.x,
                   (unsigned(given.rows) + block.y - 1) / block.y);
   void* arguments[] = {&band};
   return cudaLaunchKernel(renderPixels<Integrator, Blend, Lighting, View>, grid, block, arguments, 0, stream);
+}
+
+template <class Integrator, class Blend, class Lighting, class View>
+cudaError_t launch(const DeviceBand& given, cudaStream_t stream) {
+  return launchView<Integrator, Blend, Lighting>(View{given.scene}, given, stream);
 }
 
 template <class Integrator, class View>

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "tests/cuda/device_scenes.h"
-#include "tests/cuda/ptx_machine.h"
+#include "tests/cuda/ptx_counts.h"
 #include "tests/cuda/substitute_runtime.h"
 #include "tests/cuda/uploaded_plan.h"
 
@@ -80,6 +80,26 @@ TEST(PtxMemory, IsWhatAThreadOwnsAlignedAndOnlyWhileItDoes) {
     EXPECT_FALSE(allowed(ptx::addressOf(inner), 8, load));
   }
   EXPECT_FALSE(allowed(ptx::addressOf(outer), 8, load));
+}
+
+TEST(PtxCounts, TellGlobalMemoryFromLocalMemoryAndParameters) {
+  alignas(8) const std::byte outside[16]{}, parameter[8]{};
+  const std::uint64_t begin = ptx::addressOf(parameter);
+  const std::vector<ptx::Range> parameters{{begin, begin + sizeof parameter}};
+  ptx::Thread thread{{}, {}, {}, {}, {}, parameters};
+  alignas(8) std::byte outer[8], inner[8];
+  const ptx::Frame outerFrame(thread, outer), innerFrame(thread, inner);
+  ptx::counts = {};
+  ptx::countLoad(thread, ptx::addressOf(outside), 16);
+  ptx::countLoad(thread, ptx::addressOf(outside), 4);
+  ptx::countLoad(thread, ptx::addressOf(outer), 8);
+  ptx::countLoad(thread, ptx::addressOf(inner) + 4, 4);
+  ptx::countLoad(thread, begin, 8);
+  EXPECT_EQ(ptx::counts.loads, 2u);
+  EXPECT_EQ(ptx::counts.loadedBytes, 20u);
+  EXPECT_EQ(ptx::counts.localLoads, 2u);
+  EXPECT_EQ(ptx::counts.localBytes, 12u);
+  EXPECT_EQ(ptx::counts.instructions, 0u);
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""ptx_to_cpp.py IN.ptx OUT.cpp [--allow-contraction]
+"""ptx_to_cpp.py IN.ptx OUT.cpp [--allow-contraction] [--count] [--only TEXT]
 
 Turns compiled kernels into C++ that runs them on a CPU, a statement for every instruction (ptx_machine.h has what
-they are built from). Refuses arithmetic whose bits depend on the device: approximations, flushed denormals, float
+they are built from). With --count, it also counts what it executes (ptx_counts.h); with --only, kernels whose names do
+not contain the text are left out. Refuses arithmetic whose bits depend on the device: approximations, flushed denormals, float
 operations that a later stage might contract; and what these kernels have no business with: shared memory, barriers,
 atomics, calls of functions that are not in the file."""
+import argparse
 import re
 import sys
 
@@ -37,10 +39,10 @@ def bits(type_name):
 
 
 class FunctionTranslator:
-    def __init__(self, function: Function, symbols, functions, allow_contraction):
+    def __init__(self, function: Function, symbols, functions, allow_contraction, count):
         self.function = function
         self.functions = functions  # C++ name of every function that is defined
-        self.allow_contraction = allow_contraction
+        self.allow_contraction, self.count = allow_contraction, count
         self.symbols = dict(symbols)  # name in PTX -> C++ expression of type byte*
         for i, parameter in enumerate(function.parameters):
             self.symbols[parameter.name] = f"arguments[{i}]"
@@ -62,7 +64,9 @@ class FunctionTranslator:
                 elif text[0].startswith("."):
                     self.declare(text[0])
                 else:
-                    self.lines.append(self.statement(text[0]))
+                    # What a guard skips takes a device's time too.
+                    counting = "++ptx::counts.instructions; " if self.count else ""
+                    self.lines.append(counting + self.statement(text[0]))
             except Refused as refused:
                 self.refusals.append(f"{self.function.name}: {text[0]}: {refused}")
         return self.lines
@@ -181,6 +185,8 @@ class FunctionTranslator:
         registers = self.vector(modifiers, operands[0])
         if len(registers) > 1:
             code += f"ptx::checkAlignment(at, {len(registers) * size}); "
+        if self.count and "param" not in modifiers:
+            code += f"ptx::countLoad(thread, at, {len(registers) * size}); "
         for i, register in enumerate(registers):
             code += self.assign(register, type_name, f"{load}<{CPP_TYPES[type_name]}>({where}at + {i * size})")
         return code + " }"
@@ -387,13 +393,14 @@ def label(name):
     return name.replace("$", "")
 
 
-def translate(text, allow_contraction=False):
+def translate(text, allow_contraction=False, count=False, only=""):
     """C++ of a module's functions and a table of its kernels. Raises Refused, which names all refused statements."""
     module = read_module(text)
-    defined = [function for function in module.functions if function.defined]
+    defined = [function for function in module.functions
+               if function.defined and (only in function.name or not function.is_kernel)]
     names = {function.name: f"function{i}" for i, function in enumerate(defined)}
     symbols = {table.name: f"table_{table.name}" for table in module.tables}
-    out = ['#include "tests/cuda/ptx_machine.h"', "", "namespace {"]
+    out = [f'#include "tests/cuda/{"ptx_counts" if count else "ptx_machine"}.h"', "", "namespace {"]
     for table in module.tables:
         out.append(f"alignas({table.align}) {CPP_TYPES[plain(table.element)]} table_{table.name}"
                    f"[{table.size // (bits(table.element) // 8)}] = {{{table.values}}};")
@@ -402,7 +409,7 @@ def translate(text, allow_contraction=False):
     out += [f"void {name}{signature};" for name in names.values()]
     refusals = []
     for function in defined:
-        translator = FunctionTranslator(function, symbols, names, allow_contraction)
+        translator = FunctionTranslator(function, symbols, names, allow_contraction, count)
         lines = translator.translate()
         refusals += translator.refusals
         out += ["", f"// {function.name}", f"void {names[function.name]}{signature} {{",
@@ -417,13 +424,19 @@ def translate(text, allow_contraction=False):
 
 
 def main():
-    source, target, *options = sys.argv[1:]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("source", metavar="IN.ptx")
+    parser.add_argument("target", metavar="OUT.cpp")
+    parser.add_argument("--allow-contraction", action="store_true")
+    parser.add_argument("--count", action="store_true")
+    parser.add_argument("--only", metavar="TEXT", default="")
+    options = parser.parse_args()
     try:
-        with open(source, encoding="utf-8") as file:
-            code = translate(file.read(), "--allow-contraction" in options)
+        with open(options.source, encoding="utf-8") as file:
+            code = translate(file.read(), options.allow_contraction, options.count, options.only)
     except Refused as refused:
-        sys.exit(f"{source}: refused:\n{refused}")
-    with open(target, "w", encoding="utf-8") as file:
+        sys.exit(f"{options.source}: refused:\n{refused}")
+    with open(options.target, "w", encoding="utf-8") as file:
         file.write(code)
 
 

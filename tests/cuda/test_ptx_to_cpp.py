@@ -53,6 +53,26 @@ class Translator(unittest.TestCase):
         with self.assertRaisesRegex(Refused, "shared memory"):
             translate(".shared .align 4 .b8 scratch[64];\n" + KERNEL)
 
+    def test_counts_instructions_and_loads_only_when_asked(self):
+        statement = "@%p1 bra END;\n  ld.v2.f32 {%f2, %f3}, [%rd1];\nEND:"
+        text = KERNEL.replace("STATEMENT", statement).replace(".reg .f32", ".reg .pred %p<2>;\n  .reg .f32")
+        self.assertNotIn("count", translate(text))
+        counted = translate(text, count=True)
+        self.assertIn('#include "tests/cuda/ptx_counts.h"', counted)
+        self.assertEqual(counted.count("++ptx::counts.instructions; "), 6)
+        self.assertIn("++ptx::counts.instructions; if (p1) { goto END; }", counted)
+        # The parameter is not loaded from memory.
+        self.assertEqual([part.split(")")[0] for part in counted.split("countLoad(")[1:]],
+                         ["thread, at, 4", "thread, at, 8"])
+
+    def test_leaves_out_kernels_of_other_names_but_no_functions(self):
+        other = KERNEL.replace("STATEMENT", "").replace("kernel", "other")
+        function = ".func helper()\n{\n  ret;\n}\n"
+        text = KERNEL.replace("STATEMENT", "") + function + other.split(".target sm_75")[1]
+        self.assertEqual([name in translate(text) for name in ('"kernel"', '"other"')], [True, True])
+        chosen = translate(text, only="other")
+        self.assertEqual([name in chosen for name in ('"kernel"', '"other"', "// helper")], [False, True, True])
+
 
 if __name__ == "__main__":
     unittest.main()
