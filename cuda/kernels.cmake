@@ -11,7 +11,7 @@ set(SCOLOPAX_INTEGRATORS
   "raymarch_voxels|raymarch.h|RayMarch<kernel::VoxelCells>")
 set(folder ${CMAKE_BINARY_DIR}/cuda/kernels)
 set(SCOLOPAX_PLAIN_KERNELS)
-set(SCOLOPAX_ALL_KERNELS ${CMAKE_SOURCE_DIR}/cuda/rebuild_totals.cu)
+set(SCOLOPAX_ALL_KERNELS ${CMAKE_CURRENT_LIST_DIR}/rebuild_totals.cu)
 foreach(entry ${SCOLOPAX_INTEGRATORS})
   string(REPLACE "|" ";" entry "${entry}")
   list(GET entry 0 name)

@@ -6,6 +6,7 @@ import os
 import time
 
 from common import LIGHTS, MULTICHANNEL, PROGRAM, SCENES, light_settings, median, resources
+from device_experiment import proxies
 from surface_experiment import surfaces
 
 
@@ -159,4 +160,5 @@ def loading(bench):
     return found
 
 
-EXPERIMENTS = {f.__name__: f for f in (speed, macrocells, channels, quality, blends, memory, sizes, threads, loading, surfaces)}
+EXPERIMENTS = {f.__name__: f for f in (speed, macrocells, channels, quality, blends, memory, sizes, threads, loading, surfaces,
+                                       proxies)}

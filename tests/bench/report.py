@@ -8,6 +8,7 @@ import os
 import re
 
 from common import HERE, processor
+from device_sections import machine_of
 from plots import save
 from sections import REPORT
 
@@ -21,11 +22,14 @@ def remarks():
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("measured", metavar="MEASURED.json", nargs="+", help="files of run.py; later ones replace earlier ones")
+    parser.add_argument("measured", metavar="MEASURED.json", nargs="*", help="files of run.py; later ones replace earlier ones")
     parser.add_argument("--rebuild", metavar="REBUILD.json", help="output of bench_rebuild --json")
     parser.add_argument("--layout", metavar="LAYOUT.json", help="output of bench_layout --json")
+    parser.add_argument("--device", metavar="DEVICE.json", help="file of tests/cuda/on_device.sh")
     parser.add_argument("--out", metavar="FOLDER", default=os.path.join(HERE, "report"))
     options = parser.parse_args()
+    if not any((options.measured, options.rebuild, options.layout, options.device)):
+        parser.error("expected measurements")
     measured = {}
     for path in options.measured:
         with open(path, encoding="utf-8") as file:
@@ -34,6 +38,10 @@ def main():
         if path:
             with open(path, encoding="utf-8") as file:
                 measured[name] = {"found": json.load(file), "tool": f"bench_{name} --json"}
+    if options.device:
+        with open(options.device, encoding="utf-8") as file:
+            found = json.load(file)
+        measured["gpu"] = {"machine": machine_of(found), "quick": False, "found": found, "maker": "tests/cuda/on_device.sh"}
     os.makedirs(options.out, exist_ok=True)
     written = remarks()
 
@@ -49,8 +57,9 @@ def main():
         entries = [(section, measured[section.__name__]) for section in sections if section.__name__ in measured]
         if not entries:
             continue
-        text = f"# {title}\nMade by `tests/bench/run.py` and `tests/bench/report.py`; "
         known = [entry for _, entry in entries if "machine" in entry]
+        maker = known[0].get("maker", "tests/bench/run.py") if known else "tests/bench/run.py"
+        text = f"# {title}\nMade by `{maker}` and `tests/bench/report.py`; "
         text += f"machine: {known[0]['machine'] if known else processor()}.\n"
         if name in ("speed", "quality", "channels"):
             text += (f"Pictures of {known[0]['side']}x{known[0]['side']} rays through pixel centres; errors over every third "

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report's sections: Markdown tables and plots of an experiment's results. One function each, and one list of them.
 Every function gets the experiment's entry of run.py's file, and a function that saves a plot and returns its link."""
+from device_sections import gpu, proxies
 from plots import lines
 from surface_sections import surfaces
 from tables import number, table
@@ -211,5 +212,7 @@ REPORT = {
     "memory": ("Memory and rebuild times (Table 1)", [memory, rebuild]),
     "layout": ("Layout of the voxels", [layout]),
     "scaling": ("Scaling", [sizes, threads, loading]),
+    "proxies": ("What CUDA kernels execute", [proxies]),
+    "gpu": ("CUDA devices", [gpu]),
     "surfaces": ("Sharp transfer functions and surfaces (Knoll et al. 2009)", [surfaces]),
 }
