@@ -367,11 +367,11 @@ void measureAll(const Extent& extent, double seconds) {
 
 /// `name`: of a method; auto is what it chooses.
 void renderFrames(const Extent& extent, const std::string& name, std::size_t count) {
-  const auto volume = orbitals(extent.edge, extent.channels[0]);
-  Scene scene = sceneOf(*volume, extent.sizes[0]);
   const auto known = std::find_if(std::begin(kMethods), std::end(kMethods),
                                   [&](const NamedValue& method) { return method.name == name; });
   if (known == std::end(kMethods)) failBadInput("there is no method " + name);
+  const auto volume = orbitals(extent.edge, extent.channels[0]);
+  Scene scene = sceneOf(*volume, extent.sizes[0]);
   scene.method = Method(known - std::begin(kMethods));
   if (scene.method == Method::automatic) {
     const auto renderer = deviceRenderer(volume);

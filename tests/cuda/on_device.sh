@@ -78,7 +78,11 @@ run() {
   cat "$logs/probe.out"
   local capability; capability=$(sed -n 's/.*"capability": "\([0-9]*\)\.\([0-9]*\)".*/\1\2/p' "$logs/probe.out")
 
-  local build=$dir/build jobs=$(($(nproc) * 3 / 2))
+  # More than there are processors, so that the kernels, which take longest, do not wait for other files; each needs up
+  # to 2 GiB.
+  local build=$dir/build jobs=$(($(nproc) * 3)) most
+  most=$(($(sed -n 's/^MemAvailable: *\([0-9]*\) kB/\1/p' /proc/meminfo) / 2097152))
+  [ $jobs -le $most ] || jobs=$((most > 1 ? most : 1))
   if step configure 60 cmake -S "$dir/tests/cuda/on_device" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release \
       -DSCOLOPAX_NVCC="$nvcc" -DSCOLOPAX_CUDA_DEVICES="sm_$capability" -DSCOLOPAX_THIRD_PARTY="$dir/third_party" &&
       step build 330 cmake --build "$build" -j "$jobs"; then
