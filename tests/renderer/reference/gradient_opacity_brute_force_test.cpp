@@ -6,15 +6,17 @@
 #include "renderer/reference/integrator.h"
 #include "tests/renderer/reference/lit_march.h"
 #include "tests/renderer/reference/random_light.h"
+#include "tests/support/statistics.h"
 
 namespace scolopax::reference {
 namespace {
 
-/// Compares one ray through each of `count` random scenes with tiny steps: the claimed error bounds must
+/// Compares one ray through each of `usualCount` random scenes with tiny steps: the claimed error bounds must
 /// hold.
-void expectFactorClaimsHold(bool shading, bool shadows, unsigned count, int steps, double largestClaim) {
+void expectFactorClaimsHold(bool shading, bool shadows, int usualCount, int steps, double largestClaim) {
+  const int count = test::timesFactor(usualCount);
   int seen = 0;
-  for (unsigned seed = 1; seed <= count; ++seed) {
+  for (unsigned seed = 1; seed <= unsigned(count); ++seed) {
     RandomLight draw(seed);
     const Volume volume = draw.volume();
     Scene scene = draw.scene(volume);
@@ -31,7 +33,7 @@ void expectFactorClaimsHold(bool shading, bool shadows, unsigned count, int step
     EXPECT_LE(found.error, largestClaim) << "seed " << seed;
     seen += found.rgba.a > 0.01;
   }
-  EXPECT_GT(seen, int(count) / 2);
+  EXPECT_GT(seen, count / 2);
 }
 
 // kTolerance and kToleranceLit are tolerances of one piece; blend mode composite adds three channels.

@@ -6,6 +6,7 @@
 #include "renderer/reference/integrator.h"
 #include "tests/renderer/reference/lit_march.h"
 #include "tests/renderer/reference/random_light.h"
+#include "tests/support/statistics.h"
 
 namespace scolopax::reference {
 namespace {
@@ -25,11 +26,12 @@ std::vector<Isovalue> randomSurfaces(RandomLight& draw) {
   return isovalues;
 }
 
-/// Compares one ray through each of `count` random scenes with tiny steps. `largestClaim` holds for one
+/// Compares one ray through each of `usualCount` random scenes with tiny steps. `largestClaim` holds for one
 /// channel.
-void expectFeatureClaimsHold(const Features& has, unsigned count, int steps, double largestClaim) {
+void expectFeatureClaimsHold(const Features& has, int usualCount, int steps, double largestClaim) {
+  const int count = test::timesFactor(usualCount);
   int seen = 0;
-  for (unsigned seed = 1; seed <= count; ++seed) {
+  for (unsigned seed = 1; seed <= unsigned(count); ++seed) {
     RandomLight draw(seed);
     const Volume volume = draw.volume();
     Scene scene = draw.scene(volume);
@@ -52,7 +54,7 @@ void expectFeatureClaimsHold(const Features& has, unsigned count, int steps, dou
     EXPECT_LE(found.error, largestClaim * double(scene.channels.size())) << "seed " << seed;
     seen += found.rgba.a > 0.01;
   }
-  EXPECT_GT(seen, int(count) / 2);
+  EXPECT_GT(seen, count / 2);
 }
 
 // kTolerance and kToleranceLit are tolerances of one piece.

@@ -11,6 +11,7 @@
 #include "renderer/reference/render.h"
 #include "tests/renderer/reference/lit_march.h"
 #include "tests/renderer/reference/random_light.h"
+#include "tests/support/statistics.h"
 
 namespace scolopax::reference {
 namespace {
@@ -55,10 +56,11 @@ TEST(ReferenceShading, OfEightBytesIsWhatTinyStepsSay) {
     }
 }
 
-/// Compares one ray through each of `count` random scenes, in all blend modes, with tiny steps: the claimed
-/// error bounds must hold.
-void expectLightClaimsHold(bool shading, bool shadows, unsigned count, int steps, double largestClaim) {
-  for (unsigned seed = 1; seed <= count; ++seed) {
+/// Compares one ray through each of `usualCount` random scenes, in all blend modes, with tiny steps: the
+/// claimed error bounds must hold.
+void expectLightClaimsHold(bool shading, bool shadows, int usualCount, int steps, double largestClaim) {
+  const int count = test::timesFactor(usualCount);
+  for (unsigned seed = 1; seed <= unsigned(count); ++seed) {
     RandomLight draw(seed);
     const Volume volume = draw.volume();
     Scene scene = draw.scene(volume);
@@ -84,7 +86,7 @@ TEST(ReferenceShadows, KeepsWhatItClaimsOnRandomScenes) {
 TEST(ReferenceShadows, KeepsWhatItClaimsAgainstTheSameWithAThousandthOfTheTolerance) {
   // Shadows narrower than a fifth of a voxel may be missed: of rays like these, 1 in 2500 exceeded the
   // claimed error, by at most 4e-5.
-  for (unsigned seed = 1; seed <= 200; ++seed) {
+  for (unsigned seed = 1; seed <= unsigned(test::timesFactor(200)); ++seed) {
     RandomLight draw(seed);
     const Volume volume = draw.volume();
     Scene scene = draw.scene(volume);
