@@ -7,6 +7,7 @@
 #include <glm/vec4.hpp>
 #include <vector>
 
+#include "renderer/kernel/cell_walk.h"
 #include "renderer/kernel/shade.h"
 #include "tests/bench/peaks/peak_table.h"
 #include "tests/bench/peaks/preintegrated_table.h"
