@@ -13,6 +13,8 @@ constexpr double kDivisors[] = {1, 1.5, 2, 2.5, 3, 4, 6, 8, 12, kMaxDivisor};
 constexpr double kProbeDivisor = 4;
 /// Largest ratio of the pixels of a picture to those of the next coarser one, plus a margin.
 constexpr double kLargestStep = 2.3;
+/// Smallest ratio of the widths of two pictures at rest of which the second is worth rendering.
+constexpr double kSmallestStep = 1.5;
 /// The target is at least this many times the fixed cost.
 constexpr double kOverFixed = 1.6;
 constexpr double kFiner = 0.8, kKept = 1.2;  ///< shares of the target at which the divisor changes
@@ -78,8 +80,10 @@ double ResolutionPolicy::atRest(std::uint64_t pixels, std::optional<double> show
   const PassCost& cost = costOf(false);
   if (!cost.known()) return 1;
   double seconds = secondsOf(policy_.frameTarget), divisor = 1;
+  // While edits arrive, `auto` takes a coarse step: at rest a pass may take ten times as long.
+  if (!cost_[false].known()) seconds /= policy_.restFactor;
   do divisor = divisorForTarget(pixels, cost, seconds *= policy_.restFactor);
-  while (divisor > 1 && shown && divisor >= *shown);
+  while (divisor > 1 && shown && divisor * kSmallestStep > *shown);
   return divisor;
 }
 

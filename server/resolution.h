@@ -62,7 +62,7 @@ class ResolutionPolicy {
   /// whole picture.
   double whileEdited(std::uint64_t pixels, int editedOthers);
   /// The divisor at rest. `shown` is the divisor of the reduced picture of this scene on the screen, if there
-  /// is one; the result is smaller.
+  /// is one; the result is clearly smaller, or 1.
   double atRest(std::uint64_t pixels, std::optional<double> shown) const;
 
  private:

@@ -135,6 +135,16 @@ TEST(Resolution, BeginsWithASmallPictureAndWithAWholeOneWhereNobodyEdits) {
   EXPECT_EQ(policy.whileEdited(kPixels, 0), 4);
 }
 
+TEST(Resolution, AtRestBeginsWithASmallerPictureWhileOnlyTheCostOfEditsIsKnown) {
+  ResolutionPolicy policy(kDefaults);
+  policy.passDone(true, 10'000, 0.01);
+  policy.passDone(true, 20'000, 0.02);  // 0.2 s for the whole picture of 200000, if it cost the same at rest
+  const double first = policy.atRest(200'000, 6);
+  EXPECT_EQ(first, 3);  // within 0.025 s
+  policy.passDone(false, 22'000, 0.2);
+  EXPECT_EQ(policy.atRest(200'000, first), 1);  // 1.8 s
+}
+
 TEST(Resolution, GetsFinerWithEveryStepAtRest) {
   ResolutionPolicy policy(kDefaults);
   policy.passDone(false, 1000, 1000 * 1e-4);  // 12 s for the whole picture of 120000
