@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <new>
 #include <set>
 #include <string>
 
 #include "protocol/problem.h"
+#include "renderer/core/error.h"
 #include "renderer/renderer.h"
 #include "server/session.h"
 
@@ -81,7 +83,8 @@ json pickedJson(const ResolvedScene& scene, std::uint32_t revision, const PickQu
 }
 
 void CurrentPick::run(const PendingPick& pick, const ResolvedScene& scene, std::uint32_t revision,
-                      const Renderer& renderer, std::chrono::nanoseconds slice, Session& session) {
+                      const Renderer& renderer, std::chrono::nanoseconds slice, Session& session,
+                      const std::function<void(const std::string&)>& log) {
   PickAnswer answer;
   try {
     if (!picking_ || id_ != pick.id) {
@@ -94,6 +97,13 @@ void CurrentPick::run(const PendingPick& pick, const ResolvedScene& scene, std::
     answer.found = pickedJson(scene, revision, pick.query, picking_->found());
   } catch (const ProtocolError&) {
     answer.failure = std::current_exception();
+  } catch (const Error&) {
+    answer.failure = std::current_exception();
+  } catch (const std::bad_alloc&) {
+    answer.failure = std::make_exception_ptr(Error(ErrorCode::busy, "not enough memory for this pick"));
+  } catch (const std::exception& error) {
+    log("session " + session.id() + ": a pick failed: " + error.what());
+    answer.failure = std::make_exception_ptr(Error(ErrorCode::unsupported, "the pick failed"));
   }
   picking_.reset();
   session.answerPick(pick.id, answer);

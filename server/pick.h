@@ -9,6 +9,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "renderer/data/pick.h"
@@ -54,9 +55,11 @@ struct PendingPick {
 class CurrentPick {
  public:
   /// Begins or continues a pick for at most `slice`, and passes the answer to the session when it is
-  /// complete. The renderer must have the scene.
+  /// complete. The renderer must have the scene. Throws nothing: if the pick fails, that is the answer, and
+  /// `log` receives a cause that clients must not see.
   void run(const PendingPick& pick, const ResolvedScene& scene, std::uint32_t revision,
-           const Renderer& renderer, std::chrono::nanoseconds slice, Session& session);
+           const Renderer& renderer, std::chrono::nanoseconds slice, Session& session,
+           const std::function<void(const std::string&)>& log);
   /// To be called before the renderer gets another scene or is destroyed. A pick in progress then starts
   /// over.
   void forget() { picking_.reset(); }

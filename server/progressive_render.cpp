@@ -339,7 +339,7 @@ bool ProgressiveRender::pickIn(const RenderRequest& request) {
   pickedLast_ = pickable(request) && !pickedLast_;
   if (pickedLast_)
     pick_.run(*request.pick, *request.scene, film_.revision, *renderer_, context_.policy.politeSlice,
-              *session_);
+              *session_, context_.log);
   return pickedLast_;
 }
 
@@ -390,6 +390,9 @@ void ProgressiveRender::fail(const RenderRequest& request, const Error& error) {
                                                : request.revision;
   session_->fail(revision, error);
   // The state after an error cannot be trusted.
+  if (job_) job_->cancel();
+  job_.reset();
+  next_ = nullptr;
   build_.reset();
   part_.reset();
   picture_.reset();

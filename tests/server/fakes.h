@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -53,6 +54,7 @@ struct FakeControl {
       ~0u;  ///< from this many samples on the error takes long, until it is measured
   std::function<void(std::stop_token)> measuring;  ///< called during that measurement
   int incompletePicks = 0;           ///< calls that use up their budget before a pick is complete
+  std::string pickFailure;           ///< if set, picks throw a std::runtime_error with this message
   std::vector<std::uint32_t> picks;  ///< the scene's seed in each pick that was begun
   std::vector<Picked> found;         ///< the result of each pick
 };
@@ -85,6 +87,7 @@ class FakePicking : public Picking {
  public:
   explicit FakePicking(std::shared_ptr<FakeControl> control) : control_(std::move(control)) {}
   bool run(std::chrono::nanoseconds budget) override {
+    if (!control_->pickFailure.empty()) throw std::runtime_error(control_->pickFailure);
     if (control_->incompletePicks == 0) return true;
     if (control_->clock)
       control_->clock->advance(std::chrono::duration_cast<std::chrono::microseconds>(budget));
@@ -227,6 +230,7 @@ struct Workshop {
   FakeClock clock;
   std::shared_ptr<FakeControl> control = std::make_shared<FakeControl>();
   int renderWakes = 0, encoderWakes = 0, watchWakes = 0;
+  std::vector<std::string> log;  ///< of the render loop
   SessionHooks hooks{clock.now(), [this] { ++renderWakes; }, [this] { ++encoderWakes; },
                      [this] { render.interrupt(); }};
   std::shared_ptr<const SceneResolver> resolver =
@@ -246,7 +250,7 @@ struct Workshop {
                 },
                 {},
                 clock.now(),
-                [](const std::string&) {},
+                [this](const std::string& line) { log.push_back(line); },
                 background,
                 passes,
                 background,

@@ -15,6 +15,7 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 using protocol::ProtocolError;
+using testing::FakeBackground;
 using testing::FakeViewer;
 using testing::seedPatch;
 using testing::Workshop;
@@ -241,6 +242,78 @@ TEST(Pick, IsToldThatTheSceneCannotBeRendered) {
   EXPECT_THROW(std::rethrow_exception(picker.answers[0].failure), Error);
   EXPECT_THROW(picker.pick(), Error);
   EXPECT_THROW(picker.session->waitForPick({1, 2}, 0ms), Error);
+}
+
+std::string reasonOf(const PickAnswer& answer) {
+  try {
+    if (answer.failure) std::rethrow_exception(answer.failure);
+    return "none";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+TEST(Pick, ThatFailsSaysSoAndThePictureGoesOn) {
+  Picker picker;
+  Workshop& workshop = picker.workshop;
+  const auto viewer = std::make_shared<FakeViewer>();
+  picker.session->addViewer(viewer);
+  workshop.steps(2);
+  workshop.control->pickFailure = "a secret path";
+  picker.pick();
+  workshop.steps(2);
+  ASSERT_EQ(picker.answers.size(), 1u);
+  EXPECT_EQ(reasonOf(picker.answers[0]), "the pick failed");  // clients do not see the cause
+  ASSERT_EQ(workshop.log.size(), 1u);
+  EXPECT_NE(workshop.log[0].find("a secret path"), std::string::npos);
+  EXPECT_TRUE(viewer->failures.empty());
+  const auto passes = workshop.control->passes.size();
+  workshop.control->pickFailure.clear();
+  picker.pick();
+  workshop.steps(4);
+  EXPECT_GT(workshop.control->passes.size(), passes);
+  ASSERT_EQ(picker.answers.size(), 2u);
+  EXPECT_FALSE(picker.answers[1].failure);
+}
+
+/// The job that runs in the background when a pick fails.
+enum class Beside { pass, addition, picture };
+
+TEST(Pick, ThatFailsLetsABackgroundJobEndWell) {
+  for (const Beside job : {Beside::pass, Beside::addition, Beside::picture}) {
+    Picker picker;
+    Workshop& workshop = picker.workshop;
+    const auto viewer = std::make_shared<FakeViewer>();
+    picker.session->addViewer(viewer);
+    workshop.steps(2);
+    FakeBackground& background = job == Beside::addition ? workshop.background : workshop.passes;
+    if (job == Beside::pass) {
+      workshop.control->duringPass = [&] { workshop.clock.advance(1s); };
+      workshop.step();
+      workshop.control->duringPass = nullptr;
+    }
+    workshop.control->filmIsLarge = job == Beside::addition;
+    workshop.control->longErrorFrom = job == Beside::picture ? 1 : ~0u;
+    background.atOnce = false;
+    workshop.steps(3);
+    ASSERT_EQ(background.waiting.size(), 1u);
+    workshop.control->pickFailure = "a bug";
+    picker.pick();
+    workshop.steps(2);
+    ASSERT_EQ(picker.answers.size(), 1u);
+    EXPECT_EQ(reasonOf(picker.answers[0]), "the pick failed");
+    EXPECT_EQ(background.waiting.size(), 1u);
+    background.finish();
+    background.atOnce = true;
+    const auto passes = workshop.control->passes.size();
+    workshop.clock.advance(600ms);
+    const auto frames = viewer->frames.size();
+    workshop.steps(4);
+    EXPECT_GT(workshop.control->passes.size(), passes);
+    EXPECT_GT(viewer->frames.size(), frames);
+    EXPECT_TRUE(viewer->failures.empty());
+    EXPECT_EQ(workshop.control->renderersMade, 1);
+  }
 }
 
 TEST(Pick, WhoseAnswerCannotBeTakenDisturbsNoOther) {
