@@ -103,7 +103,7 @@ void CurrentPick::run(const PendingPick& pick, const ResolvedScene& scene, std::
     answer.failure = std::make_exception_ptr(Error(ErrorCode::busy, "not enough memory for this pick"));
   } catch (const std::exception& error) {
     log("session " + session.id() + ": a pick failed: " + error.what());
-    answer.failure = std::make_exception_ptr(Error(ErrorCode::unsupported, "the pick failed"));
+    answer.failure = std::make_exception_ptr(ProtocolError(500, "", "the server failed to answer this pick"));
   }
   picking_.reset();
   session.answerPick(pick.id, answer);

@@ -244,14 +244,16 @@ TEST(Pick, IsToldThatTheSceneCannotBeRendered) {
   EXPECT_THROW(picker.session->waitForPick({1, 2}, 0ms), Error);
 }
 
-std::string reasonOf(const PickAnswer& answer) {
+/// The HTTP status and the detail of a failed pick.
+std::pair<int, std::string> pickProblem(const PickAnswer& answer) {
   try {
     if (answer.failure) std::rethrow_exception(answer.failure);
-    return "none";
-  } catch (const Error& error) {
-    return error.what();
+    return {200, ""};
+  } catch (const ProtocolError& error) {
+    return {error.status, error.what()};
   }
 }
+const std::pair<int, std::string> kPickFailed{500, "the server failed to answer this pick"};
 
 TEST(Pick, ThatFailsSaysSoAndThePictureGoesOn) {
   Picker picker;
@@ -263,7 +265,7 @@ TEST(Pick, ThatFailsSaysSoAndThePictureGoesOn) {
   picker.pick();
   workshop.steps(2);
   ASSERT_EQ(picker.answers.size(), 1u);
-  EXPECT_EQ(reasonOf(picker.answers[0]), "the pick failed");  // clients do not see the cause
+  EXPECT_EQ(pickProblem(picker.answers[0]), kPickFailed);
   ASSERT_EQ(workshop.log.size(), 1u);
   EXPECT_NE(workshop.log[0].find("a secret path"), std::string::npos);
   EXPECT_TRUE(viewer->failures.empty());
@@ -301,7 +303,7 @@ TEST(Pick, ThatFailsLetsABackgroundJobEndWell) {
     picker.pick();
     workshop.steps(2);
     ASSERT_EQ(picker.answers.size(), 1u);
-    EXPECT_EQ(reasonOf(picker.answers[0]), "the pick failed");
+    EXPECT_EQ(pickProblem(picker.answers[0]), kPickFailed);
     EXPECT_EQ(background.waiting.size(), 1u);
     background.finish();
     background.atOnce = true;
