@@ -76,7 +76,7 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
             {"renderSeconds", config.maxRenderSeconds},
             {"macrocells", SceneResolver::Options().maxIntervals},
             {"waitingPolls", Session::kMaxPolls},
-            {"waitingPicks", Session::kMaxPicks},
+            {"waitingPicks", PickQueue::kMaxPicks},
             {"waitingEdits", EditQueue::kMaxEdits},
             {"pickPixels", kMaxPickPixels}}}};
 }

@@ -18,6 +18,8 @@ using TimePoint = std::chrono::steady_clock::time_point;
 /// The steady clock, or a test's own.
 using Now = std::function<TimePoint()>;
 
+using ViewerId = std::uint64_t;  ///< a client that watches a session; 0: none of them
+
 /// Metadata of a frame; most of it is also in the frame header on the wire.
 struct FrameInfo {
   std::uint32_t number = 0;           ///< counts a session's encoded frames from 1; 0 before encoding

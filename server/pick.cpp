@@ -7,6 +7,7 @@
 #include <new>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "protocol/problem.h"
 #include "renderer/core/error.h"
@@ -106,7 +107,7 @@ void CurrentPick::run(const PendingPick& pick, const ResolvedScene& scene, std::
     answer.failure = std::make_exception_ptr(ProtocolError(500, "", "the server failed to answer this pick"));
   }
   picking_.reset();
-  session.answerPick(pick.id, answer);
+  session.answerPick(pick.id, std::move(answer));
 }
 
 }  // namespace scolopax::server

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Picking: what is visible at a pixel or in a rectangle of a session's picture. Session stores the queries,
-// and the render thread answers them with the Renderer.
+// Picking: what is visible at a pixel or in a rectangle of a session's picture. Session stores the queries
+// (PickQueue), and the render thread answers them with the Renderer.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "renderer/data/pick.h"
+#include "server/frame.h"
 #include "server/scene_resolver.h"
 
 namespace scolopax {
@@ -43,7 +44,7 @@ struct PickAnswer {
   nlohmann::json found = {};
   std::exception_ptr failure = {};
 };
-using OnPicked = std::function<void(const PickAnswer&)>;
+using OnPicked = std::function<void(PickAnswer)>;
 
 using PickId = std::uint64_t;
 struct PendingPick {

@@ -26,6 +26,11 @@ void notify(const Call& call, Arguments&&... arguments) noexcept {
   }
 }
 
+template <class Failure>
+PickAnswer failed(const Failure& failure) {
+  return {{}, std::make_exception_ptr(failure)};
+}
+
 }  // namespace
 
 Session::Session(std::string id, std::string token, std::shared_ptr<const SceneResolver> resolver,
@@ -119,10 +124,16 @@ ViewerId Session::addViewer(std::shared_ptr<ViewerSink> sink) {
 }
 
 void Session::removeViewer(ViewerId id) {
-  const std::lock_guard lock(mutex_);
-  viewers_.erase(id);
-  lastUsed_ = hooks_.now();
-  hooks_.wakeRender();  // the loop also determines when the session ends
+  std::vector<OnPicked> left;
+  {
+    const std::lock_guard lock(mutex_);
+    if (viewers_.erase(id) > 0) left = picks_.takeOf(id);
+    lastUsed_ = hooks_.now();
+    hooks_.wakeRender();  // the loop also determines when the session ends
+  }
+  for (const OnPicked& answered : left)
+    notify(answered, failed(protocol::ProtocolError(
+                         409, "", "the stream left the session while this pick was waiting")));
 }
 
 void Session::setView(ViewerId id, bool visible, double maxFps) {
@@ -184,35 +195,32 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
   return nullptr;
 }
 
-PickId Session::pick(const PickQuery& query, OnPicked answered) {
+PickId Session::pick(const PickQuery& query, OnPicked answered, ViewerId viewer) {
   const std::lock_guard lock(mutex_);
-  return addPick(query, std::move(answered));
-}
-
-PickId Session::addPick(const PickQuery& query, OnPicked answered) {
   if (closed_) throw protocol::ProtocolError(404, "", "the session has ended");
   areaOf(query, scene_->render.width, scene_->render.height);
-  if (picks_.size() >= kMaxPicks)
-    throw protocol::ProtocolError(
-        429, "",
-        "the limit of " + std::to_string(kMaxPicks) + " picks waiting in a session is reached; retry later");
   retryIfBusy();
   if (failedRevision_ == revision_) throw Error(*failure_);
+  const PickId id = picks_.add(query, viewer, std::move(answered));
   lastUsed_ = hooks_.now();
-  picks_.push_back({{++lastPick_, query}, std::move(answered)});
   hooks_.interruptRender();
   hooks_.wakeRender();
-  return lastPick_;
+  return id;
 }
 
 std::optional<nlohmann::json> Session::waitForPick(const PickQuery& query, std::chrono::milliseconds timeout,
                                                    const std::stop_token& gone) {
-  std::unique_lock lock(mutex_);
   const auto came = std::make_shared<std::optional<PickAnswer>>();
-  const PickId id = addPick(query, [came](const PickAnswer& answer) { *came = answer; });
+  const PickId id = pick(query, [this, came](PickAnswer answer) {
+    const std::lock_guard lock(mutex_);
+    *came = std::move(answer);
+    frameCame_.notify_all();
+  });
+  std::unique_lock lock(mutex_);
   frameCame_.wait_for(lock, gone, timeout, [&] { return closed_ || came->has_value(); });
   if (!*came) {
-    std::erase_if(picks_, [&](const WaitingPick& pick) { return pick.id == id; });
+    picks_.take(id);
+    hooks_.wakeRender();  // to end the work on it
     return std::nullopt;
   }
   if ((*came)->failure) std::rethrow_exception((*came)->failure);
@@ -230,7 +238,7 @@ void Session::close(const std::string& reason) {
   hooks_.interruptRender();
   for (auto& [id, viewer] : viewers_) notify(&ViewerSink::sessionClosed, *viewer.sink, reason);
   viewers_.clear();
-  picks_.clear();
+  picks_ = {};
   frameCame_.notify_all();
 }
 
@@ -249,7 +257,7 @@ RenderRequest Session::request() const {
   const bool seen =
       std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.visible; });
   request.failures = failures_;
-  if (!picks_.empty()) request.pick = picks_.front();
+  request.pick = picks_.oldest();
   request.wanted = !closed_ && (seen || !pollSamples_.empty() || request.pick);
   if (failedRevision_ == revision_) {
     if (request.wanted) request.retryAt = retryAt_;
@@ -273,30 +281,35 @@ void Session::submit(RenderedFrame frame) {
 }
 
 void Session::fail(std::uint32_t revision, const Error& error) {
+  for (const OnPicked& answered : takeFailed(revision, error)) notify(answered, failed(error));
+}
+
+/// Stores the failure and returns the picks that fail with it.
+std::vector<OnPicked> Session::takeFailed(std::uint32_t revision, const Error& error) {
   const std::lock_guard lock(mutex_);
   ++failures_;
   const bool busy = error.code() == ErrorCode::busy;
   const bool known = busy && retryAt_ && failedRevision_ == revision;  // a retry that failed again
   if (!known)
     for (auto& [id, viewer] : viewers_) notify(&ViewerSink::renderFailed, *viewer.sink, error);
-  if (revision != revision_) return;  // the current scene may be renderable
+  if (revision != revision_) return {};  // the current scene may be renderable
   failedRevision_ = revision;
   failure_ = error;
   retryAt_.reset();
   if (busy) retryAt_ = hooks_.now() + kRetryTime;
-  for (const WaitingPick& pick : std::exchange(picks_, {}))
-    notify(pick.answered, PickAnswer{{}, std::make_exception_ptr(error)});
   frameCame_.notify_all();
+  return picks_.takeAll();
 }
 
-void Session::answerPick(PickId id, const PickAnswer& answer) {
-  const std::lock_guard lock(mutex_);
-  const auto pick = std::find_if(picks_.begin(), picks_.end(), [&](const auto& p) { return p.id == id; });
-  if (pick == picks_.end()) return;
-  notify(pick->answered, answer);
-  picks_.erase(pick);
-  lastUsed_ = hooks_.now();
-  frameCame_.notify_all();
+void Session::answerPick(PickId id, PickAnswer answer) {
+  OnPicked answered;
+  {
+    const std::lock_guard lock(mutex_);
+    answered = picks_.take(id);
+    if (!answered) return;
+    lastUsed_ = hooks_.now();
+  }
+  notify(answered, std::move(answer));
 }
 
 void Session::retryIfBusy() {

@@ -13,7 +13,8 @@
 //  5. Only the encoder thread offers frames to viewers. A frame of an older scene is not published, so it
 //     cannot replace a newer one.
 //  6. Viewers are called with the mutex held, so that they see edits in order. A ViewerSink therefore only
-//     queues: it neither blocks nor calls back.
+//     queues: it neither blocks nor calls back. The answer to a pick is passed on without the mutex, because
+//     writing it may take long.
 //  7. An edit interrupts the running pass after it has changed the scene. RenderLoop clears the interruption
 //     before it reads any scene, so no edit is lost in between.
 //  8. Edits of a session are made one at a time: an edit holds a mutex of its own, which no loop uses, while
@@ -34,7 +35,7 @@
 
 #include "renderer/core/error.h"
 #include "server/frame.h"
-#include "server/pick.h"
+#include "server/pick_queue.h"
 #include "server/scene_resolver.h"
 
 namespace scolopax::server {
@@ -54,8 +55,6 @@ class ViewerSink {
   /// The session has ended.
   virtual void sessionClosed(const std::string& reason) = 0;
 };
-
-using ViewerId = std::uint64_t;  ///< 0: nobody
 
 /// The origin of an edit, and a condition for it.
 struct EditOrigin {
@@ -110,8 +109,6 @@ class Session {
 
   /// Maximum number of scripts that wait at once.
   static constexpr std::size_t kMaxPolls = 8;
-  /// Maximum number of picks that wait at once.
-  static constexpr std::size_t kMaxPicks = 8;
 
   Session(std::string id, std::string token, std::shared_ptr<const SceneResolver> resolver,
           std::shared_ptr<const ResolvedScene> scene, SessionHooks hooks);
@@ -133,6 +130,7 @@ class Session {
 
   /// The viewer gets the latest frame soon, then every new one.
   ViewerId addViewer(std::shared_ptr<ViewerSink> sink);
+  /// The viewer's picks that wait fail with ProtocolError(409).
   void removeViewer(ViewerId id);
   /// `maxFps` 0: no limit.
   void setView(ViewerId id, bool visible, double maxFps);
@@ -145,10 +143,11 @@ class Session {
                                                    std::chrono::milliseconds timeout);
   std::shared_ptr<const EncodedFrame> latestFrame() const;
   /// Asks what is visible in the current scene or a newer one. `answered` is called once, or never if the
-  /// session is closed first. It is called on any thread and with the session's mutex held, so it must only
-  /// queue; its exceptions are ignored. Throws ProtocolError: 404 if the session has ended, 422 as areaOf(),
-  /// 429 if too many picks wait already. Throws the renderer's Error if the scene cannot be rendered.
-  PickId pick(const PickQuery& query, OnPicked answered);
+  /// session is closed first. It is called on any thread, also on those of the loops, so it must not block,
+  /// but without the session's mutex; its exceptions are ignored. Throws ProtocolError: 404 if the session
+  /// has ended, 422 as areaOf(), 429 if too many picks wait already. Throws the renderer's Error if the scene
+  /// cannot be rendered.
+  PickId pick(const PickQuery& query, OnPicked answered, ViewerId viewer = 0);
   /// The same, but waits for the answer; nullopt if none came in time or the session was closed. Throws the
   /// error of a failed pick.
   std::optional<nlohmann::json> waitForPick(const PickQuery& query, std::chrono::milliseconds timeout,
@@ -167,7 +166,7 @@ class Session {
   /// notified once.
   void fail(std::uint32_t revision, const Error& error);
   /// Does nothing if no client waits for the answer any more.
-  void answerPick(PickId id, const PickAnswer& answer);
+  void answerPick(PickId id, PickAnswer answer);
 
   // --- encoder thread ---
   /// Takes the waiting picture, unless it has more than `mostPixels` pixels.
@@ -196,11 +195,7 @@ class Session {
   SceneState edit(const EditOrigin& origin, const Resolve& resolve);
   void checkRevision(const EditOrigin& origin) const;
   void retryIfBusy();
-  PickId addPick(const PickQuery& query, OnPicked answered);
-
-  struct WaitingPick : PendingPick {
-    OnPicked answered;
-  };
+  std::vector<OnPicked> takeFailed(std::uint32_t revision, const Error& error);
 
   const std::string id_, token_;
   const std::shared_ptr<const SceneResolver> resolver_;
@@ -223,8 +218,7 @@ class Session {
   std::map<ViewerId, Viewer> viewers_;
   ViewerId nextViewer_ = 1;
   std::multiset<std::uint32_t> pollSamples_;  ///< one per waiting script
-  std::vector<WaitingPick> picks_;            ///< the oldest first
-  PickId lastPick_ = 0;
+  PickQueue picks_;
   bool aovs_ = false;                      ///< AOVs are recorded
   TimePoint lastAovs_;                     ///< the last query for them
   std::optional<RenderedFrame> rendered_;  ///< waits for the encoder

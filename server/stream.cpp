@@ -139,7 +139,7 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
       if (const auto self = stream.lock()) self->sendPicked(id, answer);
     };
     try {
-      session_->pick({message.x, message.y, message.x2, message.y2}, answered);
+      session_->pick({message.x, message.y, message.x2, message.y2}, answered, viewer_);
     } catch (...) {
       sendPicked(message.id, {{}, std::current_exception()});
     }

@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <future>
 #include <limits>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "protocol/problem.h"
 #include "tests/server/fakes.h"
@@ -318,6 +321,44 @@ TEST(Pick, ThatFailsLetsABackgroundJobEndWell) {
   }
 }
 
+TEST(Pick, DelaysNobodyWhileItsAnswerIsWritten) {
+  Picker picker;
+  std::vector<std::future<std::size_t>> asked;
+  int served = 0;
+  const auto write = [&](const PickAnswer&) {
+    asked.push_back(std::async(std::launch::async, [&] { return picker.session->viewerCount(); }));
+    served += asked.back().wait_for(10s) == std::future_status::ready;
+  };
+  picker.session->pick({1, 2}, write);
+  picker.workshop.step();
+  picker.session->pick({1, 2}, write);
+  picker.session->fail(1, Error(ErrorCode::busy, "no memory"));
+  const ViewerId viewer = picker.session->addViewer(std::make_shared<FakeViewer>());
+  picker.session->pick({1, 2}, write, viewer);
+  picker.session->removeViewer(viewer);
+  EXPECT_EQ(served, 3);
+}
+
+TEST(Pick, EndsWhenTheViewerThatAskedForItLeaves) {
+  Picker picker;
+  const ViewerId viewer = picker.session->addViewer(std::make_shared<FakeViewer>());
+  picker.workshop.steps(2);
+  picker.workshop.control->incompletePicks = 1000;
+  for (int i = 0; i < 2; ++i)
+    picker.session->pick(
+        {1, 2}, [&](PickAnswer answer) { picker.answers.push_back(std::move(answer)); }, viewer);
+  picker.workshop.step();
+  bool othersAnswered = false;
+  picker.session->pick({1, 2}, [&](const PickAnswer&) { othersAnswered = true; });
+  picker.session->removeViewer(viewer);
+  ASSERT_EQ(picker.answers.size(), 2u);
+  for (const PickAnswer& answer : picker.answers) EXPECT_EQ(pickProblem(answer).first, 409);
+  picker.workshop.control->incompletePicks = 0;
+  picker.workshop.steps(2);
+  EXPECT_TRUE(othersAnswered);
+  EXPECT_FALSE(picker.session->request().wanted);
+}
+
 TEST(Pick, WhoseAnswerCannotBeTakenDisturbsNoOther) {
   Picker picker;
   const auto throws = [](const PickAnswer&) { throw std::runtime_error("no memory for this answer"); };
@@ -335,7 +376,7 @@ TEST(Pick, WhoseAnswerCannotBeTakenDisturbsNoOther) {
 
 TEST(Pick, OneTooManyIsRefusedWith429) {
   Picker picker;
-  for (std::size_t i = 0; i < Session::kMaxPicks; ++i) picker.pick();
+  for (std::size_t i = 0; i < PickQueue::kMaxPicks; ++i) picker.pick();
   try {
     picker.pick();
     FAIL() << "no error";
@@ -343,9 +384,9 @@ TEST(Pick, OneTooManyIsRefusedWith429) {
     EXPECT_EQ(error.status, 429);
   }
   // A pick whose wait has timed out makes room again.
-  picker.workshop.steps(2 * int(Session::kMaxPicks));
-  EXPECT_EQ(picker.answers.size(), Session::kMaxPicks);
-  for (std::size_t i = 0; i <= Session::kMaxPicks; ++i)
+  picker.workshop.steps(2 * int(PickQueue::kMaxPicks));
+  EXPECT_EQ(picker.answers.size(), PickQueue::kMaxPicks);
+  for (std::size_t i = 0; i <= PickQueue::kMaxPicks; ++i)
     EXPECT_FALSE(picker.session->waitForPick({1, 2}, 0ms).has_value());
 }
 

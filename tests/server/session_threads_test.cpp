@@ -112,6 +112,33 @@ TEST(SessionThreads, KeepRevisionsApartWhateverComesTogether) {
   for (std::size_t i = 0; i < watching->scenes.size(); ++i) EXPECT_EQ(watching->scenes[i].first, i + 2);
 }
 
+TEST(SessionThreads, AnswerEveryPickOnceWhileScenesChangeAndViewersLeave) {
+  RunningServer server;
+  const auto session = server.store.create(kTinyImage);
+  std::atomic<int> found{0}, answers{0};
+  std::vector<std::thread> threads;
+  for (int script = 0; script < 3; ++script)
+    threads.emplace_back([&] {
+      for (int i = 0; i < 50; ++i) found += session->waitForPick({1, 2}, 60s).has_value();
+    });
+  threads.emplace_back([&] {
+    for (int i = 0; i < 50; ++i) {
+      const ViewerId viewer = session->addViewer(std::make_shared<FakeViewer>());
+      session->pick(
+          {1, 2}, [&](const PickAnswer&) { ++answers; }, viewer);
+      session->removeViewer(viewer);
+    }
+  });
+  threads.emplace_back([&] {
+    for (std::uint32_t i = 0; i < 60; ++i) session->patch(seedPatch(i), {});
+  });
+  for (auto& thread : threads) thread.join();
+  EXPECT_EQ(found, 150);
+  // The render thread may have begun to answer a pick before its viewer left. It answers this one afterwards.
+  EXPECT_TRUE(session->waitForPick({1, 2}, 60s));
+  EXPECT_EQ(answers, 50);
+}
+
 TEST(SessionThreads, MakeAndEndSessionsWhileOthersRender) {
   RunningServer server;
   std::vector<std::thread> threads;

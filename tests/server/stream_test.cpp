@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "tests/server/fakes.h"
@@ -69,6 +70,26 @@ TEST(Stream, EndsWhenTheFailureOfAPickCannotBeSent) {
   client.events.onText(kPick);
   client.session->fail(1, Error(ErrorCode::busy, "no memory"));
   EXPECT_EQ(client.socket->closed, 1011);
+}
+
+TEST(Stream, LeavesNoPickBehind) {
+  Client client;
+  client.events.onText(kPick);
+  EXPECT_TRUE(client.session->request().pick);
+  client.events.onClose();
+  EXPECT_FALSE(client.session->request().pick);
+}
+
+TEST(Stream, IsToldThatItsPickEndedWhenItGoesToAnotherSession) {
+  Client client;
+  client.events.onText(kPick);
+  const auto other = client.workshop.store.create(json::object());
+  client.events.onText(json{{"type", "resume"}, {"token", other->token()}}.dump());
+  const auto isPicked = [](const net::SharedText& text) {
+    const auto message = json::parse(*text);
+    return message["type"] == "picked" && message["id"] == 3 && message["problem"]["status"] == 409;
+  };
+  EXPECT_EQ(std::count_if(client.socket->texts.begin(), client.socket->texts.end(), isPicked), 1);
 }
 
 TEST(Stream, SharesTheTextAboutAnEditWithTheOthers) {

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/pick_queue.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "protocol/problem.h"
+
+namespace scolopax::server {
+
+PickId PickQueue::add(const PickQuery& query, ViewerId viewer, OnPicked answered) {
+  if (picks_.size() >= kMaxPicks)
+    throw protocol::ProtocolError(
+        429, "",
+        "the limit of " + std::to_string(kMaxPicks) + " picks waiting in a session is reached; retry later");
+  picks_.push_back({{++last_, query}, viewer, std::move(answered)});
+  return last_;
+}
+
+std::optional<PendingPick> PickQueue::oldest() const {
+  if (picks_.empty()) return std::nullopt;
+  return picks_.front();
+}
+
+OnPicked PickQueue::take(PickId id) {
+  auto taken = takeIf([&](const Waiting& pick) { return pick.id == id; });
+  return taken.empty() ? OnPicked() : std::move(taken.front());
+}
+
+std::vector<OnPicked> PickQueue::takeOf(ViewerId viewer) {
+  return takeIf([&](const Waiting& pick) { return pick.viewer == viewer; });
+}
+
+std::vector<OnPicked> PickQueue::takeAll() {
+  return takeIf([](const Waiting&) { return true; });
+}
+
+std::vector<OnPicked> PickQueue::takeIf(const std::function<bool(const Waiting&)>& wanted) {
+  const auto first =
+      std::stable_partition(picks_.begin(), picks_.end(), [&](const Waiting& pick) { return !wanted(pick); });
+  std::vector<OnPicked> taken;
+  for (auto pick = first; pick != picks_.end(); ++pick) taken.push_back(std::move(pick->answered));
+  picks_.erase(first, picks_.end());
+  return taken;
+}
+
+}  // namespace scolopax::server
