@@ -14,6 +14,8 @@ Resolution resolutionAt(int index) {
   return {std::ldexp(1.0, kEqualSteps + 1 - index), true};
 }
 
+double finestEstimatedStep(const Grid& grid) { return grid.diagonal() / grid.smallestSpacing() * 0x1p-16; }
+
 Resolution resolutionOf(const Scene& scene) {
   return scene.step > 0 ? Resolution{scene.step, false} : Resolution{kWholeCell, true};
 }

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "renderer/data/scene.h"
+#include "renderer/data/volume.h"
 #include "renderer/kernel/views.h"
 
 namespace scolopax {
@@ -30,6 +31,10 @@ Resolution resolutionAt(int index);
 inline constexpr int kEqualSteps = 7;    ///< number of those with equal steps
 inline constexpr int kResolutions = 15;  ///< the last has steps of 1/64, where float's precision begins to
                                          ///< limit a march
+
+/// The smallest step, in smallest spacings, at which biases are estimated: the longest ray through the grid
+/// has 2^16 of them. Only a limit on the work of estimates: pictures are rendered with smaller steps, too.
+double finestEstimatedStep(const Grid& grid);
 
 /// The scene's own.
 Resolution resolutionOf(const Scene& scene);

@@ -133,10 +133,8 @@ AutomaticChoice chooseAutomatically(Launcher& launcher, const RenderPlan& plan, 
   // Shadow rays, if there are any, cost the most.
   const Method quadrature = plan.scene().shadows ? Method::hybrid : Method::raymarch;
   Thumbnails thumbnails(launcher, plan, quadrature, true, stop);
-  // A march has at most 2^16 steps.
-  const double leastStep = plan.grid().diagonal() / double(plan.view().smallestSpacing) * 0x1p-16;
   // Equal steps between the faces of nearest voxels are whole cells, or parts of them.
-  const Ladder ladder(thumbnails, plan.view().nearest ? kEqualSteps : 0, leastStep);
+  const Ladder ladder(thumbnails, plan.view().nearest ? kEqualSteps : 0, finestEstimatedStep(plan.grid()));
   const Path path = cheapestPath(ladder);
 
   const int base = path.resolutions.front();

@@ -10,8 +10,6 @@ namespace scolopax {
 namespace {
 
 constexpr std::size_t kThumbnailSamples = 8;
-/// Maximum number of segments of a ray, at the smallest step.
-constexpr double kMostSegments = 1 << 16;
 
 double upper(const Estimate& estimate) {
   return std::max(0.0, estimate.value) + kDeviations * estimate.deviation;
@@ -21,7 +19,7 @@ double upper(const Estimate& estimate) {
 
 double estimateBias(Launcher& launcher, const RenderPlan& plan, const std::stop_token& stop) {
   Thumbnails thumbnails(launcher, plan, plan.scene().method, false, stop);
-  const double least = plan.grid().diagonal() / double(plan.view().smallestSpacing) / kMostSegments;
+  const double least = finestEstimatedStep(plan.grid());
   Resolution own = resolutionOf(plan.scene());
   own.step = std::max(own.step, least);
   const Pictures coarse = thumbnails.render(own, kThumbnailSamples);

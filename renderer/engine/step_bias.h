@@ -14,10 +14,9 @@ inline constexpr double kDeviations = 2;
 
 /// Bias of quadrature at the step of the plan's scene, with its lighting: the RMSE of the expected picture
 /// over linear premultiplied RGBA. Measured as the difference from the picture voxel cell by voxel cell, with
-/// segments of at most half the smallest spacing, plus an extrapolation to even shorter ones. Steps so small
-/// that a ray has more than 2^16 of them are not rendered; for such a step, returns the bias of the smallest
-/// step that is rendered. Runs in the caller's thread arena, like Launcher::launch. Throws Error(cancelled)
-/// soon after `stop` is requested.
+/// segments of at most half the smallest spacing, plus an extrapolation to even shorter ones. For a step
+/// below finestEstimatedStep(), returns the bias of that. Runs in the caller's thread arena, like
+/// Launcher::launch. Throws Error(cancelled) soon after `stop` is requested.
 double estimateBias(Launcher& launcher, const RenderPlan& plan, const std::stop_token& stop = {});
 
 }  // namespace scolopax

@@ -45,5 +45,12 @@ TEST(Resolution, OfTheLadderBecomesFinerRungByRung) {
   }
 }
 
+TEST(Resolution, OfEstimatesDividesTheLongestRayIntoAtMost65536Steps) {
+  EXPECT_DOUBLE_EQ(finestEstimatedStep(gridOf({1 << 16, 1, 1}, {1e-3, 1e6, 1e6})) * 0x1p16 * 1e-3,
+                   gridOf({1 << 16, 1, 1}, {1e-3, 1e6, 1e6}).diagonal());
+  EXPECT_NEAR(finestEstimatedStep(gridOf({1 << 16, 1, 1})), 1, 1e-6);
+  EXPECT_NEAR(finestEstimatedStep(gridOf({1, 1, 1 << 10}, {2, 2, 2})), 1.0 / 64, 1e-6);
+}
+
 }  // namespace
 }  // namespace scolopax
