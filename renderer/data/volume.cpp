@@ -27,10 +27,13 @@ bool isFinite(const glm::dmat4& m) {
 }
 
 void checkGrid(const Grid& grid) {
+  const std::string found = "found " + std::to_string(grid.dims.x) + "x" + std::to_string(grid.dims.y) + "x" +
+                            std::to_string(grid.dims.z);
   if (grid.dims.x < 1 || grid.dims.y < 1 || grid.dims.z < 1)
-    throw Error(ErrorCode::badInput, "volume: every dimension must be at least 1, found " +
-                                         std::to_string(grid.dims.x) + "x" + std::to_string(grid.dims.y) +
-                                         "x" + std::to_string(grid.dims.z));
+    throw Error(ErrorCode::badInput, "volume: every dimension must be at least 1, " + found);
+  if (grid.dims.x > kMaxVolumeSide || grid.dims.y > kMaxVolumeSide || grid.dims.z > kMaxVolumeSide)
+    throw Error(ErrorCode::tooLarge, "volume: expected at most " + std::to_string(kMaxVolumeSide) +
+                                         " voxels along an axis, " + found);
   if (!isFinite(grid.worldFromVoxel))
     throw Error(ErrorCode::badInput,
                 "volume: the affine from voxels to world has a value that is not finite");

@@ -21,10 +21,13 @@ constexpr std::size_t countOf(const glm::ivec3& size) {
   return std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z);
 }
 
+/// The most voxels along an axis. Kernels find voxels with floats, which have every whole number up to 2^24.
+inline constexpr int kMaxVolumeSide = 1 << 24;
+
 /// Regular grid. Voxel centre (i,j,k), x fastest, lies at worldFromVoxel * (i,j,k,1) in world units.
 /// The box reaches half a voxel beyond the outer centres.
 struct Grid {
-  glm::ivec3 dims{1};              ///< voxels per axis, each >= 1
+  glm::ivec3 dims{1};              ///< voxels per axis, each from 1 to kMaxVolumeSide
   glm::dmat4 worldFromVoxel{1.0};  ///< affine, not singular
   std::size_t voxelCount() const { return countOf(dims); }
   /// Lengths of one voxel step along each axis, world units.

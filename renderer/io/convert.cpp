@@ -192,12 +192,11 @@ glm::ivec3 checkedDims(const std::string& where, std::int64_t x, std::int64_t y,
       "found " + std::to_string(x) + " x " + std::to_string(y) + " x " + std::to_string(z);
   if (x < 1 || y < 1 || z < 1)
     throw Error(ErrorCode::badInput, where + ": expected sizes of at least 1, " + found);
-  constexpr std::int64_t kLargest = std::numeric_limits<std::int32_t>::max();
-  const bool fits = x <= kLargest && y <= kLargest && z <= kLargest &&
+  const bool fits = x <= kMaxVolumeSide && y <= kMaxVolumeSide && z <= kMaxVolumeSide &&
                     saturatingProduct(std::uint64_t(x) * std::uint64_t(y), std::uint64_t(z)) <= 1ull << 48;
   if (!fits)
     throw Error(ErrorCode::tooLarge,
-                where + ": expected at most 2^48 voxels and 2^31 - 1 on an axis, " + found);
+                where + ": expected at most 2^48 voxels and 2^24 along an axis, " + found);
   return glm::ivec3(int(x), int(y), int(z));
 }
 

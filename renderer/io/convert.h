@@ -62,7 +62,7 @@ struct VoxelLayout {
 };
 
 /// Dims from a header's numbers. `where` is file and field. Throws Error(badInput) unless each is at least 1,
-/// Error(tooLarge) if one is beyond 2^31 - 1 or their product beyond 2^48.
+/// Error(tooLarge) if one is beyond kMaxVolumeSide or their product beyond 2^48.
 glm::ivec3 checkedDims(const std::string& where, std::int64_t x, std::int64_t y, std::int64_t z);
 
 /// Throws Error(tooLarge) if the voxels, with the memory needed to convert them, exceed the limit, and

@@ -236,6 +236,10 @@ TEST(NrrdFiles, BadHeadersNameTheFieldThatIsWrong) {
   EXPECT_THAT(with("sizes", "sizes: 2 -3 2\n"), HasSubstr("sizes: expected whole numbers"));
   EXPECT_THAT(with("sizes", "sizes: 2 3.5 2\n"), HasSubstr("sizes"));
   EXPECT_THAT(with("sizes", "sizes: 2147483648 1 1\n"), HasSubstr("sizes: expected at most"));
+  EXPECT_THAT(
+      with("sizes", "sizes: 1 1 16777217\n"),
+      HasSubstr("sizes: expected at most 2^48 voxels and 2^24 along an axis, found 1 x 1 x 16777217"));
+  EXPECT_THAT(with("sizes", "sizes: 1 1 16777216\n"), HasSubstr("the file holds"));
   EXPECT_THAT(with("sizes", "sizes: 2000000000 2000000000 2000000000\n"),
               HasSubstr("sizes: expected at most"));
   EXPECT_THAT(with("sizes", "sizes: 60000 60000 60000\n"), HasSubstr("of memory, the limit is"));
