@@ -13,8 +13,8 @@ Core::Core(Options given)
     : options(std::move(given)),
       files(options.staticRoot),
       tls(loadTls(options.certificateFile, options.keyFile)),
-      workers(std::max(1, options.workers)),
-      bulkWorkers(kBulkThreads),
+      workers(std::max(1, options.workers), [this] { logFailure("worker"); }),
+      bulkWorkers(kBulkThreads, [this] { logFailure("worker"); }),
       longWorkers(static_cast<std::size_t>(std::max(1, options.longRequests))),
       slots(options.longRequests, options.waitingRequests) {}
 
@@ -27,15 +27,26 @@ void Core::log(const std::string& line) const {
   if (options.log) options.log(line);
 }
 
+void Core::logFailure(std::string_view where) const noexcept {
+  try {
+    std::string cause = "not a std::exception";
+    try {
+      throw;
+    } catch (const std::exception& error) {
+      cause = error.what();
+    } catch (...) {
+    }
+    log(std::string(where) + ": " + cause);
+  } catch (...) {  // no memory for a line
+  }
+}
+
 Response Core::guarded(const Handler& handler, const Request& request) const {
-  std::string cause = "not a std::exception";
   try {
     return handler(request);
-  } catch (const std::exception& error) {
-    cause = error.what();
   } catch (...) {
+    logFailure(request.method + " " + request.path);
   }
-  log(request.method + " " + request.path + ": " + cause);
   return problem(500, "The server failed; see its log for the cause.");
 }
 
@@ -104,6 +115,17 @@ std::vector<std::shared_ptr<Connection>> Core::connections() const {
     if (auto connection = entry.connection.lock()) alive.push_back(std::move(connection));
   }
   return alive;
+}
+
+void Core::runIo() {
+  for (bool done = false; !done;) {
+    try {
+      io->run();
+      done = true;
+    } catch (...) {
+      logFailure("network");
+    }
+  }
 }
 
 void Core::beginStop() {

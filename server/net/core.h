@@ -9,11 +9,13 @@
 #include <boost/asio/thread_pool.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <condition_variable>
+#include <exception>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <random>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -44,6 +46,8 @@ class Core {
   /// A refusal by the server itself, in the format of Options::problem.
   Response problem(int status, const std::string& detail) const;
   void log(const std::string& line) const;
+  /// Logs the exception that is being handled. `where`: what has thrown it.
+  void logFailure(std::string_view where) const noexcept;
   /// Runs a handler; turns an exception into a log line and a 500.
   Response guarded(const Handler& handler, const Request& request) const;
 
@@ -66,6 +70,9 @@ class Core {
   /// Must be a connection's last call to the core.
   void leave(Connection* connection);
   std::size_t connectionCount() const;
+
+  /// Runs the handlers of `io` on this thread until there is no more work. A handler that throws is logged.
+  void runIo();
 
   bool stopping() const { return stopping_; }
   void beginStop();
@@ -111,17 +118,45 @@ class Core {
   bool cutting_ = false;
 };
 
+/// Makes a connection leave, however it ends: a server that stops would wait for it for ever.
+class Leaving {
+ public:
+  Leaving(Core& core, Connection* connection) : core_(core), connection_(connection) {}
+  Leaving(Leaving&& other) noexcept
+      : core_(other.core_), connection_(std::exchange(other.connection_, nullptr)) {}
+  Leaving& operator=(Leaving&&) = delete;
+  ~Leaving() {
+    if (connection_) core_.leave(connection_);
+  }
+
+ private:
+  Core& core_;
+  Connection* connection_;
+};
+
 /// Runs `work` on another thread, to which `post` passes it, and resumes the awaiting coroutine with the
-/// result on the coroutine's own executor.
+/// result, or with the exception that `work` has thrown, on the coroutine's own executor. If there is not
+/// even memory for that, the coroutine is destroyed.
 template <typename Result, typename Post, typename Work>
 asio::awaitable<Result> runBy(Post post, Work work) {
-  return asio::async_initiate<const asio::use_awaitable_t<>, void(Result)>(
+  return asio::async_initiate<const asio::use_awaitable_t<>, void(std::exception_ptr, Result)>(
       [post = std::move(post)](auto completion, Work task) {
         post([completion = std::move(completion), task = std::move(task)]() mutable {
-          auto executor = asio::get_associated_executor(completion);
-          asio::post(executor, [completion = std::move(completion), result = task()]() mutable {
-            std::move(completion)(std::move(result));
-          });
+          std::exception_ptr failure;
+          Result result{};
+          try {
+            result = task();
+          } catch (...) {
+            failure = std::current_exception();
+          }
+          try {
+            auto executor = asio::get_associated_executor(completion);
+            asio::post(executor, [completion = std::move(completion), failure = std::move(failure),
+                                  result = std::move(result)]() mutable {
+              std::move(completion)(std::move(failure), std::move(result));
+            });
+          } catch (...) {
+          }
         });
       },
       asio::use_awaitable, std::move(work));

@@ -12,6 +12,9 @@
 namespace scolopax::net {
 
 struct FairPool::Impl {
+  explicit Impl(std::function<void()> onFailure) : failed(std::move(onFailure)) {}
+
+  const std::function<void()> failed;
   std::mutex mutex;
   std::condition_variable changed;
   TurnQueue<Job> queue{1};
@@ -26,7 +29,13 @@ struct FairPool::Impl {
       auto turn = queue.take();
       if (queue.ready()) changed.notify_one();
       lock.unlock();
+      auto done = turn.job.get_future();
       turn.job();
+      try {
+        done.get();
+      } catch (...) {
+        failed();
+      }
       turn.job = {};  // with all that it holds
       lock.lock();
       queue.end(turn.flow);
@@ -35,7 +44,8 @@ struct FairPool::Impl {
   }
 };
 
-FairPool::FairPool(int threads) : impl_(std::make_unique<Impl>()) {
+FairPool::FairPool(int threads, std::function<void()> failed)
+    : impl_(std::make_unique<Impl>(std::move(failed))) {
   for (int i = 0; i < threads; ++i) impl_->threads.emplace_back([this] { impl_->run(); });
 }
 

@@ -2,6 +2,7 @@
 // A thread pool with fair queuing. Jobs belong to flows, and flows take turns. However many jobs a flow has,
 // and however long they take, another flow waits for at most one of them.
 #pragma once
+#include <functional>
 #include <future>
 #include <memory>
 #include <string>
@@ -13,7 +14,10 @@ class FairPool {
   /// Like std::function<void()>, but may hold objects that cannot be copied.
   using Job = std::packaged_task<void()>;
 
-  explicit FairPool(int threads);
+  /// `failed` is called on the pool's threads while an exception that a job has thrown is handled; it must
+  /// not throw itself. The pool goes on with the next job.
+  explicit FairPool(
+      int threads, std::function<void()> failed = [] {});
   ~FairPool();  ///< as join()
   FairPool(const FairPool&) = delete;
   FairPool& operator=(const FairPool&) = delete;

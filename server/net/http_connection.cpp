@@ -72,17 +72,17 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
   }
 
   static awaitable<void> run(std::shared_ptr<HttpConnection> self) {
+    const Leaving leaving(self->core_, self.get());
     try {
       Milliseconds patience = self->core_.options.headTimeout;
       if (co_await self->secure()) {
         while (co_await self->exchange(patience)) patience = self->core_.options.idleTimeout;
       }
       if (self->linger_) co_await self->linger();
-    } catch (const std::exception& error) {
-      self->core_.log(std::string("connection: ") + error.what());
+    } catch (...) {
+      self->core_.logFailure("connection");
     }
     self->closeSocket();
-    self->core_.leave(self.get());
   }
 
  private:
@@ -269,6 +269,8 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     if (!core_.upgradeHandler)
       co_return co_await write(core_.problem(404, "There is no WebSocket here."), keepAlive_);
     const std::shared_ptr<PreparedWebSocket> socket = prepareWebSocket(core_, request.flow);
+    const auto abandon = [](PreparedWebSocket* refused) { refused->abandon(); };
+    std::unique_ptr<PreparedWebSocket, decltype(abandon)> unstarted(socket.get(), abandon);
     using Answer = std::variant<WebSocketEvents, Response>;
     Answer answer = co_await runOn<Answer>(core_.workers, request.flow, [&]() -> Answer {
       Answer decided;
@@ -281,10 +283,11 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
       return decided;
     });
     if (auto* refused = std::get_if<Response>(&answer)) {
-      socket->abandon();
+      unstarted.reset();
       co_return co_await write(std::move(*refused), keepAlive_);
     }
     socket->start(std::move(transport_), parser.release(), std::move(std::get<WebSocketEvents>(answer)));
+    unstarted.release();
     co_return false;
   }
 
@@ -366,8 +369,14 @@ void serveHttp(Core& core, tcp::socket socket, bool full) {
   error_code ignored;
   const std::string address = socket.remote_endpoint(ignored).address().to_string();
   auto connection = std::make_shared<HttpConnection>(core, std::move(socket), address, full);
-  core.enter(connection, address);
-  asio::co_spawn(executor, HttpConnection::run(std::move(connection)), asio::detached);
+  Connection* const entered = connection.get();
+  try {
+    core.enter(connection, address);
+    asio::co_spawn(executor, HttpConnection::run(std::move(connection)), asio::detached);
+  } catch (...) {
+    core.leave(entered);
+    throw;
+  }
 }
 
 }  // namespace scolopax::net

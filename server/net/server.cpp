@@ -57,23 +57,38 @@ struct Server::Impl {
   }
 
   asio::awaitable<void> accept() {
-    while (acceptor.is_open()) {
-      error_code error;
-      tcp::socket socket = co_await acceptor.async_accept(asio::make_strand(*core.io),
-                                                          asio::redirect_error(asio::use_awaitable, error));
-      if (error == asio::error::operation_aborted || core.stopping()) break;
-      if (error) {
-        // Probably out of file descriptors: existing connections continue, and some of them will end.
-        core.log("accept: " + error.message());
-        asio::steady_timer pause(strand, kAcceptPause);
-        co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, error));
-        continue;
+    bool failed = false;
+    while (acceptor.is_open() && !core.stopping()) {
+      try {
+        if (std::exchange(failed, false)) {
+          error_code ignored;
+          asio::steady_timer pause(strand, kAcceptPause);
+          co_await pause.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
+        }
+        failed = !co_await acceptOne();
+      } catch (...) {
+        failed = true;
+        core.logFailure("accept");
       }
-      const bool full = !core.makeRoom();
-      if (core.connectionCount() >= core.options.maxConnections + kRefusedAtOnce) continue;
-      socket.set_option(tcp::no_delay(true), error);
-      serveHttp(core, std::move(socket), full);
     }
+  }
+
+  /// False if the next connection should be accepted after a pause only.
+  asio::awaitable<bool> acceptOne() {
+    error_code error;
+    tcp::socket socket = co_await acceptor.async_accept(asio::make_strand(*core.io),
+                                                        asio::redirect_error(asio::use_awaitable, error));
+    if (error == asio::error::operation_aborted || core.stopping()) co_return true;
+    if (error) {
+      // Probably out of file descriptors: existing connections continue, and some of them will end.
+      core.log("accept: " + error.message());
+      co_return false;
+    }
+    const bool full = !core.makeRoom();
+    if (core.connectionCount() >= core.options.maxConnections + kRefusedAtOnce) co_return true;
+    socket.set_option(tcp::no_delay(true), error);
+    serveHttp(core, std::move(socket), full);
+    co_return true;
   }
 
   Core core;
@@ -99,7 +114,7 @@ void Server::upgrade(UpgradeHandler handler) { impl_->core.upgradeHandler = std:
 void Server::start() {
   impl_->bind();
   asio::co_spawn(impl_->strand, impl_->accept(), asio::detached);
-  for (int i = 0; i < kIoThreads; ++i) impl_->threads.emplace_back([this] { impl_->core.io->run(); });
+  for (int i = 0; i < kIoThreads; ++i) impl_->threads.emplace_back([this] { impl_->core.runIo(); });
 }
 
 std::uint16_t Server::port() const { return impl_->boundPort; }

@@ -126,8 +126,8 @@ class WebSocketConnection : public PreparedWebSocket,
   /// Makes the strand check the outbox. Requires the mutex.
   void wake() {
     if (!strand_ || ended_ || woken_) return;
-    woken_ = true;
     asio::post(*strand_, [self = shared_from_this()] { self->pump(); });
+    woken_ = true;
   }
 
   void onAccept(const error_code& error) {
@@ -138,12 +138,28 @@ class WebSocketConnection : public PreparedWebSocket,
   }
 
   void read() {
-    stream_->async_read(
-        buffer_, [self = shared_from_this()](const error_code& error, std::size_t) { self->onRead(error); });
+    try {
+      stream_->async_read(buffer_, [self = shared_from_this()](const error_code& error, std::size_t) {
+        self->onRead(error);
+      });
+    } catch (...) {
+      core_.logFailure("WebSocket");
+      finish();
+    }
   }
 
   void onRead(const error_code& error) {
     if (error) return finish();
+    try {
+      passOn();
+    } catch (...) {
+      core_.logFailure("WebSocket");
+      finish();
+    }
+  }
+
+  /// Passes on the message that has been read. Another one is read when it has been handled.
+  void passOn() {
     if (!stream_->got_text()) {
       close(1003, "only text messages are accepted");
       buffer_.consume(buffer_.size());
@@ -161,13 +177,23 @@ class WebSocketConnection : public PreparedWebSocket,
   void deliver(std::string text) {
     try {
       if (events_.onText) events_.onText(std::move(text));
-    } catch (const std::exception& error) {
-      core_.log(std::string("WebSocket message: ") + error.what());
+    } catch (...) {
+      core_.logFailure("WebSocket message");
       close(1011, "the server failed");
     }
   }
 
   void pump() {
+    try {
+      writeNext();
+    } catch (...) {
+      core_.logFailure("WebSocket");
+      writing_ = false;
+      closeSocket();  // which makes the read fail, too
+    }
+  }
+
+  void writeNext() {
     std::optional<Outbox::Item> item;
     {
       const std::lock_guard lock(mutex_);
@@ -238,14 +264,15 @@ class WebSocketConnection : public PreparedWebSocket,
       outbox_.clear();
     }
     stream_.reset();
-    core_.workers.post(flow_, FairPool::Job([self = shared_from_this()] {
+    core_.workers.post(flow_,
+                       FairPool::Job([self = shared_from_this(), leaving = Leaving(core_, this)]() mutable {
+                         const Leaving last = std::move(leaving);
                          try {
                            if (self->events_.onClose) self->events_.onClose();
-                         } catch (const std::exception& error) {
-                           self->core_.log(std::string("WebSocket close: ") + error.what());
+                         } catch (...) {
+                           self->core_.logFailure("WebSocket close");
                          }
                          self->events_ = {};
-                         self->core_.leave(self.get());
                        }));
   }
 

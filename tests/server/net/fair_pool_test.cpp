@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <mutex>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "tests/server/net/gate.h"
@@ -62,6 +64,26 @@ TEST(FairPool, EndsWithTheJobsThatJobsPost) {
       "a", FairPool::Job([&] { pool.post("b", FairPool::Job([&] { pool.post("a", notes.job("last")); })); }));
   pool.join();
   pool.join();
+  EXPECT_EQ(notes.names(), (std::vector<std::string>{"last"}));
+}
+
+TEST(FairPool, TellsOfJobsThatThrowAndGoesOn) {
+  Notes notes;
+  std::vector<std::string> failures;
+  FairPool pool(1, [&] {
+    try {
+      throw;
+    } catch (const std::exception& error) {
+      failures.emplace_back(error.what());
+    } catch (int number) {
+      failures.push_back(std::to_string(number));
+    }
+  });
+  pool.post("a", FairPool::Job([] { throw std::runtime_error("why"); }));
+  pool.post("a", FairPool::Job([] { throw 42; }));
+  pool.post("a", notes.job("last"));
+  pool.join();
+  EXPECT_EQ(failures, (std::vector<std::string>{"why", "42"}));
   EXPECT_EQ(notes.names(), (std::vector<std::string>{"last"}));
 }
 

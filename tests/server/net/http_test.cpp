@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // HTTP as seen by well-behaved and other clients.
+#include <fcntl.h>
+#include <sys/resource.h>
+
 #include <atomic>
 #include <mutex>
+#include <new>
 
 #include "server/net/server.h"
 #include "tests/server/net/test_client.h"
@@ -38,8 +42,10 @@ class HttpTest : public testing::Test {
                       *request.queryValue("a") + *request.header("x-thing") + request.remoteAddress,
                       {}};
     });
-    server_->route("GET", "/throw",
-                   [](const Request&) -> Response { throw std::runtime_error("the secret cause"); });
+    const auto fails = [](const Request&) -> Response { throw std::runtime_error("the secret cause"); };
+    server_->route("GET", "/throw", fails);
+    for (const RouteKind kind : {RouteKind::quick, RouteKind::takesLong, RouteKind::waiting})
+      server_->route("GET", "/throw/" + std::to_string(int(kind)), fails, kind);
     server_->route("GET", "/split", [](const Request&) {
       return Response{200, "text/plain", "x", {{"X-Bad", "a\r\nX-Injected: b"}}};
     });
@@ -165,6 +171,49 @@ TEST_F(HttpTest, KeepsTheCauseOfAFailureToTheLog) {
     const std::lock_guard lock(logMutex_);
     EXPECT_NE(logged_.find("the secret cause"), std::string::npos);
   }
+  EXPECT_EQ(client.request("GET /hello/you HTTP/1.1").status, 200);
+}
+
+TEST_F(HttpTest, EndsAConnectionWhenEvenTheRefusalFails) {
+  Options options = quickOptions();
+  options.log = [this](const std::string& line) {
+    const std::lock_guard lock(logMutex_);
+    logged_ += line + "\n";
+  };
+  options.problem = [](int, const std::string&) -> Response { throw std::runtime_error("no refusal"); };
+  start(options);
+  for (const RouteKind kind : {RouteKind::quick, RouteKind::takesLong, RouteKind::waiting})
+    EXPECT_EQ(TestClient(port()).request("GET /throw/" + std::to_string(int(kind)) + " HTTP/1.1").status, 0);
+  {
+    const std::lock_guard lock(logMutex_);
+    for (int kind = 0; kind < 3; ++kind)
+      EXPECT_NE(logged_.find("GET /throw/" + std::to_string(kind) + ": the secret cause\n"),
+                std::string::npos);
+    EXPECT_NE(logged_.find("connection: no refusal\n"), std::string::npos);
+  }
+  EXPECT_EQ(TestClient(port()).request("GET /hello/you HTTP/1.1").status, 200);
+  server_->stop(milliseconds(50));  // does not wait for them
+}
+
+TEST_F(HttpTest, GoesOnAcceptingAfterAFailure) {
+  // The log has no memory for the first line that it gets: that there are no descriptors left.
+  const auto lines = std::make_shared<std::atomic<int>>(0);
+  Options options = quickOptions();
+  options.log = [lines](const std::string&) {
+    if ((*lines)++ == 0) throw std::bad_alloc();
+  };
+  start(options);
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
+  const int next = ::open("/dev/null", O_RDONLY);
+  ASSERT_GE(next, 0);
+  ::close(next);
+  const rlimit less{rlim_t(next) + 1, before.rlim_max};  // one more, for the client
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &less), 0);
+  TestClient client(port());
+  const bool failed = eventually([&] { return *lines >= 2; });
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &before), 0);
+  EXPECT_TRUE(failed);
   EXPECT_EQ(client.request("GET /hello/you HTTP/1.1").status, 200);
 }
 

@@ -404,6 +404,40 @@ TEST_F(WebSocketTest, StopSaysGoingAwayAndCutsWhoStalls) {
   EXPECT_EQ(closed_, 2) << "every onClose ran before stop returned";
 }
 
+TEST_F(WebSocketTest, StopWaitsForNobodyWhoseHandlersThrowAnything) {
+  std::mutex mutex;
+  std::string logged;
+  Options options = quickOptions();
+  options.log = [&](const std::string& line) {
+    const std::lock_guard lock(mutex);
+    logged += line + "\n";
+  };
+  Server server(options);
+  server.upgrade([](const Request&, const std::shared_ptr<WebSocket>&) {
+    return WebSocketEvents{[](const std::string&) { throw 1; }, [] { throw 2; }};
+  });
+  server.start();
+  TestClient client(server.port());
+  EXPECT_EQ(client.upgrade("/stream").status, 101);
+  client.sendText("anything");
+  EXPECT_EQ(client.closeCode(), 1011);
+  TestClient other(server.port());
+  EXPECT_EQ(other.upgrade("/stream").status, 101);
+  server.stop(milliseconds(50));
+  EXPECT_EQ(logged,
+            "WebSocket message: not a std::exception\nWebSocket close: not a std::exception\n"
+            "WebSocket close: not a std::exception\n");
+}
+
+TEST_F(WebSocketTest, StopWaitsForNoUpgradeThatCouldNotBeRefused) {
+  Options options = quickOptions();
+  options.problem = [](int, const std::string&) -> Response { throw std::runtime_error("no refusal"); };
+  start(options);
+  TestClient client(port());
+  EXPECT_EQ(client.upgrade("/throw").status, 0);
+  server_->stop(milliseconds(50));
+}
+
 TEST_F(WebSocketTest, HandlesOutliveTheServer) {
   start();
   const auto client = connect();
