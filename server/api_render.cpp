@@ -151,7 +151,8 @@ struct Rendered {
   decltype(net::Response::headers) headers;  ///< state how it was made
 };
 
-/// The picture of the scene. The slot and the memory of the film are free again when this returns.
+/// The picture of the scene, whose stop.seconds is at most the server's limit. The slot and the memory of the
+/// film are free again when this returns.
 Rendered renderPicture(const ApiContext& context, std::atomic<int>& running, const net::Request& request,
                        const std::shared_ptr<const ResolvedScene>& scene) {
   const double limit = context.config.maxRenderSeconds;
@@ -169,7 +170,7 @@ Rendered renderPicture(const ApiContext& context, std::atomic<int>& running, con
     // The scene's time limit may end a pass in the middle, except the first one, which may take up to the
     // server's limit.
     const bool timed = scene->stop.seconds > 0 && renderer->samples() > 0;
-    const double until = timed ? std::min(scene->stop.seconds, limit) : limit;
+    const double until = timed ? scene->stop.seconds : limit;
     // Clamped before the conversion, because a long duration would overflow nanoseconds.
     const auto budget = std::chrono::duration<double>(std::clamp(until - seconds(), 0.0, kSlice));
     const auto slice = std::chrono::duration_cast<std::chrono::nanoseconds>(budget);
@@ -179,7 +180,7 @@ Rendered renderPicture(const ApiContext& context, std::atomic<int>& running, con
     }
     throwIfUnwanted(context, request);
     if (seconds() < until) continue;
-    if (timed && until < limit) break;
+    if (timed) break;
     throw tooLate(limit, renderer->samples());
   }
   const auto milliseconds = std::int64_t(seconds() * 1000);

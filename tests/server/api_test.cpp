@@ -85,6 +85,19 @@ TEST(Api, GivesTheSameBytesForTheSameRender) {
   EXPECT_NE(headerOf(first, "Scolopax-Scene"), headerOf(other, "Scolopax-Scene"));
 }
 
+TEST(Api, EndsARenderAtATimeThatIsAlsoTheServersLimit) {
+  Api api;
+  api.config.maxRenderSeconds = 0.2;
+  int passes = 0;
+  api.workshop.control->duringPass = [&] {
+    if (++passes > 1) std::this_thread::sleep_for(300ms);
+  };
+  const auto response =
+      api.call("POST", "/api/v1/render", R"({"image": {"width": 9, "height": 9}, "stop": {"seconds": 0.2}})");
+  EXPECT_EQ(response.status, 200);
+  EXPECT_NE(headerOf(response, "Scolopax-Samples"), "0");
+}
+
 TEST(Api, EndsTheMeasuringOfAnErrorWithTheTimeForTheRender) {
   Api api;
   api.config.maxRenderSeconds = 0.5;
