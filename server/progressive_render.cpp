@@ -120,11 +120,19 @@ std::optional<TimePoint> ProgressiveRender::dueAt() const {
   return std::nullopt;
 }
 
+/// Whether the film is one of the requested scene, though maybe of another size.
+bool ProgressiveRender::filmGoesOn(const RenderRequest& request) const {
+  return film_.scene && makeSameFilm(*film_.scene, *request.scene);
+}
+
 double ProgressiveRender::wantedDivisor(const RenderRequest& request, int editedOthers) {
   const Scene& scene = request.scene->render;
   const auto pixels = std::uint64_t(scene.width) * std::uint64_t(scene.height);
   if (request.interactive) return resolution_.whileEdited(pixels, editedOthers);
-  const bool shown = film_.shown.revision == request.revision;
+  const bool goesOn = filmGoesOn(request);
+  if (goesOn && film_.divisor == 1) return 1;
+  const bool shown =
+      film_.shown.revision == request.revision || (goesOn && film_.shown.revision == film_.revision);
   const bool reducedShown = shown && film_.shown.reduced;
   if (!request.pollSamples.empty() || (shown && !reducedShown)) return 1;
   return resolution_.atRest(pixels, reducedShown ? std::optional(film_.divisor) : std::nullopt);
@@ -217,7 +225,7 @@ void ProgressiveRender::sceneBuilt(PassResult& result) {
     film_.shown = {};  // earlier frames do not count, since they have no AOVs
   }
   if (build->stats.filmReset || build->record) filmSeconds_ = 0;
-  if (request.interactive || film_.revision != request.revision) reduced_.reset();
+  if (request.interactive || !filmGoesOn(request)) reduced_.reset();
   film_.scene = request.scene;
   film_.revision = request.revision;
   film_.divisor = build->divisor;

@@ -97,6 +97,7 @@ class ProgressiveRender {
   bool finished(const RenderRequest& request) const;
   bool showDue(const RenderRequest& request) const;
   bool pickable(const RenderRequest& request) const;
+  bool filmGoesOn(const RenderRequest& request) const;
   double wantedDivisor(const RenderRequest& request, int editedOthers);
   std::uint64_t filmSize() const;
   void fail(const RenderRequest& request, const Error& error);
@@ -140,8 +141,9 @@ class ProgressiveRender {
   bool quick_ = false;      ///< the last part of a pass took no longer than its turn
   double filmSeconds_ = 0;  ///< spent on the film's samples
   std::uint32_t rebuildUs_ = 0, renderUs_ = 0;
-  std::shared_ptr<const Image> reduced_;  ///< this revision's last reduced picture, while it is needed
-  double sampleError_ = 0;                ///< estimated RMSE of one sample while edits arrived; 0: not known
+  std::shared_ptr<const Image>
+      reduced_;             ///< the last reduced picture of the film's scene, while it is needed
+  double sampleError_ = 0;  ///< estimated RMSE of one sample while edits arrived; 0: not known
 };
 
 }  // namespace scolopax::server

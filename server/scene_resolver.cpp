@@ -233,7 +233,9 @@ protocol::Scene pictureOf(protocol::Scene resolved) {
 
 }  // namespace
 
-bool samePicture(const protocol::Scene& a, const protocol::Scene& b) { return pictureOf(a) == pictureOf(b); }
+bool makeSameFilm(const ResolvedScene& a, const ResolvedScene& b) {
+  return a.dataset == b.dataset && makeSameFilm(a.render, b.render);
+}
 
 json pictureJson(const protocol::Scene& resolved) {
   json picture = protocol::toJson(pictureOf(resolved));

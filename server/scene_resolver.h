@@ -46,8 +46,9 @@ struct ResolvedScene {
   MemoryBudget::Share memory = {};
 };
 
-/// Whether two resolved scenes give the same picture at a given number of samples.
-bool samePicture(const protocol::Scene& a, const protocol::Scene& b);
+/// Whether two scenes make the same film: an edit from one to the other changes names, the stop rule or the
+/// background, if anything.
+bool makeSameFilm(const ResolvedScene& a, const ResolvedScene& b);
 /// The parts of the resolved scene that determine the picture at a given number of samples.
 nlohmann::json pictureJson(const protocol::Scene& resolved);
 

@@ -72,7 +72,7 @@ Session::SceneState Session::edit(const EditOrigin& origin, const Resolve& resol
   // Everything that takes time is done without the mutex.
   lock.unlock();
   auto next = resolve(*before);
-  const bool pictureChanges = !samePicture(next->resolved, before->resolved);
+  const bool filmChanges = !makeSameFilm(*next, *before);
   lock.lock();
   // The message for the other viewers; most sessions have only one. A query for AOVs may begin a revision
   // meanwhile.
@@ -92,7 +92,7 @@ Session::SceneState Session::edit(const EditOrigin& origin, const Resolve& resol
   lastUsed_ = hooks_.now();
   if (aovs_ && (lastUsed_ - lastAovs_ >= kKeepAovs || resolver_->tooLarge(scene_->render, true)))
     aovs_ = false;
-  if (pictureChanges) {
+  if (filmChanges) {
     lastEdit_ = lastUsed_;
     editRevision_ = revision_;
     hooks_.interruptRender();

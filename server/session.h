@@ -79,7 +79,7 @@ struct RenderRequest {
   bool wanted = false;       ///< a viewer or a script wants pictures, and the scene can be rendered
   bool interactive = false;  ///< edits arrive
   TimePoint interactiveEnd;  ///< when `interactive` ends if no further edit comes
-  std::uint32_t edit = 0;    ///< revision of the last edit that changed the picture; 0 if nobody watches
+  std::uint32_t edit = 0;    ///< revision of the last edit that changed the film; 0 if nobody watches
   std::vector<std::uint32_t> pollSamples;  ///< sample counts that scripts wait for
   bool aovs = false;                       ///< a script has asked for AOVs
   std::optional<TimePoint> retryAt;        ///< when to retry after a lack of memory
@@ -207,7 +207,7 @@ class Session {
       frameCame_;  ///< notified of a frame, a pick's answer, a failure, an edit or the end
   std::shared_ptr<const ResolvedScene> scene_;
   std::uint32_t revision_ = 1;
-  std::optional<TimePoint> lastEdit_;  ///< the last edit that changed the picture
+  std::optional<TimePoint> lastEdit_;  ///< the last edit that changed the film
   std::uint32_t editRevision_ = 0;     ///< its revision
   TimePoint lastUsed_;
   bool closed_ = false;

@@ -11,13 +11,6 @@
 namespace scolopax {
 namespace {
 
-/// Whether both scenes make the same film. They may differ only in the background, which is added to the
-/// finished image.
-bool samePicture(Scene a, const Scene& b) {
-  a.background = b.background;
-  return a == b;
-}
-
 /// Whether the bound of all channels together is the sum of their bounds.
 bool sumsExtinction(BlendMode blend) { return blend != BlendMode::max && blend != BlendMode::mix; }
 
@@ -59,7 +52,5 @@ RenderPlan::RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene,
   rebuilt_.rebuildMs =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
-
-bool RenderPlan::makesSamePicture(const Scene& scene) const { return samePicture(scene_, scene); }
 
 }  // namespace scolopax

@@ -29,8 +29,6 @@ class RenderPlan : public std::enable_shared_from_this<RenderPlan> {
 
   /// Whether building the next plan, of `scene`, would take longer than a few milliseconds.
   bool nextTakesLong(const Scene& scene) const { return channels_->nextTakesLong(scene); }
-  /// Whether `scene` gives the same film as this plan.
-  bool makesSamePicture(const Scene& scene) const;
   /// What had to be rebuilt because it could not be shared.
   const RebuildStats& rebuilt() const { return rebuilt_; }
   const Scene& scene() const { return scene_; }

@@ -93,6 +93,10 @@ struct Scene {
   bool operator==(const Scene&) const = default;
 };
 
+/// Whether both scenes make the same film. They may differ only in the background, which is added to the
+/// finished image.
+bool makeSameFilm(const Scene& a, const Scene& b);
+
 inline constexpr int kMaxImageSide = 16384;
 inline constexpr double kLeastStep = 0.01;  ///< other than 0
 

@@ -195,7 +195,7 @@ class Engine final : public Renderer {
       // Tries the previous choice first: if nothing else has changed, the film is kept.
       chosen.method = choice.method;
       chosen.step = sceneStep(choice.resolution);
-      if (!plan_ || !automaticChosen_ || !plan_->makesSamePicture(chosen)) {
+      if (!plan_ || !automaticChosen_ || !makeSameFilm(plan_->scene(), chosen)) {
         makeNext();
         choice = chooseAutomatically(*launcher_, *plan, stop);
       }
@@ -204,7 +204,7 @@ class Engine final : public Renderer {
     }
     makeNext();
     launcher_->upload(plan, stop);
-    stats.filmReset = !plan_ || automatic != automaticChosen_ || !plan_->makesSamePicture(chosen);
+    stats.filmReset = !plan_ || automatic != automaticChosen_ || !makeSameFilm(plan_->scene(), chosen);
     plan_ = std::move(plan);
     automatic_ = std::move(choice);
     automaticChosen_ = automatic;

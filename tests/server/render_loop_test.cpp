@@ -78,6 +78,32 @@ TEST(RenderLoop, GoesOnWithTheFilmWhenOnlyTheStopRuleChanges) {
   EXPECT_EQ(workshop.control->passes.size(), 4u);
 }
 
+TEST(RenderLoop, GoesOnWithAWholeFilmAfterEditsThatLeaveItAsItIsHoweverLongAPassTakes) {
+  Workshop workshop;
+  workshop.control->secondsPerPixel = 1e-4;  // 12 s a pass
+  const auto session =
+      workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}, {"stop", {{"samples", 2}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.steps(4);
+  ASSERT_EQ(samplesOf(*viewer), (std::vector<std::uint32_t>{1, 2}));
+  std::uint32_t revision = 1;
+  for (const json& patch : {json{{"channels", {{"0", {{"name", "nucleus"}}}}}},
+                            json{{"image", {{"background", "#ff8000"}}}}, json{{"stop", {{"samples", 4}}}}}) {
+    session->patch(patch, {});
+    ++revision;
+    workshop.steps(4);
+    EXPECT_EQ(viewer->frames.back().info.revision, revision);
+    EXPECT_EQ(viewer->frames.back().info.samples, revision < 4 ? 2u : 4u);
+    EXPECT_TRUE(viewer->frames.back().info.final);
+  }
+  for (const auto& frame : viewer->frames) {
+    EXPECT_EQ(frame.height, 300);
+    EXPECT_FALSE(frame.info.interactive);
+  }
+  EXPECT_EQ(workshop.control->passes.size(), 4u);
+}
+
 TEST(RenderLoop, ConfirmsAnEditThatChangesNothing) {
   Workshop workshop;
   const auto session = workshop.store.create({{"stop", {{"samples", 2}}}});
@@ -205,6 +231,25 @@ TEST(RenderLoop, GetsFromSmallToWholeInStepsWhereAPassTakesLong) {
   for (const int i : {0, 1, 2, 3}) EXPECT_EQ(viewer->frames[std::size_t(i)].info.interactive, i < 2);
   EXPECT_EQ(viewer->frames[3].info.samples, 2u);
   EXPECT_EQ(session->waitForFrame({}, 0ms)->height, 300);
+}
+
+TEST(RenderLoop, GetsFromSmallToWholeNoLaterForEditsThatLeaveTheFilmAsItIs) {
+  Workshop workshop;
+  workshop.control->secondsPerPixel = 1e-4;
+  const auto session = workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.step();
+  session->patch(seedPatch(1), {});
+  workshop.step();
+  workshop.clock.advance(Session::kInteractiveTime);
+  std::vector<int> heights;
+  for (const char* name : {"a", "b", "c"}) {
+    workshop.step();
+    heights.push_back(viewer->frames.back().height);
+    session->patch({{"channels", {{"0", {{"name", name}}}}}}, {});
+  }
+  EXPECT_EQ(heights, (std::vector<int>{38, 150, 300}));
 }
 
 TEST(RenderLoop, MixesTheSmallPictureIntoTheNoisyWholeOneInTheProportionOfLeastError) {

@@ -51,10 +51,11 @@ TEST(SceneResolver, FillsEveryValueOfAnEmptyScene) {
 }
 
 TEST(SceneResolver, LeavesStopRulesOutOfWhatDecidesThePicture) {
-  const auto plain = resolver().replace(json::object());
-  const auto fine = resolver().replace({{"stop", {{"error", 1e-4}}}});
+  const auto resolve = resolver();
+  const auto plain = resolve.replace(json::object());
+  const auto fine = resolve.replace({{"stop", {{"error", 1e-4}}}});
   EXPECT_EQ(fine->stop.error, 1e-4);
-  EXPECT_TRUE(samePicture(fine->resolved, plain->resolved));
+  EXPECT_TRUE(makeSameFilm(*fine, *plain));
 }
 
 TEST(SceneResolver, ResolvesAResolvedSceneToItself) {
@@ -319,7 +320,7 @@ TEST(SceneResolver, TakesTheRangeAndTheFactorThatAreGiven) {
       resolverOfSquares().replaceNow({{"channels", {json::object(), {{"gradientOpacity", curve}}}}});
   EXPECT_EQ(steepnessOf(scene, 1), (GradientOpacity{3, 0.5, {{0.25, 1}, {0.75, 0}}}));
   EXPECT_EQ(toJson(scene->resolved)["channels"][1]["gradientOpacity"], curve);
-  EXPECT_FALSE(samePicture(scene->resolved, resolverOfSquares().replaceNow(json::object())->resolved));
+  EXPECT_FALSE(makeSameFilm(scene->render, resolverOfSquares().replaceNow(json::object())->render));
   EXPECT_EQ(errorOf({{"channels", {{{"gradientOpacity", {{"range", {1}}}}}}}}),
             std::pair(422, std::string("/channels/0/gradientOpacity/range")));
 }
@@ -378,13 +379,16 @@ TEST(SceneResolver, KnowsWhatLeavesThePictureAsItIs) {
   const auto base = resolve.replace(json::object());
   const auto looksTheSame = [&](const json& patch) {
     const auto patched = resolve.patch(*base, patch);
-    EXPECT_EQ(pictureJson(patched->resolved) == pictureJson(base->resolved),
-              samePicture(patched->resolved, base->resolved));
-    return samePicture(patched->resolved, base->resolved);
+    EXPECT_EQ(pictureJson(patched->resolved) == pictureJson(base->resolved), makeSameFilm(*patched, *base));
+    return makeSameFilm(*patched, *base);
   };
   EXPECT_TRUE(looksTheSame({{"stop", {{"samples", 9}}}}));
   EXPECT_TRUE(looksTheSame({{"channels", {{"0", {{"name", "nucleus"}}}}}}));
   EXPECT_FALSE(looksTheSame({{"channels", {{"0", {{"gamma", 3}}}}}}));
+  EXPECT_FALSE(looksTheSame({{"dataset", "other"}}));
+  const auto onWhite = resolve.patch(*base, {{"image", {{"background", "#ffffff"}}}});
+  EXPECT_NE(pictureJson(onWhite->resolved), pictureJson(base->resolved));
+  EXPECT_TRUE(makeSameFilm(*onWhite, *base));
 }
 
 TEST(SceneResolver, SharesTheChannelsThatAPatchLeavesAsTheyAre) {
