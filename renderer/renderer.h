@@ -83,8 +83,9 @@ class Renderer {
   /// Samples per pixel in the film.
   virtual std::uint32_t samples() const = 0;
   /// Estimated RMSE of the current picture over linear premultiplied RGBA. Includes noise and, for quadrature
-  /// that was chosen automatically or has at least 16 samples, bias. NaN with fewer than two samples. Throws
-  /// Error(cancelled) soon after `stop` is requested, but only while errorTakesLong() is true.
+  /// that was chosen automatically or has at least 16 samples, bias. NaN with fewer than two samples, and
+  /// where the bias is not known because measuring it would take too much work. Throws Error(cancelled) soon
+  /// after `stop` is requested, but only while errorTakesLong() is true.
   virtual double estimatedError(std::stop_token stop = {}) const = 0;
   /// Whether estimatedError() would have to measure the bias, which is slow. Once measured, the bias is kept
   /// until the film is reset.

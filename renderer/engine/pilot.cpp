@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -35,11 +36,13 @@ class Ladder {
   /// Begins at resolution number `first`, and leaves out those with steps below `leastStep`; there are always
   /// whole voxel cells.
   Ladder(Thumbnails& thumbnails, int first, double leastStep) : leastStep_(leastStep), next_(first) {
-    while (next_ <= kFinestThumbnail) render(thumbnails);
+    while (complete_ && next_ <= kFinestThumbnail) render(thumbnails);
     // In dense matter, halves of voxel cells may differ from whole ones, and finer parts from those as much.
-    if (isRough()) render(thumbnails);
+    if (complete_ && isRough()) render(thumbnails);
   }
 
+  /// Whether the thumbnails have not taken too much work. The rest requires it.
+  bool complete() const { return complete_; }
   int size() const { return int(pictures_.size()); }
   const Resolution& resolution(int i) const { return at(i).resolution; }
   double variance(int i) const { return scolopax::variance(at(i)); }
@@ -78,7 +81,10 @@ class Ladder {
   const Pictures& at(int i) const { return pictures_[std::size_t(i)]; }
   void render(Thumbnails& thumbnails) {
     const Resolution resolution = resolutionAt(next_++);
-    if (resolution.step >= leastStep_) pictures_.push_back(thumbnails.render(resolution, kPilotSamples));
+    if (resolution.step < leastStep_) return;
+    std::optional<Pictures> pictures = thumbnails.render(resolution, kPilotSamples);
+    complete_ = pictures.has_value();
+    if (pictures) pictures_.push_back(std::move(*pictures));
   }
   /// Whether the last two pictures certainly differ by more than is usually wanted.
   bool isRough() const {
@@ -95,6 +101,7 @@ class Ladder {
   std::vector<Pictures> pictures_;
   double leastStep_;
   int next_;  // resolution after those of the thumbnails
+  bool complete_ = true;
 };
 
 /// The resolutions through which a film is corrected, the base first, and the work that they need: the square
@@ -132,9 +139,10 @@ Path cheapestPath(const Ladder& ladder) {
 AutomaticChoice chooseAutomatically(Launcher& launcher, const RenderPlan& plan, const std::stop_token& stop) {
   // Shadow rays, if there are any, cost the most.
   const Method quadrature = plan.scene().shadows ? Method::hybrid : Method::raymarch;
-  Thumbnails thumbnails(launcher, plan, quadrature, true, stop);
+  Thumbnails thumbnails(launcher, plan, quadrature, true, kMostChoiceWork, stop);
   // Equal steps between the faces of nearest voxels are whole cells, or parts of them.
   const Ladder ladder(thumbnails, plan.view().nearest ? kEqualSteps : 0, finestEstimatedStep(plan.grid()));
+  if (!ladder.complete()) return {Method::superposed, resolutionOf(Scene()), {}, thumbnails.rays()};
   const Path path = cheapestPath(ladder);
 
   const int base = path.resolutions.front();
@@ -156,10 +164,12 @@ AutomaticChoice chooseAutomatically(Launcher& launcher, const RenderPlan& plan, 
   AutomaticChoice choice{quadrature, ladder.resolution(base),
                          scheduleLevels(ladder.variance(base) / gain, levels), thumbnails.rays()};
   if (rest <= kBiasLeft && work <= 2 * baseWork) return choice;
-  Thumbnails tracked(launcher, plan, Method::superposed, true, stop);
-  const Pictures tracker = tracked.render({}, kPilotSamples);
-  if (rest > kBiasLeft || std::sqrt(variance(tracker) * tracker.fetches * kTrackerFetch) < work)
-    choice = {Method::superposed, resolutionOf(Scene()), {}, 0};
+  Thumbnails tracked(launcher, plan, Method::superposed, true, kMostChoiceWork, stop);
+  const std::optional<Pictures> tracker = tracked.render({}, kPilotSamples);
+  const auto isCheaper = [&] {
+    return tracker && std::sqrt(variance(*tracker) * tracker->fetches * kTrackerFetch) < work;
+  };
+  if (rest > kBiasLeft || isCheaper()) choice = {Method::superposed, resolutionOf(Scene()), {}, 0};
   choice.rays = thumbnails.rays() + tracked.rays();
   return choice;
 }

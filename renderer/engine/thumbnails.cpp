@@ -14,6 +14,12 @@
 namespace scolopax {
 namespace {
 
+/// Rows that are rendered at once while it is not known what they cost: those of a packet of rays.
+constexpr int kPacketRows = 4;
+/// A row is expected to take at most so many times the work of the costliest one so far. Rows differ, and so
+/// do resolutions.
+constexpr std::uint64_t kRowGrowth = 64;
+
 /// Mean over pixels and components of the variance over n samples value(sample, pixel).
 template <class Value>
 double meanVariance(std::size_t n, std::size_t pixels, const Value& value) {
@@ -34,10 +40,11 @@ double meanVariance(std::size_t n, std::size_t pixels, const Value& value) {
 }  // namespace
 
 Thumbnails::Thumbnails(Launcher& launcher, const RenderPlan& plan, Method method, bool spread,
-                       const std::stop_token& stop)
+                       std::uint64_t mostWork, const std::stop_token& stop)
     : launcher_(launcher),
       plan_(plan),
       method_(method),
+      mostWork_(mostWork),
       view_(plan.view()),
       onStop_(stop, RaiseFlag{&stopped_}) {
   const Scene& scene = plan.scene();
@@ -52,23 +59,55 @@ Thumbnails::Thumbnails(Launcher& launcher, const RenderPlan& plan, Method method
   view_.stratum = stratumOf(method);
 }
 
-Pictures Thumbnails::render(const Resolution& resolution, std::size_t count) {
+/// As many rows as should not pass the limit, or those of a packet, which may pass it by their own work.
+int Thumbnails::rowsAtOnce() const {
+  if (workOfRow_ == 0) return kPacketRows;
+  const std::uint64_t rows = (mostWork_ - work_) / (kRowGrowth * workOfRow_);
+  if (rows >= std::uint64_t(view_.height)) return view_.height;
+  return std::max(1, int(rows) / kPacketRows) * kPacketRows;
+}
+
+/// Renders rows of one sample into `pixels`, those of a whole picture.
+Thumbnails::Work Thumbnails::renderRows(std::uint32_t sample, int firstRow, int rows,
+                                        std::vector<glm::vec4>& pixels) {
+  const auto width = std::size_t(view_.width), first = width * std::size_t(firstRow),
+             count = width * std::size_t(rows);
+  done_.assign(pixels.size(), 1);
+  std::fill_n(done_.begin() + std::ptrdiff_t(first), count, std::uint8_t(0));
+  cost_.assign(pixels.size(), {});
+  const auto number = sampleNumber(Sampling::independent, sample);
+  const Pass pass{
+      &plan_,       method_, view_,        number,    pixels.data(),
+      cost_.data(), nullptr, done_.data(), &stopped_, std::chrono::steady_clock::time_point::max()};
+  if (!launcher_.launch(pass)) throw Error(ErrorCode::cancelled, "rendering thumbnails was cancelled");
+  Work work;
+  for (const kernel::SampleCost& ray : cost_) {
+    work.fetches += ray.fetches;
+    work.cellSteps += ray.cellSteps;
+  }
+  rays_ += count;
+  work_ += work.all();
+  workOfRow_ = std::max(workOfRow_, work.all() / std::uint64_t(rows));
+  return work;
+}
+
+std::optional<Pictures> Thumbnails::render(const Resolution& resolution, std::size_t count) {
   setResolution(view_, resolution);
   const std::size_t pixels = std::size_t(view_.width) * std::size_t(view_.height);
-  std::vector<kernel::SampleCost> cost(pixels);
   Pictures pictures{resolution, 0, {}};
+  std::uint64_t fetches = 0;
+  if (work_ > mostWork_) return std::nullopt;
   while (pictures.samples.size() < count) {
-    const auto number = sampleNumber(Sampling::independent, std::uint32_t(pictures.samples.size()));
-    std::vector<glm::vec4>& sample = pictures.samples.emplace_back(pixels);
-    std::vector<std::uint8_t> done(pixels, 0);
-    const Pass pass{
-        &plan_,      method_, view_,       number,    sample.data(),
-        cost.data(), nullptr, done.data(), &stopped_, std::chrono::steady_clock::time_point::max()};
-    if (!launcher_.launch(pass)) throw Error(ErrorCode::cancelled, "the bias estimate was cancelled");
-    rays_ += pixels;
+    const auto sample = std::uint32_t(pictures.samples.size());
+    std::vector<glm::vec4>& picture = pictures.samples.emplace_back(pixels);
+    for (int row = 0; row < view_.height;) {
+      const int rows = std::min(rowsAtOnce(), view_.height - row);
+      fetches += renderRows(sample, row, rows, picture).fetches;
+      if (work_ > mostWork_) return std::nullopt;
+      row += rows;
+    }
   }
-  for (const kernel::SampleCost& ray : cost) pictures.fetches += double(ray.fetches);
-  pictures.fetches /= double(count * pixels);
+  pictures.fetches = double(fetches) / double(count * pixels);
   return pictures;
 }
 

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Limits on small pictures of a scene: they stop when cancelled, and their steps are no finer than a ray
-// allows.
+// Limits on small pictures of a scene: they stop when cancelled, their steps are no finer than a ray allows,
+// and they take no more than a certain amount of work.
 #include "renderer/engine/step_bias.h"
 
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "renderer/core/error.h"
 #include "renderer/engine/pilot.h"
+#include "renderer/renderer.h"
 #include "tests/support/volumes.h"
 
 namespace scolopax {
@@ -95,6 +97,86 @@ TEST(StepBias, MarchesNoFinerThanTheSmallestStepOfARay) {
   EXPECT_GT(biasAt(0.01), 0);
   EXPECT_EQ(biasAt(0.01), biasAt(0.04));
   EXPECT_LT(biasAt(0.04), biasAt(2));
+}
+
+/// Says that every ray takes so much work, but does none: all pixels are equal.
+class CostlyLauncher : public Launcher {
+ public:
+  CostlyLauncher(std::uint32_t workOfRay, std::uint64_t* work) : workOfRay_(workOfRay), work_(work) {}
+  std::string_view name() const override { return "costly"; }
+  void run(const std::function<void()>& f) override { f(); }
+  void upload(const std::shared_ptr<const RenderPlan>&, const std::stop_token&) override {}
+  bool uploadTakesLong(const RenderPlan&, const Scene&) const override { return false; }
+  bool launch(const Pass& pass) override {
+    for (int i = 0; i < pass.scene.width * pass.scene.height; ++i) {
+      if (pass.done[i]) continue;
+      pass.done[i] = 1;
+      pass.pixels[i] = glm::vec4(0.5f);
+      if (!pass.cost) continue;
+      pass.cost[i].fetches += workOfRay_ / 4;
+      pass.cost[i].cellSteps += workOfRay_ - workOfRay_ / 4;
+      *work_ += workOfRay_;
+    }
+    return true;
+  }
+
+ private:
+  const std::uint32_t workOfRay_;
+  std::uint64_t* const work_;
+};
+
+/// Work of a ray of which a thousand are too many, and that of the four rows that are rendered at once.
+constexpr std::uint32_t kMuch = 1 << 24;
+constexpr std::uint64_t kMuchAtOnce = 4 * 24 * std::uint64_t(kMuch);
+
+std::shared_ptr<const Volume> fewVoxels() {
+  const glm::ivec3 dims(4, 4, 4);
+  return volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int x, int y, int z) { return x + y + z; }));
+}
+
+TEST(StepBias, IsNotKnownWhereItTakesTooMuchWork) {
+  const auto volume = fewVoxels();
+  Scene scene = frontScene(*volume, 100, 100);
+  scene.method = Method::raymarch;
+  const RenderPlan plan(volume, scene);
+  std::uint64_t little = 0, much = 0;
+  CostlyLauncher cheap(1 << 10, &little), costly(kMuch, &much);
+  EXPECT_EQ(estimateBias(cheap, plan), 0);
+  EXPECT_EQ(little, 3 * 8 * 24 * 24 * std::uint64_t(1 << 10));
+  EXPECT_TRUE(std::isnan(estimateBias(costly, plan)));
+  EXPECT_GT(much, kMostBiasWork);
+  EXPECT_LE(much, kMostBiasWork + kMuchAtOnce);
+}
+
+TEST(Automatic, TakesTheTrackerWhereItsChoiceTakesTooMuchWork) {
+  const auto volume = fewVoxels();
+  const RenderPlan plan(volume, frontScene(*volume, 100, 100));
+  std::uint64_t much = 0;
+  CostlyLauncher costly(kMuch, &much);
+  EXPECT_EQ(chooseAutomatically(costly, plan).method, Method::superposed);
+  EXPECT_GT(much, kMostChoiceWork);
+  EXPECT_LE(much, kMostChoiceWork + kMuchAtOnce);
+}
+
+TEST(Renderer, DoesNotKnowTheErrorOfAPictureWhoseBiasTakesTooMuchWork) {
+  const auto volume = fewVoxels();
+  std::uint64_t much = 0;
+  const auto renderer = makeRenderer(std::make_unique<CostlyLauncher>(kMuch, &much), volume);
+  Scene scene = frontScene(*volume, 100, 100);
+  scene.method = Method::raymarch;
+  renderer->setScene(scene);
+  while (renderer->samples() < 15) renderer->renderSample(kNever);
+  EXPECT_EQ(renderer->estimatedError(), 0);
+  renderer->renderSample(kNever);
+  EXPECT_TRUE(renderer->errorTakesLong());
+  EXPECT_TRUE(std::isnan(renderer->estimatedError()));
+  EXPECT_FALSE(renderer->errorTakesLong());
+  EXPECT_TRUE(std::isnan(renderer->estimatedError()));
+  scene.method = Method::automatic;
+  renderer->setScene(scene);
+  EXPECT_EQ(renderer->choice().method, Method::superposed);
+  while (renderer->samples() < 16) renderer->renderSample(kNever);
+  EXPECT_EQ(renderer->estimatedError(), 0);
 }
 
 }  // namespace
