@@ -93,8 +93,9 @@ struct Application::Impl {
   std::stop_source abortRequests;
   const Now now = [] { return std::chrono::steady_clock::now(); };
   LoopThread renderThread, watchThread, encodeThread;
-  // Separate, so that short jobs do not wait for long ones.
-  BackgroundThreads pictures, passes{std::max<std::size_t>(1, processors() / 2)}, builds;
+  // Separate, so that short jobs do not wait for long ones: a part of a pass is short, measuring an error
+  // takes many times longer.
+  BackgroundThreads pictures, passes{std::max<std::size_t>(1, processors() / 2)}, errors, builds;
   // Few threads, so that encoding for one client does not delay the frames of others.
   BackgroundThreads encoders{std::min<std::size_t>(2, processors())};
   Metrics metrics;
@@ -135,6 +136,7 @@ struct Application::Impl {
                     log,
                     pictures,
                     passes,
+                    errors,
                     builds,
                     [this] { renderThread.wake(); },
                     memory,

@@ -321,7 +321,7 @@ void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
   picture_->sampleError = sampleError_;
   const auto make = [picture = picture_, renderer = renderer_, pixels = filmSize(), memory = context_.memory](
                         const std::stop_token& stop) { picture->make(*renderer, pixels, memory, stop); };
-  Background* const background = renderer_->errorTakesLong() ? &context_.passes
+  Background* const background = renderer_->errorTakesLong() ? &context_.errors
                                  : renderer_->filmIsLarge()  ? &context_.pictures
                                                              : nullptr;
   perform(background, make, &ProgressiveRender::pictureMade, result);
@@ -334,7 +334,8 @@ void ProgressiveRender::pictureMade(PassResult&) {
   if (info.reduced) {
     reduced_ = picture->frame.image;
     if (picture->interactive)
-      sampleError_ = info.samples > 1 ? double(info.error) * std::sqrt(info.samples) : 0;
+      sampleError_ =
+          info.samples < 2 || std::isnan(info.error) ? 0 : double(info.error) * std::sqrt(info.samples);
   }
   film_.restShown = !picture->interactive;
   film_.shown = info;

@@ -38,7 +38,8 @@ struct RenderContext {
   Now now;
   Log log;
   Background& pictures;  ///< for large pictures (adding samples, making, encoding) and for releasing films
-  Background& passes;    ///< for passes with slow rays and for errors that take long to measure
+  Background& passes;    ///< for passes with slow rays
+  Background& errors;    ///< for pictures whose error takes long to measure
   Background& builds;    ///< for scenes, including the automatic choice of the method
   std::function<void()> wake;
   std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for pictures; null: no limit

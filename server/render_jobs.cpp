@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/render_jobs.h"
 
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -49,7 +50,8 @@ void PictureJob::make(const Renderer& renderer, std::uint64_t pixels,
   auto aovMemory = take(aovs ? std::size(kAovs) * sizeof(float) : 0);
   Image picture = renderer.image();
   if (reduced) {
-    const double error = info.samples > 1 ? double(info.error) : sampleError;
+    // If the error is not known although there are samples enough, the picture is shown as it is.
+    const double error = info.samples < 2 ? sampleError : std::isnan(info.error) ? 0 : double(info.error);
     share = mixIn(enlarged(*reduced, picture.width, picture.height), error, &picture);
     info.mixed = true;
   }

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -62,6 +63,12 @@ class ApplicationTest : public ::testing::Test {
     const auto make = [this](const std::shared_ptr<const Volume>&) {
       const auto control = std::make_shared<testing::FakeControl>();
       control->building = building_;
+      if (longErrors_) control->longErrorFrom = 1;
+      control->measuring = std::ref(endless_);
+      control->duringPass = [this] {
+        if (slowPasses_) std::this_thread::sleep_for(500ms);
+      };
+      ++made_;
       return std::make_unique<testing::FakeRenderer>(control);
     };
     application_.emplace(config_, std::move(datasets), make, memory_, [](const std::string&) {});
@@ -87,11 +94,30 @@ class ApplicationTest : public ::testing::Test {
   static constexpr const char* kToken = "0123456789abcdef";
   Config config_;
   std::function<void(std::stop_token)> building_;
+  std::atomic<bool> longErrors_{false}, slowPasses_{false};
+  std::atomic<int> made_{0};
   EndlessBuilds endless_;
   WaitingBuilds waiting_;
   std::shared_ptr<MemoryBudget> memory_;
   std::optional<Application> application_;  ///< last: ends before what its renderers use
 };
+
+TEST_F(ApplicationTest, RendersSlowPassesWhileTheErrorsOfManyPicturesAreMeasured) {
+  const int count = int(processors());
+  config_.stopGrace = 0s;
+  config_.maxSessions = std::size_t(count) + 1;
+  longErrors_ = true;
+  start();
+  std::vector<std::unique_ptr<TestClient>> waiting;
+  for (int i = 0; i < count; ++i) {
+    waiting.push_back(std::make_unique<TestClient>(application_->port()));
+    send(*waiting.back(), "GET " + newSession() + "/frame");
+  }
+  ASSERT_TRUE(eventually([&] { return made_ == count && endless_.begun >= std::max(1, count / 2); }));
+  longErrors_ = false;
+  slowPasses_ = true;  // so slow that they continue in the background
+  EXPECT_EQ(call("GET " + newSession() + "/frame?minSamples=3").status, 200);
+}
 
 constexpr const char* kSmallPicture = R"({"image": {"width": 8, "height": 8}, "stop": {"samples": 1}})";
 

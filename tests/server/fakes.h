@@ -236,7 +236,7 @@ struct Workshop {
   std::shared_ptr<const SceneResolver> resolver =
       std::make_shared<const SceneResolver>(smallStore(), SceneResolver::Options{4096, 16'777'216});
   SessionStore store;
-  FakeBackground background, passes;
+  FakeBackground background, passes, errors;
   PassResult last;  ///< the result of the render loop's last turn
   RenderLoop render;
   EncodeLoop encode;
@@ -253,6 +253,7 @@ struct Workshop {
                 [this](const std::string& line) { log.push_back(line); },
                 background,
                 passes,
+                errors,
                 background,
                 [this] { ++renderWakes; },
                 memory,

@@ -170,13 +170,13 @@ TEST(Pick, WaitsForTheSceneButNotForWhatElseIsDoneInTheBackground) {
   workshop.step();
   EXPECT_EQ(picker.answers.size(), 1u);
   workshop.control->longErrorFrom = 1;
-  workshop.passes.atOnce = false;
+  workshop.errors.atOnce = false;
   workshop.steps(3);
-  ASSERT_EQ(workshop.passes.waiting.size(), 1u);  // the picture's error is being measured
+  ASSERT_EQ(workshop.errors.waiting.size(), 1u);  // the picture's error is being measured
   picker.pick();
   workshop.step();
   EXPECT_EQ(picker.answers.size(), 2u);
-  EXPECT_EQ(workshop.passes.waiting.size(), 1u);
+  EXPECT_EQ(workshop.errors.waiting.size(), 1u);
 }
 
 TEST(Pick, InterruptsAPass) {

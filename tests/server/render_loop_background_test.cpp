@@ -507,21 +507,22 @@ struct Measured {
     otherSession = workshop.store.create({{"stop", {{"samples", 1}}}});
     otherSession->addViewer(other);
     workshop.steps(4);
-    workshop.passes.atOnce = false;
+    workshop.errors.atOnce = false;
     workshop.steps(30);
   }
 };
 
 TEST(RenderLoop, MeasuresAnErrorThatTakesLongInTheBackgroundWhileOthersHaveTheirTurns) {
   Measured test;
-  EXPECT_EQ(test.workshop.passes.waiting.size(), 1u);
+  EXPECT_EQ(test.workshop.errors.waiting.size(), 1u);
+  EXPECT_TRUE(test.workshop.passes.waiting.empty());  // where others' passes would wait for it
   EXPECT_EQ(test.measured, 0);
   EXPECT_EQ(test.viewer->frames.back().info.samples, 8u);
   test.otherSession->patch(seedPatch(5), {});
   test.workshop.steps(2);
   EXPECT_EQ(test.other->frames.back().info.revision, 2u);
   EXPECT_FALSE(test.viewer->frames.back().info.final);
-  test.workshop.passes.finish();
+  test.workshop.errors.finish();
   test.workshop.steps(6);
   EXPECT_EQ(test.measured, 1);
   EXPECT_TRUE(test.viewer->frames.back().info.final);
@@ -532,7 +533,7 @@ TEST(RenderLoop, GivesUpMeasuringTheErrorOfADeletedSession) {
   Measured test;
   EXPECT_TRUE(test.workshop.store.remove(test.session->id()));
   test.workshop.step();
-  test.workshop.passes.finish();
+  test.workshop.errors.finish();
   EXPECT_EQ(test.stopped, 1);
 }
 
@@ -540,7 +541,7 @@ TEST(RenderLoop, GivesUpMeasuringTheErrorOfASceneThatAnEditReplaces) {
   Measured test;
   test.session->patch(seedPatch(5), {});
   test.workshop.step();
-  test.workshop.passes.finish();
+  test.workshop.errors.finish();
   EXPECT_EQ(test.stopped, 1);
   test.workshop.steps(2);
   EXPECT_FALSE(test.workshop.last.abandoned);  // no build was abandoned
@@ -552,9 +553,9 @@ TEST(RenderLoop, MeasuresAnewWhenSomebodyWaitsAgain) {
   Measured test;
   test.session->removeViewer(test.viewerId);
   test.workshop.step();
-  test.workshop.passes.finish();
+  test.workshop.errors.finish();
   EXPECT_EQ(test.stopped, 1);
-  test.workshop.passes.atOnce = true;
+  test.workshop.errors.atOnce = true;
   test.session->addViewer(test.viewer);
   test.workshop.steps(6);
   EXPECT_EQ(test.measured, 2);

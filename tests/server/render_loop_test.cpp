@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <map>
 
 #include "server/loop_thread.h"
@@ -281,6 +282,27 @@ TEST(RenderLoop, MixesTheSmallPictureIntoTheNoisyWholeOneInTheProportionOfLeastE
   ASSERT_TRUE(viewer->frames.back().info.final);
   EXPECT_DOUBLE_EQ(green(), 9);  // the final picture is unmixed, too
   EXPECT_NE(session->waitForFrame({}, 0ms), nullptr);
+}
+
+TEST(RenderLoop, MixesNothingIntoAPictureWhoseErrorIsNotKnown) {
+  Workshop workshop;
+  workshop.control->secondsPerPixel = 1e-6;
+  workshop.control->error = [](std::uint32_t) { return std::numeric_limits<double>::quiet_NaN(); };
+  const auto session =
+      workshop.store.create({{"image", {{"width", 400}, {"height", 300}}}, {"stop", {{"samples", 9}}}});
+  const auto viewer = std::make_shared<FakeViewer>();
+  session->addViewer(viewer);
+  workshop.step();
+  session->patch(seedPatch(1), {});
+  workshop.steps(8);
+  ASSERT_EQ(viewer->frames.back().info.samples, 8u);
+  ASSERT_TRUE(viewer->frames.back().info.interactive);
+  workshop.clock.advance(Session::kInteractiveTime);
+  for (const double samples : {1.0, 2.0}) {
+    workshop.step();
+    EXPECT_EQ(viewer->frames.back().width, 400);
+    EXPECT_EQ(double(session->latestFrame()->image->pixels[0].g), samples);
+  }
 }
 
 TEST(RenderLoop, BeginsThePictureOfAnEditAnewCoarserWhenItTakesTooLong) {

@@ -30,7 +30,7 @@ struct RunningServer {
                      {1000, 5min},
                      hooks};
   LoopThread watchThread;
-  BackgroundThreads pictures, passes, builds;
+  BackgroundThreads pictures, passes, errors, builds;
   RenderLoop render{
       store,
       {[this](const std::shared_ptr<const Volume>&) { return std::make_unique<FakeRenderer>(control); },
@@ -39,6 +39,7 @@ struct RunningServer {
        [](const std::string&) {},
        pictures,
        passes,
+       errors,
        builds,
        [this] { renderThread.wake(); },
        nullptr,
