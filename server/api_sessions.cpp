@@ -136,14 +136,18 @@ net::Response frame(ApiContext& context, const net::Request& request) {
                         "query parameter format: expected " + imageTypesText(&ImageType::format) +
                             ", found \"" + shortened(*asked) + '"');
   const std::optional<Aov> aov = queryAov(request);
-  const FrameQuery query{queryUnsigned(request, "after", 0), queryUnsigned(request, "minSamples", 1),
-                         aov.has_value(), request.gone};
+  const bool encoded = !aov && type->format == "jpeg";  // as viewers get it
+  const FrameQuery query{.after = queryUnsigned(request, "after", 0),
+                         .minSamples = queryUnsigned(request, "minSamples", 1),
+                         .aovs = aov.has_value(),
+                         .gone = request.gone,
+                         .image = !aov && !encoded};
   const auto found = session->waitForFrame(query, pollTimeout(context.config, request));
   if (!found && context.stopping) throw stoppingProblem();
   if (!found) return {204, "", "", {}};
   net::Response response{200, std::string(type->mediaType), "", {}};
-  const std::uint64_t pixels = found->image->pixels.size();
-  if (!aov && type->format == "jpeg") {
+  const std::uint64_t pixels = std::uint64_t(found->width) * std::uint64_t(found->height);
+  if (encoded) {
     response.heldUntilSent = context.answers.take(request.flow, found->jpeg->size());
     response.body.assign(found->jpeg->begin(), found->jpeg->end());
   } else {

@@ -37,6 +37,7 @@ bool FilmState::showDue(const RenderRequest& request, const FilmProgress& film, 
   if (shown.revision != revision || shown.interactive != request.interactive) return true;
   if (request.failures != shownFailures) return true;
   if (!shown.reduced && samples < shown.samples) return false;
+  if (request.drops != shownDrops) return true;
   if (shown.mixed && !request.pollSamples.empty()) return true;
   if (!request.interactive && divisor == 1 && film.finished) return !shown.final;
   if (samples == shown.samples) return false;

@@ -32,6 +32,7 @@ struct FilmState {
 
   FrameInfo shown;                  ///< the last frame submitted; revision 0 before the first
   std::uint32_t shownFailures = 0;  ///< the session's failures when that frame was made
+  std::uint32_t shownDrops = 0;     ///< the session's drops when that frame was made
   TimePoint shownAt;
 
   /// Whether the request needs a new film: another scene, a finer resolution, the scene's own method, or

@@ -48,7 +48,7 @@ struct EncodedFrame {
   FrameInfo info;
   int width = 0, height = 0;
   std::shared_ptr<const std::vector<unsigned char>> jpeg;
-  std::shared_ptr<const Image> image;  ///< for scripts that ask for png or exr
+  std::shared_ptr<const Image> image;  ///< for scripts that ask for png or exr; null once dropped
   glm::vec3 background{0};
   std::shared_ptr<const std::vector<AovValues>> aovs;  ///< as in RenderedFrame
 };

@@ -303,6 +303,7 @@ void ProgressiveRender::sampleAdded(PassResult& result) {
 
 void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
   film_.shownFailures = request.failures;
+  film_.shownDrops = request.drops;
   picture_ = std::make_shared<PictureJob>();
   FrameInfo& info = picture_->frame.info;
   info.revision = film_.revision;

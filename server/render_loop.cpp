@@ -24,7 +24,9 @@ RenderLoop::RenderLoop(SessionStore& store, RenderContext context, OnPass onPass
       onPass_(std::move(onPass)),
       interrupter_(context_.now, context_.wakeWatch) {
   if (!context_.memory) return;
-  context_.memory->setRelease([kept = std::weak_ptr(context_.parked)] {
+  // Pictures first, because they can be made again from the films.
+  context_.memory->setRelease([dropPicture = store_.pictureRelease(), kept = std::weak_ptr(context_.parked)] {
+    if (dropPicture()) return true;
     const auto parked = kept.lock();
     return parked && parked->dropOldest();
   });

@@ -18,7 +18,8 @@ namespace scolopax::server {
 class RenderLoop {
  public:
   using OnPass = std::function<void(const PassResult&)>;
-  /// If the context's memory budget is used up, renderers of sessions that nobody watches are dropped.
+  /// If the context's memory budget is used up, the pictures of sessions that nobody watches are dropped, and
+  /// then their renderers.
   RenderLoop(SessionStore& store, RenderContext context, OnPass onPass);
   /// Runs one turn of the next session that has work. First pictures after edits have priority. Between two
   /// of them, a session at rest gets a short turn, so that no session starves.

@@ -17,6 +17,12 @@ namespace {
 // forgotten; then the patch id in headers only lags behind.
 constexpr std::size_t kMaxPendingPatches = 1024;
 
+/// Whether two frames of a session show the same picture: one has been made again.
+bool isSamePicture(const FrameInfo& a, const FrameInfo& b) {
+  return a.revision == b.revision && a.samples == b.samples && a.interactive == b.interactive &&
+         a.reduced == b.reduced && a.mixed == b.mixed && a.final == b.final;
+}
+
 /// Calls a function of a client. Its failure must neither affect other clients nor end a loop's thread.
 template <class Call, class... Arguments>
 void notify(const Call& call, Arguments&&... arguments) noexcept {
@@ -179,6 +185,7 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
   const auto fits = [&] {
     return frame_ && frame_->info.number > query.after && frame_->info.revision >= revision &&
            !frame_->info.interactive && !frame_->info.mixed && (frame_->aovs || !query.aovs) &&
+           (frame_->image || !query.image) &&
            (frame_->info.samples >= query.minSamples || frame_->info.final);
   };
   const auto poll = pollSamples_.insert(query.minSamples);
@@ -247,6 +254,23 @@ TimePoint Session::lastUsed() const {
   return viewers_.empty() && pollSamples_.empty() && picks_.empty() ? lastUsed_ : hooks_.now();
 }
 
+/// Whether a viewer wants pictures. Requires the mutex.
+bool Session::seen() const {
+  return std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.visible; });
+}
+
+bool Session::dropPicture() {
+  std::shared_ptr<const EncodedFrame> last;  // released without the mutex, as that may take time
+  const std::lock_guard lock(mutex_);
+  if (seen() || !pollSamples_.empty() || !frame_ || (!frame_->image && !frame_->aovs)) return false;
+  EncodedFrame rest = *frame_;
+  rest.image.reset();
+  rest.aovs.reset();
+  last = std::exchange(frame_, std::make_shared<const EncodedFrame>(std::move(rest)));
+  ++drops_;
+  return true;
+}
+
 RenderRequest Session::request() const {
   const std::lock_guard lock(mutex_);
   RenderRequest request;
@@ -254,16 +278,15 @@ RenderRequest Session::request() const {
   request.revision = revision_;
   request.pollSamples.assign(pollSamples_.begin(), pollSamples_.end());
   request.aovs = aovs_;
-  const bool seen =
-      std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.visible; });
   request.failures = failures_;
+  request.drops = drops_;
   request.pick = picks_.oldest();
-  request.wanted = !closed_ && (seen || !pollSamples_.empty() || request.pick);
+  request.wanted = !closed_ && (seen() || !pollSamples_.empty() || request.pick);
   if (failedRevision_ == revision_) {
     if (request.wanted) request.retryAt = retryAt_;
     request.wanted = request.retryAt && hooks_.now() >= *request.retryAt;
   }
-  if (seen && lastEdit_) {
+  if (seen() && lastEdit_) {
     request.interactiveEnd = *lastEdit_ + kInteractiveTime;
     request.interactive = hooks_.now() < request.interactiveEnd;
     request.edit = editRevision_;
@@ -326,7 +349,8 @@ void Session::publish(EncodedFrame frame) {
   std::shared_ptr<const EncodedFrame> last;  // released without the mutex, as that may take time
   const std::lock_guard lock(mutex_);
   if (frame_ && frame.info.revision < frame_->info.revision) return;
-  frame.info.number = ++frameNumber_;
+  const bool again = frame_ && !frame_->image && isSamePicture(frame.info, frame_->info);
+  frame.info.number = again ? frameNumber_ : ++frameNumber_;
   last = std::exchange(frame_, std::make_shared<const EncodedFrame>(std::move(frame)));
   frameCame_.notify_all();
 }

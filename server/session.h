@@ -70,6 +70,7 @@ struct FrameQuery {
   std::uint32_t minSamples = 1;  ///< with at least this many samples per pixel, or final
   bool aovs = false;             ///< with AOVs; the first such query begins a revision that records them
   std::stop_token gone = {};     ///< requested when nobody waits any more
+  bool image = false;            ///< with the linear picture; otherwise the JPEG suffices
 };
 
 /// A snapshot of the work that the render thread should do for a session.
@@ -85,6 +86,7 @@ struct RenderRequest {
   std::optional<TimePoint> retryAt;        ///< when to retry after a lack of memory
   std::uint32_t failures =
       0;  ///< number of failures so far; after a new one, the last picture may have been lost
+  std::uint32_t drops = 0;          ///< number of calls of dropPicture() so far that dropped one
   std::optional<PendingPick> pick;  ///< the oldest one not yet answered
 };
 
@@ -157,6 +159,12 @@ class Session {
   /// Time of the last view, edit or query; the current time while there is a viewer or a waiting script.
   TimePoint lastUsed() const;
 
+  // --- any thread ---
+  /// Releases the linear picture and the AOVs of the latest frame, for their memory, unless a viewer or a
+  /// script wants pictures; the JPEG stays. When one does, they are made again, and the frame keeps its
+  /// number. False if there are none to release.
+  bool dropPicture();
+
   // --- render thread ---
   RenderRequest request() const;
   /// Makes this the frame that waits for the encoder, replacing an earlier one.
@@ -191,6 +199,8 @@ class Session {
     std::deque<PendingPatch> pending;  ///< patches newer than the last frame offered
   };
 
+  bool seen() const;
+
   using Resolve = std::function<SceneResolver::Resolved(const ResolvedScene& before)>;
   SceneState edit(const EditOrigin& origin, const Resolve& resolve);
   void checkRevision(const EditOrigin& origin) const;
@@ -214,7 +224,7 @@ class Session {
   std::uint32_t failedRevision_ = 0;
   std::optional<Error> failure_;
   std::optional<TimePoint> retryAt_;  ///< set if rendering failed because others held the memory
-  std::uint32_t failures_ = 0;
+  std::uint32_t failures_ = 0, drops_ = 0;
   std::map<ViewerId, Viewer> viewers_;
   ViewerId nextViewer_ = 1;
   std::multiset<std::uint32_t> pollSamples_;  ///< one per waiting script

@@ -14,8 +14,8 @@ SessionStore::SessionStore(std::shared_ptr<const SceneResolver> resolver, Option
 
 /// Throws if another session cannot be created now. Requires the mutex.
 void SessionStore::checkRoom() const {
-  if (closed_) throw protocol::ProtocolError(503, "", *closed_);
-  if (sessions_.size() >= options_.maxSessions)
+  if (list_->closed) throw protocol::ProtocolError(503, "", *list_->closed);
+  if (list_->sessions.size() >= options_.maxSessions)
     throw protocol::ProtocolError(
         503, "",
         "the limit of " + std::to_string(options_.maxSessions) + " sessions is reached; retry later");
@@ -24,28 +24,28 @@ void SessionStore::checkRoom() const {
 std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene) {
   expire();
   {
-    const std::lock_guard lock(mutex_);
+    const std::lock_guard lock(list_->mutex);
     checkRoom();  // before resolving the scene, which takes time
   }
   auto session = std::make_shared<Session>(createToken(), createToken(), resolver_,
                                            resolver_->replaceNow(scene), hooks_);
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(list_->mutex);
   checkRoom();  // again, because other threads may have created sessions
-  sessions_.push_back(session);
+  list_->sessions.push_back(session);
   hooks_.wakeRender();  // the loop will end the session if nobody uses it
   return session;
 }
 
 std::shared_ptr<Session> SessionStore::find(std::string_view id) const {
-  const std::lock_guard lock(mutex_);
-  const auto found =
-      std::find_if(sessions_.begin(), sessions_.end(), [&](const auto& s) { return s->id() == id; });
-  return found == sessions_.end() ? nullptr : *found;
+  const std::lock_guard lock(list_->mutex);
+  const auto found = std::find_if(list_->sessions.begin(), list_->sessions.end(),
+                                  [&](const auto& s) { return s->id() == id; });
+  return found == list_->sessions.end() ? nullptr : *found;
 }
 
 std::shared_ptr<Session> SessionStore::findByToken(std::string_view token) const {
-  const std::lock_guard lock(mutex_);
-  for (const auto& session : sessions_)
+  const std::lock_guard lock(list_->mutex);
+  for (const auto& session : list_->sessions)
     if (sameToken(session->token(), token)) return session;
   return nullptr;
 }
@@ -53,21 +53,33 @@ std::shared_ptr<Session> SessionStore::findByToken(std::string_view token) const
 bool SessionStore::remove(std::string_view id) {
   std::shared_ptr<Session> session;
   {
-    const std::lock_guard lock(mutex_);
-    const auto found =
-        std::find_if(sessions_.begin(), sessions_.end(), [&](const auto& s) { return s->id() == id; });
-    if (found == sessions_.end()) return false;
+    const std::lock_guard lock(list_->mutex);
+    const auto found = std::find_if(list_->sessions.begin(), list_->sessions.end(),
+                                    [&](const auto& s) { return s->id() == id; });
+    if (found == list_->sessions.end()) return false;
     session = *found;
-    sessions_.erase(found);
+    list_->sessions.erase(found);
   }
   session->close("the session was deleted");
   hooks_.wakeRender();  // the loop releases the session's renderer
   return true;
 }
 
-std::vector<std::shared_ptr<Session>> SessionStore::all() const {
-  const std::lock_guard lock(mutex_);
-  return sessions_;
+std::vector<std::shared_ptr<Session>> SessionStore::List::all() const {
+  const std::lock_guard lock(mutex);
+  return sessions;
+}
+
+std::vector<std::shared_ptr<Session>> SessionStore::all() const { return list_->all(); }
+
+std::function<bool()> SessionStore::pictureRelease() const {
+  return [weak = std::weak_ptr(list_)] {
+    const auto list = weak.lock();
+    if (!list) return false;
+    std::multimap<TimePoint, std::shared_ptr<Session>> byUse;
+    for (auto& session : list->all()) byUse.emplace(session->lastUsed(), std::move(session));
+    return std::any_of(byUse.begin(), byUse.end(), [](const auto& one) { return one.second->dropPicture(); });
+  };
 }
 
 std::optional<TimePoint> SessionStore::expire() {
@@ -85,9 +97,9 @@ std::optional<TimePoint> SessionStore::expire() {
 void SessionStore::closeAll(const std::string& reason) {
   std::vector<std::shared_ptr<Session>> sessions;
   {
-    const std::lock_guard lock(mutex_);
-    closed_ = reason;
-    sessions = std::exchange(sessions_, {});
+    const std::lock_guard lock(list_->mutex);
+    list_->closed = reason;
+    sessions = std::exchange(list_->sessions, {});
   }
   for (const auto& session : sessions) session->close(reason);
 }

@@ -32,6 +32,10 @@ class SessionStore {
   bool remove(std::string_view id);
   /// All sessions, in the order of their creation.
   std::vector<std::shared_ptr<Session>> all() const;
+  /// A function that calls Session::dropPicture() of the sessions until one has released a picture, beginning
+  /// with the one that has been unused for longest; false if none has. It may be called from any thread, even
+  /// after the store has ended.
+  std::function<bool()> pictureRelease() const;
   /// Ends the sessions that have expired; returns when the next one may expire.
   std::optional<TimePoint> expire();
   /// Ends all sessions. From then on create() throws, with this reason.
@@ -43,9 +47,14 @@ class SessionStore {
   const std::shared_ptr<const SceneResolver> resolver_;
   const Options options_;
   const SessionHooks hooks_;
-  mutable std::mutex mutex_;
-  std::vector<std::shared_ptr<Session>> sessions_;
-  std::optional<std::string> closed_;  ///< the reason, after closeAll()
+  struct List {
+    mutable std::mutex mutex;  ///< guards the members below
+    std::vector<std::shared_ptr<Session>> sessions;
+    std::optional<std::string> closed;  ///< the reason, after closeAll()
+
+    std::vector<std::shared_ptr<Session>> all() const;
+  };
+  const std::shared_ptr<List> list_ = std::make_shared<List>();
 };
 
 }  // namespace scolopax::server

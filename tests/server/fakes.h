@@ -204,7 +204,7 @@ struct FakeViewer : ViewerSink {
   struct Offer {
     FrameInfo info;
     int width = 0, height = 0;
-    float red = 0;  ///< the scene's seed; -1 if samples of several scenes are mixed
+    float red = 0;  ///< the scene's seed; -1 if samples of several scenes are mixed; -2 for a dropped picture
     std::uint32_t patch = 0;
   };
   std::vector<Offer> frames;
@@ -214,7 +214,8 @@ struct FakeViewer : ViewerSink {
   std::string closed;
 
   void offerFrame(const EncodedFrame& frame, std::uint32_t patch) override {
-    frames.push_back({frame.info, frame.width, frame.height, frame.image->pixels.front().r, patch});
+    const float red = frame.image ? frame.image->pixels.front().r : -2;
+    frames.push_back({frame.info, frame.width, frame.height, red, patch});
   }
   void sceneChanged(const net::SharedText& message) override {
     const auto parsed = nlohmann::json::parse(*message);

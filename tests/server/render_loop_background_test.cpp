@@ -101,6 +101,57 @@ TEST(RenderLoop, GivesThePictureOfARequestTheMemoryOfAFilmThatNobodyWatches) {
   EXPECT_EQ(memory->used(MemoryUse::films), 0u);
 }
 
+TEST(RenderLoop, DropsPicturesThatNobodyWatchesBeforeItRefusesAnother) {
+  const auto memory = std::make_shared<MemoryBudget>(200'000);  // three pictures, and all films
+  Workshop workshop({}, memory);
+  std::vector<std::shared_ptr<Session>> sessions;
+  std::vector<std::uint32_t> numbers;
+  for (int i = 0; i < 6; ++i) {
+    sessions.push_back(
+        workshop.store.create({{"image", {{"width", 64}, {"height", 48}}}, {"stop", {{"samples", 2}}}}));
+    const auto viewer = std::make_shared<FakeViewer>();
+    const ViewerId id = sessions.back()->addViewer(viewer);
+    workshop.steps(4);
+    EXPECT_TRUE(viewer->failures.empty()) << i;
+    ASSERT_FALSE(viewer->frames.empty()) << i;
+    EXPECT_TRUE(viewer->frames.back().info.final) << i;
+    numbers.push_back(viewer->frames.back().info.number);
+    sessions.back()->removeViewer(id);
+    workshop.clock.advance(1s);
+    workshop.step();
+  }
+  EXPECT_EQ(workshop.control->renderersMade, 6);
+  EXPECT_EQ(memory->used(MemoryUse::films), 6 * 64 * 48u);
+  EXPECT_NE(sessions[5]->latestFrame()->image, nullptr);
+  // Those that have been unused for longest went first. Their JPEGs are still there.
+  EXPECT_EQ(sessions[0]->latestFrame()->image, nullptr);
+  EXPECT_NE(sessions[0]->waitForFrame({}, 0ms), nullptr);
+  EXPECT_EQ(sessions[0]->waitForFrame({.image = true}, 0ms), nullptr);
+  // Whoever wants the picture gets it again, from the film and as the same frame.
+  const auto viewer = std::make_shared<FakeViewer>();
+  sessions[0]->addViewer(viewer);
+  workshop.steps(3);
+  const auto again = sessions[0]->waitForFrame({.image = true}, 0ms);
+  ASSERT_NE(again, nullptr);
+  EXPECT_EQ(again->info.number, numbers[0]);
+  EXPECT_EQ(viewer->frames.size(), 1u);
+  EXPECT_EQ(workshop.control->passes.size(), 12u);
+  EXPECT_EQ(workshop.control->renderersMade, 6);
+}
+
+TEST(RenderLoop, DropsNoPictureThatAViewerSees) {
+  Workshop workshop;
+  const auto session = workshop.store.create({{"stop", {{"samples", 1}}}});
+  EXPECT_FALSE(session->dropPicture());
+  const ViewerId id = session->addViewer(std::make_shared<FakeViewer>());
+  workshop.steps(2);
+  EXPECT_FALSE(session->dropPicture());
+  session->setView(id, false, 0);
+  EXPECT_TRUE(session->dropPicture());
+  EXPECT_FALSE(session->dropPicture());
+  EXPECT_EQ(session->latestFrame()->image, nullptr);
+}
+
 TEST(RenderLoop, TriesAgainAfterASecondWhatOthersMemoryKeptItFrom) {
   Workshop workshop;
   workshop.control->memory = std::make_shared<MemoryBudget>(64 * 48);
