@@ -36,8 +36,14 @@ bool FilmState::showDue(const RenderRequest& request, const FilmProgress& film, 
   if (samples == 0) return false;
   if (shown.revision != revision || shown.interactive != request.interactive) return true;
   if (request.failures != shownFailures) return true;
+  const bool dropped = request.drops != shownDrops;
+  // If the film was dropped, too, a script need not wait until it has as many samples again.
+  if (dropped && !request.viewed &&
+      std::any_of(request.pollSamples.begin(), request.pollSamples.end(),
+                  [&](std::uint32_t wanted) { return wanted <= samples; }))
+    return true;
   if (!shown.reduced && samples < shown.samples) return false;
-  if (request.drops != shownDrops) return true;
+  if (dropped) return true;
   if (shown.mixed && !request.pollSamples.empty()) return true;
   if (!request.interactive && divisor == 1 && film.finished) return !shown.final;
   if (samples == shown.samples) return false;

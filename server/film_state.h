@@ -48,7 +48,8 @@ struct FilmState {
   /// a lower resolution.
   bool lateForEdit(const RenderRequest& request, const RenderPolicy& policy) const;
   /// Whether a frame should be made of the film in its present state. No frame is made while one with more
-  /// samples is shown, which happens after the film has been dropped and rendered again.
+  /// samples is shown, which happens after the film has been dropped and rendered again. A script gets one
+  /// all the same if its picture was dropped, too, and there is no viewer.
   bool showDue(const RenderRequest& request, const FilmProgress& film, const RenderPolicy& policy,
                TimePoint now) const;
 };

@@ -277,6 +277,7 @@ RenderRequest Session::request() const {
   request.scene = scene_;
   request.revision = revision_;
   request.pollSamples.assign(pollSamples_.begin(), pollSamples_.end());
+  request.viewed = !viewers_.empty();
   request.aovs = aovs_;
   request.failures = failures_;
   request.drops = drops_;

@@ -82,6 +82,7 @@ struct RenderRequest {
   TimePoint interactiveEnd;  ///< when `interactive` ends if no further edit comes
   std::uint32_t edit = 0;    ///< revision of the last edit that changed the film; 0 if nobody watches
   std::vector<std::uint32_t> pollSamples;  ///< sample counts that scripts wait for
+  bool viewed = false;                     ///< there is a viewer, even if it wants no pictures now
   bool aovs = false;                       ///< a script has asked for AOVs
   std::optional<TimePoint> retryAt;        ///< when to retry after a lack of memory
   std::uint32_t failures =

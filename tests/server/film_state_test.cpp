@@ -96,5 +96,28 @@ TEST(FilmState, IsShownAtPowersOfTwoAndAfterTheInterval) {
   EXPECT_TRUE(due(5, 0ms));
 }
 
+TEST(FilmState, IsShownAgainOnceItsPictureHasBeenDropped) {
+  Edited e;
+  e.request.interactive = false;
+  e.film.shown.revision = 1;
+  e.film.shown.samples = 64;
+  e.film.shown.final = true;
+  const auto due = [&](std::uint32_t samples) {
+    return e.film.showDue(e.request, {samples, samples == 64}, kPolicy, TimePoint(1000s));
+  };
+  EXPECT_FALSE(due(64));
+  e.request.drops = 1;
+  EXPECT_TRUE(due(64));
+  // The film has been dropped, too, and rendered again.
+  e.request.pollSamples = {4};
+  EXPECT_FALSE(due(3));
+  EXPECT_TRUE(due(4));
+  e.request.viewed = true;  // a viewer has seen more samples
+  EXPECT_FALSE(due(63));
+  EXPECT_TRUE(due(64));
+  e.film.shownDrops = 1;
+  EXPECT_FALSE(due(64));
+}
+
 }  // namespace
 }  // namespace scolopax::server
