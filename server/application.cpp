@@ -183,6 +183,7 @@ struct Application::Impl {
     options.bodyLimit = config.maxBodyBytes;
     options.messageLimit = config.maxMessageBytes;
     options.allowedOrigins = config.allowedOrigins;
+    options.trustedProxies = config.trustedProxies;
     options.certificateFile = config.certificateFile;
     options.keyFile = config.keyFile;
     if (std::filesystem::is_directory(config.webRoot)) options.staticRoot = config.webRoot;

@@ -18,6 +18,7 @@ struct Config {
   std::string backend = "cpu";              ///< "cpu" or "cuda", for clients
   std::string webRoot;                      ///< folder of the built page; empty: none
   std::vector<std::string> allowedOrigins;  ///< other than the server's own
+  std::vector<std::string> trustedProxies;  ///< as net::Options::trustedProxies
 
   std::size_t maxSessions = 32;
   std::size_t maxClients = 64;                            ///< streams at once

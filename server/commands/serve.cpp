@@ -23,6 +23,7 @@
 #include "server/command_config.h"
 #include "server/commands/render_device.h"
 #include "server/commands/validators.h"
+#include "server/net/client_address.h"
 #include "server/net/server.h"
 #include "server/scene_resolver.h"
 
@@ -129,6 +130,17 @@ CLI::Option* addOption(CLI::App& command, const std::string& name, Value& value,
   return command.add_option("--" + name, value, doc)->envname(variable)->capture_default_str();
 }
 
+/// Accepts an IP address, in its usual form.
+CLI::Validator asAddress() {
+  return {[](std::string& text) {
+            const auto usual = net::usualAddress(text);
+            if (!usual) return "expected an IP address, found " + text;
+            text = *usual;
+            return std::string();
+          },
+          ""};
+}
+
 void addServerOptions(CLI::App& command, ServeOptions& options) {
   server::Config& config = options.config;
   const auto add = [&command](const std::string& name, auto& value, const std::string& doc) {
@@ -158,7 +170,13 @@ void addServerOptions(CLI::App& command, ServeOptions& options) {
   add("log-level", options.logLevel, "Lowest level of the messages that are logged on standard error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "critical", "off"}));
   add("allow-origin", config.allowedOrigins, "Another site whose pages may use this server; can be repeated")
+      ->allow_extra_args(false)
       ->type_name("https://HOST");
+  add("trusted-proxy", config.trustedProxies,
+      "Proxy in front of this server, whose X-Forwarded-For names the client; can be repeated")
+      ->allow_extra_args(false)
+      ->transform(asAddress())
+      ->type_name("ADDRESS");
 }
 
 void addLimits(CLI::App& command, ServeOptions& options) {

@@ -13,6 +13,7 @@
 #include <optional>
 #include <variant>
 
+#include "server/net/client_address.h"
 #include "server/net/client_watch.h"
 #include "server/net/head_rules.h"
 #include "server/net/transport.h"
@@ -119,7 +120,6 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     }
 
     Request request;
-    request.remoteAddress = remoteAddress_;
     head_ = parser.get().method() == http::verb::head;
     version_ = parser.get().version();
     keepAlive_ = parser.keep_alive();
@@ -127,6 +127,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
     if (const auto refusal = readHead(parser.get(), core_.options.bodyLimit, request)) {
       co_return co_await refuse(refusal->status, refusal->detail);
     }
+    request.remoteAddress = clientAddress(request.headers, remoteAddress_, core_.options.trustedProxies);
     // From here on the next request can be found, unless a body has not been read.
     const bool keepAlive = keepAlive_;
     keepAlive_ = keepAlive_ && !hasBody;
@@ -142,6 +143,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
     RouteMatch match = core_.router.find(request.method, request.path);
     if (!match.route && (request.method == "GET" || request.method == "HEAD") && !hasBody) {
+      request.flow = "files for " + request.remoteAddress;  // a page opens while the client's calls wait
       Response file =
           co_await runOn<Response>(core_.workers, request.flow, [&] { return serveFile(request, match); });
       co_return co_await write(std::move(file), keepAlive_);
@@ -353,7 +355,7 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
   Transport transport_;
   asio::any_io_executor executor_;  ///< a copy, because cut() may be called after the socket has been moved
   boost::beast::flat_buffer buffer_;
-  const std::string remoteAddress_;
+  const std::string remoteAddress_;  ///< of a client or a proxy
   bool full_;
   bool idle_ = false;  ///< between requests: a server that stops does not wait
   bool linger_ = false;
@@ -367,7 +369,8 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 void serveHttp(Core& core, tcp::socket socket, bool full) {
   const auto executor = socket.get_executor();
   error_code ignored;
-  const std::string address = socket.remote_endpoint(ignored).address().to_string();
+  std::string address = socket.remote_endpoint(ignored).address().to_string();
+  address = usualAddress(address).value_or(address);
   auto connection = std::make_shared<HttpConnection>(core, std::move(socket), address, full);
   Connection* const entered = connection.get();
   try {

@@ -27,7 +27,7 @@ struct Request {
   Headers headers;                   ///< as sent
   std::string body;                  ///< whole and within the limit; empty in authorize and upgrades
   std::vector<std::string> matches;  ///< regex groups of the route; [0] is the whole path
-  std::string remoteAddress;         ///< numeric, without the port
+  std::string remoteAddress;         ///< the client's, as clientAddress(): numeric, without the port
   std::string flow;                  ///< Options::flowOf of the request or, if that is "", remoteAddress
   /// Whether the handler may wait. False in RouteKind::quick routes, except when called again after
   /// TakesLong.

@@ -46,6 +46,9 @@ struct Options {
   std::chrono::milliseconds pingTimeout{20'000};  ///< a WebSocket client silent for this long is cut
 
   std::vector<std::string> allowedOrigins;  ///< in addition to the server's own, e.g. "https://lab.example"
+  /// Addresses, as usualAddress() writes them, of proxies whose X-Forwarded-For names the client
+  /// (clientAddress()).
+  std::vector<std::string> trustedProxies;
   std::string staticRoot;                   ///< folder of the page; empty: none
 
   /// PEM files: the certificate with its chain, and its key. With both, the server speaks only TLS; with
@@ -59,7 +62,7 @@ struct Options {
   std::function<bool(const Request&)> knows;
   /// The flow of a request and of the messages of the WebSocket that it opens. Handlers of one flow run one
   /// at a time, and flows take turns (FairPool). Called like `authorize`. If it returns "" or is not set, the
-  /// flow is the client's address.
+  /// flow is the client's address. Files of the page are a flow of their own for each address.
   std::function<std::string(const Request&)> flowOf;
   /// Formats the server's own refusals (404, 405, 413, ...).
   std::function<Response(int status, const std::string& detail)> problem;

@@ -73,7 +73,8 @@ class CommandLine(unittest.TestCase):
         result = self.run_serve("--help")
         self.assertEqual(result.returncode, 0)
         for option in ("--host", "--port", "--token-file", "--data-root", "--threads", "--log-level", "--max-sessions",
-                       "--max-clients", "--max-image", "--max-render-seconds", "--max-body", "--config"):
+                       "--max-clients", "--max-image", "--max-render-seconds", "--max-body", "--config",
+                       "--trusted-proxy"):
             self.assertIn(option, result.stdout)
         self.assertIn("by default, a new random token at each start", " ".join(result.stdout.split()))
 
@@ -132,6 +133,7 @@ class CommandLine(unittest.TestCase):
                     (folder, "serve", "x.nrrd", "--config", folder),
                     ("nan", *render, "--error", "nan"), ("inf", *render, "--seconds", "inf"),
                     ("nan", "serve", "x.nrrd", "--keep-session", "nan"),
+                    ("lab.example", "serve", "x.nrrd", "--trusted-proxy", "127.0.0.1", "--trusted-proxy", "lab.example"),
                     ("camera.=1", *render, "--set", "camera.=1"), ("a..b=1", *render, "--set", "a..b=1"),
                     (".a=1", *render, "--set", ".a=1")):
                 result = run(*arguments)

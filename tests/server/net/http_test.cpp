@@ -124,6 +124,17 @@ TEST_F(HttpTest, HandsOnQueryHeadersAndTheRealAddress) {
             "1 2t127.0.0.1");
 }
 
+TEST_F(HttpTest, KnowsAClientBehindATrustedProxyByItsOwnAddress) {
+  Options options = quickOptions();
+  options.trustedProxies = {"127.0.0.1"};
+  start(options);
+  const std::string head = "GET /query?a=1 HTTP/1.1\r\nX-Thing: t\r\nX-Forwarded-For: 6.6.6.6, 192.0.2.7";
+  TestClient proxy(port()), other(port(), 0, "127.0.0.2");
+  EXPECT_EQ(proxy.request(head).body, "1t192.0.2.7");
+  EXPECT_EQ(proxy.request(head + ", unknown").body, "1t127.0.0.1");
+  EXPECT_EQ(other.request(head).body, "1t127.0.0.2");
+}
+
 TEST_F(HttpTest, LimitsDoNotReachBodiesThatTheRouterWouldParse) {
   Options options = quickOptions();
   options.bodyLimit = 1 << 20;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Requests that take long or wait: their effect on other requests, and how they end.
 #include <atomic>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -171,6 +173,25 @@ TEST(LongRequests, WithoutAFlowAreOneOfEachAddress) {
   EXPECT_EQ(gate.arrived(), 1);
   gate.open();
   for (const auto& client : many) EXPECT_EQ(client->answer().status, 200);
+}
+
+TEST(LongRequests, OfAClientDelayNoPageFiles) {
+  const auto folder = std::filesystem::path(testing::TempDir()) / ("page_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "index.html") << "the page";
+  Options options = onAnyPort();
+  options.staticRoot = folder.string();
+  Gate gate;
+  Server server(options);
+  server.route("GET", "/long", [&](const Request&) { return passed(gate); });
+  server.start();
+  TestClient waiting(server.port()), other(server.port());
+  waiting.send("GET /long HTTP/1.1\r\nHost: a\r\n\r\n");
+  gate.waitFor(1);
+  EXPECT_EQ(other.request("GET / HTTP/1.1").body, "the page");
+  gate.open();
+  EXPECT_EQ(waiting.answer().status, 200);
+  std::filesystem::remove_all(folder);
 }
 
 TEST(LongRequests, AreToldThatTheirClientHasGone) {
