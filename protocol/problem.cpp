@@ -13,6 +13,11 @@ std::string shortened(std::string_view text, std::size_t most) {
   return std::string(text.substr(0, end)).append(kMore);
 }
 
+ProtocolError limitReached(int status, std::uint64_t limit, std::string_view what) {
+  return {status, "",
+          "the limit of " + std::to_string(limit) + " " + std::string(what) + " is reached; retry later"};
+}
+
 std::string_view statusTitle(int status) {
   switch (status) {
     case 400:

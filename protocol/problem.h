@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The exception of the protocol, and its form on the wire (RFC 9457).
 #pragma once
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -26,6 +27,9 @@ struct ProtocolError : std::runtime_error {
                ///< patch or message)
   std::string pointer;  ///< RFC 6901 pointer to the bad field; "" for the whole document
 };
+
+/// A limit that others have reached for now: "the limit of 8 `what` is reached; retry later".
+ProtocolError limitReached(int status, std::uint64_t limit, std::string_view what);
 
 /// The reason phrase of an HTTP status: "Unprocessable Content" for 422; "Error" for an unknown status.
 std::string_view statusTitle(int status);

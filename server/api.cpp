@@ -232,7 +232,7 @@ void addApi(net::Server& server, ApiContext& context) {
       const auto session = context.sessions.find(id);
       if (!session)
         throw ProtocolError(404, "", "there is no session " + shortened(id) + "; it may have ended");
-      return context.streams.join(session, socket);
+      return context.streams.join(session, socket, request.remoteAddress);
     } catch (const ProtocolError& error) {
       return errorResponse(error);
     }

@@ -39,6 +39,7 @@ struct ApiContext {
   Log log;
   std::atomic<bool>& stopping;    ///< ends requests that wait
   std::stop_token abortRequests;  ///< ends requests that render, after two thirds of Config::stopGrace
+  Now now;
   std::function<nlohmann::json()> capabilities;
   std::function<std::size_t()> unreadTextBytes;   ///< net::Server::unreadTextBytes()
   std::function<std::size_t()> requestBodyBytes;  ///< net::Server::requestBodyBytes()

@@ -17,6 +17,7 @@
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
 #include "server/api.h"
+#include "server/fair_places.h"
 #include "server/stop_rule.h"
 
 namespace scolopax::server {
@@ -40,23 +41,6 @@ std::string textOf(const std::vector<Choice::Correction>& corrections) {
   }
   return text;
 }
-
-/// One of the slots for renders that run at once. The constructor throws ProtocolError(503) if none is free.
-class RenderSlot {
- public:
-  RenderSlot(std::atomic<int>& running, int limit) : running_(running) {
-    if (++running_ <= limit) return;
-    --running_;
-    throw ProtocolError(503, "",
-                        "the limit of " + std::to_string(limit) + " renders at once is reached; retry later");
-  }
-  ~RenderSlot() { --running_; }
-  RenderSlot(const RenderSlot&) = delete;
-  RenderSlot& operator=(const RenderSlot&) = delete;
-
- private:
-  std::atomic<int>& running_;
-};
 
 using Clock = std::chrono::steady_clock;
 
@@ -151,12 +135,13 @@ struct Rendered {
   decltype(net::Response::headers) headers;  ///< state how it was made
 };
 
-/// The picture of the scene, whose stop.seconds is at most the server's limit. The slot and the memory of the
+/// The picture of the scene, whose stop.seconds is at most the server's limit. The place and the memory of the
 /// film are free again when this returns.
-Rendered renderPicture(const ApiContext& context, std::atomic<int>& running, const net::Request& request,
+Rendered renderPicture(const ApiContext& context, FairPlaces& places, const net::Request& request,
                        const std::shared_ptr<const ResolvedScene>& scene) {
   const double limit = context.config.maxRenderSeconds;
-  const RenderSlot slot(running, context.config.maxRenders);
+  const FairPlaces::Place place = places.take(request.remoteAddress);
+  if (!place) throw protocol::limitReached(503, places.most(), "renders at once");
   const auto begin = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   const auto renderer = context.makeRenderer(scene->dataset->volume);
@@ -201,7 +186,7 @@ Rendered renderPicture(const ApiContext& context, std::atomic<int>& running, con
            {"Vary", "Accept"}}};
 }
 
-net::Response render(ApiContext& context, std::atomic<int>& running, const net::Request& request) {
+net::Response render(ApiContext& context, FairPlaces& places, const net::Request& request) {
   const ImageType* type = acceptedImageType(request.header("accept"));
   if (!type)
     throw ProtocolError(406, "",
@@ -212,7 +197,7 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
   if (scene->stop.seconds > limit)
     throw ProtocolError(422, "/stop/seconds",
                         "expected at most " + shortText(limit) + ", found " + shortText(scene->stop.seconds));
-  Rendered rendered = renderPicture(context, running, request, scene);
+  Rendered rendered = renderPicture(context, places, request, scene);
   net::Response response{200, std::string(type->mediaType), "", std::move(rendered.headers)};
   setEncodedBody(
       context, request, type->memory(pixelsOf(*scene)),
@@ -226,7 +211,7 @@ net::Response render(ApiContext& context, std::atomic<int>& running, const net::
 }  // namespace
 
 std::vector<Route> renderRoutes(ApiContext& context) {
-  auto running = std::make_shared<std::atomic<int>>(0);
+  const auto places = std::make_shared<FairPlaces>(std::size_t(context.config.maxRenders), context.now);
   return {{"POST",
            "/api/v1/render",
            "A picture of a scene; the same scene gives the same bytes",
@@ -234,7 +219,7 @@ std::vector<Route> renderRoutes(ApiContext& context) {
            "application/json",
            imageMediaTypes(),
            net::RouteKind::takesLong,
-           [&context, running](const net::Request& request) { return render(context, *running, request); }}};
+           [&context, places](const net::Request& request) { return render(context, *places, request); }}};
 }
 
 }  // namespace scolopax::server

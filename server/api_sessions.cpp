@@ -80,7 +80,8 @@ net::Response create(ApiContext& context, const net::Request& request) {
       if (key != "scene") throw ProtocolError(422, "/" + shortened(key), "unknown field; expected scene");
     if (body.contains("scene")) scene = std::move(body["scene"]);
   }
-  const auto session = measuredIn(context, request, [&] { return context.sessions.create(scene); });
+  const auto session =
+      measuredIn(context, request, [&] { return context.sessions.create(scene, request.remoteAddress); });
   json body = sceneJson(session->scene());
   body["id"] = session->id();
   body["token"] = session->token();

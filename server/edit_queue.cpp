@@ -12,10 +12,8 @@ void EditQueue::push(Edit edit) {
   {
     const std::lock_guard lock(mutex_);
     if (!roomFor(edit))
-      throw protocol::ProtocolError(429, "",
-                                    "the limit of " + std::to_string(kMaxEdits) + " edits or " +
-                                        std::to_string(kMaxBytes) +
-                                        " bytes of them waiting in one stream is reached; retry later");
+      throw protocol::limitReached(
+          429, kMaxEdits, "edits or " + std::to_string(kMaxBytes) + " bytes of them waiting in one stream");
     bytes_ += edit.bytes;
     ++count_;
     waiting_.push_back(std::move(edit));

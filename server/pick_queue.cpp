@@ -2,7 +2,6 @@
 #include "server/pick_queue.h"
 
 #include <algorithm>
-#include <string>
 #include <utility>
 
 #include "protocol/problem.h"
@@ -10,10 +9,7 @@
 namespace scolopax::server {
 
 PickId PickQueue::add(const PickQuery& query, ViewerId viewer, OnPicked answered) {
-  if (picks_.size() >= kMaxPicks)
-    throw protocol::ProtocolError(
-        429, "",
-        "the limit of " + std::to_string(kMaxPicks) + " picks waiting in a session is reached; retry later");
+  if (picks_.size() >= kMaxPicks) throw protocol::limitReached(429, kMaxPicks, "picks waiting in a session");
   picks_.push_back({{++last_, query}, viewer, std::move(answered)});
   return last_;
 }

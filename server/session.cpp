@@ -165,9 +165,7 @@ std::shared_ptr<const EncodedFrame> Session::waitForFrame(const FrameQuery& quer
                                                           std::chrono::milliseconds timeout) {
   std::unique_lock lock(mutex_);
   if (pollSamples_.size() >= kMaxPolls)
-    throw protocol::ProtocolError(429, "",
-                                  "the limit of " + std::to_string(kMaxPolls) +
-                                      " requests waiting for a session's frames is reached; retry later");
+    throw protocol::limitReached(429, kMaxPolls, "requests waiting for a session's frames");
   if (query.aovs) {
     if (const auto reason = resolver_->tooLarge(scene_->render, true))
       throw protocol::ProtocolError(422, "/aov", *reason);

@@ -10,43 +10,46 @@
 namespace scolopax::server {
 
 SessionStore::SessionStore(std::shared_ptr<const SceneResolver> resolver, Options options, SessionHooks hooks)
-    : resolver_(std::move(resolver)), options_(options), hooks_(std::move(hooks)) {}
+    : resolver_(std::move(resolver)),
+      options_(options),
+      hooks_(std::move(hooks)),
+      places_(options_.maxSessions, hooks_.now) {}
 
-/// Throws if another session cannot be created now. Requires the mutex.
-void SessionStore::checkRoom() const {
-  if (list_->closed) throw protocol::ProtocolError(503, "", *list_->closed);
-  if (list_->sessions.size() >= options_.maxSessions)
-    throw protocol::ProtocolError(
-        503, "",
-        "the limit of " + std::to_string(options_.maxSessions) + " sessions is reached; retry later");
-}
-
-std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene) {
+std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene, const std::string& client) {
   expire();
-  {
-    const std::lock_guard lock(list_->mutex);
-    checkRoom();  // before resolving the scene, which takes time
-  }
+  const auto full = [this] { return protocol::limitReached(503, options_.maxSessions, "sessions"); };
+  list_->throwIfClosed();
+  // The place first, because resolving the scene takes time.
+  FairPlaces::Place place = places_.take(client);
+  const auto other = place ? std::nullopt : places_.hasTooMany(client);
+  if (!place && !other) throw full();
   auto session = std::make_shared<Session>(createToken(), createToken(), resolver_,
                                            resolver_->replaceNow(scene), hooks_);
-  const std::lock_guard lock(list_->mutex);
-  checkRoom();  // again, because other threads may have created sessions
-  list_->sessions.push_back(session);
+  if (!place && endUnusedOf(*other)) place = places_.take(client);
+  if (!place) throw full();
+  list_->add({session, client, std::move(place)});
   hooks_.wakeRender();  // the loop will end the session if nobody uses it
   return session;
 }
 
+/// Ends the client's session that has been unused for the longest, if it has been unused for long enough.
+bool SessionStore::endUnusedOf(const std::string& client) {
+  std::shared_ptr<Session> oldest;
+  for (const auto& session : list_->of(client))
+    if (!oldest || session->lastUsed() < oldest->lastUsed()) oldest = session;
+  return oldest && oldest->lastUsed() + kUnused <= hooks_.now() && remove(oldest->id());
+}
+
 std::shared_ptr<Session> SessionStore::find(std::string_view id) const {
   const std::lock_guard lock(list_->mutex);
-  const auto found = std::find_if(list_->sessions.begin(), list_->sessions.end(),
-                                  [&](const auto& s) { return s->id() == id; });
-  return found == list_->sessions.end() ? nullptr : *found;
+  const auto found = list_->find(id);
+  return found == list_->entries.end() ? nullptr : found->session;
 }
 
 std::shared_ptr<Session> SessionStore::findByToken(std::string_view token) const {
   const std::lock_guard lock(list_->mutex);
-  for (const auto& session : list_->sessions)
-    if (sameToken(session->token(), token)) return session;
+  for (const Entry& entry : list_->entries)
+    if (sameToken(entry.session->token(), token)) return entry.session;
   return nullptr;
 }
 
@@ -54,30 +57,48 @@ bool SessionStore::remove(std::string_view id) {
   std::shared_ptr<Session> session;
   {
     const std::lock_guard lock(list_->mutex);
-    const auto found = std::find_if(list_->sessions.begin(), list_->sessions.end(),
-                                    [&](const auto& s) { return s->id() == id; });
-    if (found == list_->sessions.end()) return false;
-    session = *found;
-    list_->sessions.erase(found);
+    const auto found = list_->find(id);
+    if (found == list_->entries.end()) return false;
+    session = std::move(found->session);
+    list_->entries.erase(found);
   }
   session->close("the session was deleted");
   hooks_.wakeRender();  // the loop releases the session's renderer
   return true;
 }
 
-std::vector<std::shared_ptr<Session>> SessionStore::List::all() const {
+void SessionStore::List::throwIfClosed() const {
   const std::lock_guard lock(mutex);
+  if (closed) throw protocol::ProtocolError(503, "", *closed);
+}
+
+void SessionStore::List::add(Entry entry) {
+  const std::lock_guard lock(mutex);
+  if (closed) throw protocol::ProtocolError(503, "", *closed);  // meanwhile
+  entries.push_back(std::move(entry));
+}
+
+std::vector<SessionStore::Entry>::iterator SessionStore::List::find(std::string_view id) {
+  return std::find_if(entries.begin(), entries.end(),
+                      [&](const Entry& entry) { return entry.session->id() == id; });
+}
+
+std::vector<std::shared_ptr<Session>> SessionStore::List::of(const std::optional<std::string>& client) const {
+  const std::lock_guard lock(mutex);
+  std::vector<std::shared_ptr<Session>> sessions;
+  for (const Entry& entry : entries)
+    if (!client || entry.client == *client) sessions.push_back(entry.session);
   return sessions;
 }
 
-std::vector<std::shared_ptr<Session>> SessionStore::all() const { return list_->all(); }
+std::vector<std::shared_ptr<Session>> SessionStore::all() const { return list_->of(std::nullopt); }
 
 std::function<bool()> SessionStore::pictureRelease() const {
   return [weak = std::weak_ptr(list_)] {
     const auto list = weak.lock();
     if (!list) return false;
     std::multimap<TimePoint, std::shared_ptr<Session>> byUse;
-    for (auto& session : list->all()) byUse.emplace(session->lastUsed(), std::move(session));
+    for (auto& session : list->of(std::nullopt)) byUse.emplace(session->lastUsed(), std::move(session));
     return std::any_of(byUse.begin(), byUse.end(), [](const auto& one) { return one.second->dropPicture(); });
   };
 }
@@ -95,13 +116,13 @@ std::optional<TimePoint> SessionStore::expire() {
 }
 
 void SessionStore::closeAll(const std::string& reason) {
-  std::vector<std::shared_ptr<Session>> sessions;
+  std::vector<Entry> entries;
   {
     const std::lock_guard lock(list_->mutex);
     list_->closed = reason;
-    sessions = std::exchange(list_->sessions, {});
+    entries = std::exchange(list_->entries, {});
   }
-  for (const auto& session : sessions) session->close(reason);
+  for (const Entry& entry : entries) entry.session->close(reason);
 }
 
 }  // namespace scolopax::server

@@ -73,6 +73,10 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
   }
   void sessionClosed(const std::string& reason) override { end(1001, reason); }
 
+  void end(std::uint16_t code, const std::string& reason) {
+    if (const auto socket = socket_.lock()) socket->close(code, reason);
+  }
+
  private:
   void sendFrame(const EncodedFrame& frame, std::uint32_t patch) {
     protocol::FrameHeader header;
@@ -177,10 +181,6 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
     }
   }
 
-  void end(std::uint16_t code, const std::string& reason) {
-    if (const auto socket = socket_.lock()) socket->close(code, reason);
-  }
-
   void sendText(std::string text) {
     if (const auto socket = socket_.lock()) socket->sendText(std::move(text));
   }
@@ -201,20 +201,27 @@ class Stream : public ViewerSink, public std::enable_shared_from_this<Stream> {
 };
 
 StreamHub::StreamHub(SessionStore& store, Background& background, Metrics& metrics, Options options)
-    : store_(store), background_(background), metrics_(metrics), options_(std::move(options)) {}
+    : store_(store),
+      background_(background),
+      metrics_(metrics),
+      options_(std::move(options)),
+      places_(options_.maxClients, options_.now) {}
 
 StreamHub::~StreamHub() = default;
 
 net::WebSocketEvents StreamHub::join(const std::shared_ptr<Session>& session,
-                                     const std::shared_ptr<net::WebSocket>& socket) {
+                                     const std::shared_ptr<net::WebSocket>& socket,
+                                     const std::string& client) {
+  FairPlaces::Place place = places_.take(client);
+  if (!place) {
+    // The place that becomes free is kept for this client, which will try again.
+    if (const auto other = places_.hasTooMany(client)) closeNewestOf(*other);
+    throw protocol::limitReached(503, options_.maxClients, "streams");
+  }
   auto stream = std::make_shared<Stream>(store_, background_, options_, socket);
   {
     const std::lock_guard lock(mutex_);
-    if (streams_.size() >= options_.maxClients)
-      throw ProtocolError(
-          503, "",
-          "the limit of " + std::to_string(options_.maxClients) + " streams is reached; retry later");
-    streams_.push_back(stream);
+    streams_.push_back({stream, client, std::move(place)});
   }
   try {
     stream->join(session);
@@ -229,16 +236,23 @@ net::WebSocketEvents StreamHub::join(const std::shared_ptr<Session>& session,
           }};
 }
 
+void StreamHub::closeNewestOf(const std::string& client) {
+  const std::lock_guard lock(mutex_);
+  const auto newest = std::find_if(streams_.rbegin(), streams_.rend(),
+                                   [&](const Entry& entry) { return entry.client == client; });
+  if (newest != streams_.rend()) newest->stream->end(1013, "another client asked for one of the streams");
+}
+
 void StreamHub::left(const Stream* stream) {
   countFrames();
   const std::lock_guard lock(mutex_);
-  std::erase_if(streams_, [&](const auto& one) { return one.get() == stream; });
+  std::erase_if(streams_, [&](const Entry& entry) { return entry.stream.get() == stream; });
 }
 
 void StreamHub::countFrames() {
   const std::lock_guard lock(mutex_);
-  for (const auto& stream : streams_) {
-    const auto [sent, replaced] = stream->newFrames();
+  for (const Entry& entry : streams_) {
+    const auto [sent, replaced] = entry.stream->newFrames();
     metrics_.framesSent(sent, replaced);
   }
 }

@@ -201,6 +201,23 @@ TEST(Api, RefusesOneRenderTooManyWith503) {
   EXPECT_EQ(headerOf(errorResponse(ProtocolError(503, "", "busy")), "Retry-After"), "1");
 }
 
+TEST(Api, KeepsTheNextRenderForAnotherClientThatWasRefused) {
+  Api api;
+  const auto renderOf = [&](const char* client) {
+    api.client = client;
+    return api.errorOf("POST", "/api/v1/render", kSmallRender).first;
+  };
+  int nested = 0;
+  api.workshop.control->duringPass = [&] {
+    if (nested == 0) nested = renderOf("192.0.2.2");
+  };
+  EXPECT_EQ(renderOf("192.0.2.1"), 200);
+  EXPECT_EQ(nested, 503);
+  EXPECT_EQ(renderOf("192.0.2.1"), 503);
+  EXPECT_EQ(renderOf("192.0.2.2"), 200);
+  EXPECT_EQ(renderOf("192.0.2.1"), 200);
+}
+
 TEST(Api, KeepsNoPlaceForARenderThatWaitsToBeEncodedNorForOneWhoseClientHasGone) {
   Api api;
   net::Gate gate;

@@ -20,10 +20,11 @@ struct Api {
   std::shared_ptr<const DatasetStore> datasets = smallStore();
   SceneResolver resolver{datasets, {64, 1000}};
   BackgroundThreads encoders{2};
-  StreamHub streams{workshop.store, workshop.background, metrics, {}};
+  StreamHub streams{workshop.store, workshop.background, metrics, {64, {}, {}, {}, workshop.hooks.now}};
   std::atomic<bool> stopping{false};
   std::stop_source gone, abortRequests;
-  int tookLong = 0;  ///< calls of quick routes that had to be repeated where they may wait
+  std::string client = "192.0.2.1";  ///< address from which calls come
+  int tookLong = 0;                  ///< calls of quick routes that had to be repeated where they may wait
   ApiContext context{config,
                      *datasets,
                      resolver,
@@ -39,6 +40,7 @@ struct Api {
                      [](const std::string&) {},
                      stopping,
                      abortRequests.get_token(),
+                     workshop.clock.now(),
                      [] {
                        return nlohmann::json{{"backend", "fake"}};
                      },
@@ -63,6 +65,7 @@ struct Api {
     request.body = body;
     request.headers = std::move(headers);
     request.gone = gone.get_token();
+    request.remoteAddress = client;
     static const std::regex pair("[?&]([^=]+)=([^&]*)");
     for (std::sregex_iterator at(target.begin(), target.end(), pair), end; at != end; ++at)
       request.query.emplace((*at)[1], (*at)[2]);

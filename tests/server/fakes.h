@@ -242,7 +242,8 @@ struct Workshop {
   RenderLoop render;
   EncodeLoop encode;
 
-  explicit Workshop(SessionStore::Options options = {}, const std::shared_ptr<MemoryBudget>& memory = nullptr)
+  explicit Workshop(SessionStore::Options options = {32, std::chrono::minutes(5)},
+                    const std::shared_ptr<MemoryBudget>& memory = nullptr)
       : store(resolver, options, hooks),
         render(store,
                {[this](const std::shared_ptr<const Volume>&) {

@@ -42,7 +42,7 @@ TEST(RenderLoop, RefusesAFilmThatTheMemoryForAllSessionsDoesNotHoldUntilItIsAske
 }
 
 TEST(RenderLoop, DropsTheFilmThatNobodyHasWatchedForTheLongestTimeWhenMemoryIsShort) {
-  Workshop workshop({}, std::make_shared<MemoryBudget>(11'000'000));  // three films and the pictures
+  Workshop workshop({32, 5min}, std::make_shared<MemoryBudget>(11'000'000));  // three films and the pictures
   workshop.control->filmPixelBytes = 1000;
   struct Watched {
     std::shared_ptr<Session> session;
@@ -88,7 +88,7 @@ TEST(RenderLoop, DropsTheFilmThatNobodyHasWatchedForTheLongestTimeWhenMemoryIsSh
 
 TEST(RenderLoop, GivesThePictureOfARequestTheMemoryOfAFilmThatNobodyWatches) {
   const auto memory = std::make_shared<MemoryBudget>(3'500'000);
-  Workshop workshop({}, memory);
+  Workshop workshop({32, 5min}, memory);
   workshop.control->filmPixelBytes = 1000;
   const auto session = workshop.store.create({{"image", {{"width", 64}, {"height", 48}}}});
   const ViewerId id = session->addViewer(std::make_shared<FakeViewer>());
@@ -103,7 +103,7 @@ TEST(RenderLoop, GivesThePictureOfARequestTheMemoryOfAFilmThatNobodyWatches) {
 
 TEST(RenderLoop, DropsPicturesThatNobodyWatchesBeforeItRefusesAnother) {
   const auto memory = std::make_shared<MemoryBudget>(200'000);  // three pictures, and all films
-  Workshop workshop({}, memory);
+  Workshop workshop({32, 5min}, memory);
   std::vector<std::shared_ptr<Session>> sessions;
   std::vector<std::uint32_t> numbers;
   for (int i = 0; i < 6; ++i) {

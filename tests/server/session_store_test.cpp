@@ -75,6 +75,44 @@ TEST(SessionStore, RefusesOneSessionTooManyWith503) {
   EXPECT_NE(workshop.store.create(json::object()), nullptr);
 }
 
+TEST(SessionStore, EndsAnUnusedSessionOfAClientThatHasMostOfThemForAnotherClient) {
+  Workshop workshop({4, 5min});
+  std::vector<std::shared_ptr<Session>> of;
+  for (int i = 0; i < 4; ++i) {
+    of.push_back(workshop.store.create(json::object(), "a"));
+    workshop.clock.advance(1s);
+  }
+  const auto refused = [&](const char* client) {
+    try {
+      workshop.store.create(json::object(), client);
+      return false;
+    } catch (const protocol::ProtocolError& error) {
+      EXPECT_EQ(error.status, 503);
+      return true;
+    }
+  };
+  const auto exists = [&](std::size_t i) { return workshop.store.find(of[i]->id()) != nullptr; };
+  EXPECT_TRUE(refused("b"));
+  workshop.clock.advance(SessionStore::kUnused - 4s);  // the first has been unused for long enough
+  EXPECT_TRUE(refused("a"));
+  EXPECT_FALSE(refused("b"));
+  EXPECT_FALSE(exists(0));
+  EXPECT_TRUE(exists(1));
+  of[1]->addViewer(std::make_shared<FakeViewer>());
+  workshop.clock.advance(1s);
+  EXPECT_TRUE(refused("b"));  // the second has a viewer, the third has not been unused for long enough
+  workshop.clock.advance(1s);
+  EXPECT_FALSE(refused("b"));
+  EXPECT_TRUE(exists(1));
+  EXPECT_FALSE(exists(2));
+  // Both have half of them. A place that becomes free is for a third.
+  workshop.clock.advance(SessionStore::kUnused);
+  EXPECT_TRUE(refused("c"));
+  EXPECT_TRUE(workshop.store.remove(of[3]->id()));
+  EXPECT_TRUE(refused("a"));
+  EXPECT_FALSE(refused("c"));
+}
+
 /// Counts the scenes that it resolves.
 struct CountingResolver : SceneResolver {
   CountingResolver() : SceneResolver(testing::smallStore(), {}) {}

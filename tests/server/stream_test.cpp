@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "protocol/problem.h"
 #include "tests/server/fakes.h"
 
 namespace scolopax::server {
@@ -38,10 +39,11 @@ struct Client {
   Workshop workshop;
   Metrics metrics;
   std::vector<std::string> log;
-  StreamHub hub{workshop.store,
-                workshop.background,
-                metrics,
-                {8, {}, json::object(), [this](const std::string& line) { log.push_back(line); }}};
+  StreamHub hub{
+      workshop.store,
+      workshop.background,
+      metrics,
+      {8, {}, json::object(), [this](const std::string& line) { log.push_back(line); }, workshop.hooks.now}};
   std::shared_ptr<Session> session = workshop.store.create(json::object());
   std::shared_ptr<FakeSocket> socket = std::make_shared<FakeSocket>();
   net::WebSocketEvents events = hub.join(session, socket);
@@ -100,6 +102,37 @@ TEST(Stream, SharesTheTextAboutAnEditWithTheOthers) {
   EXPECT_NE(client.socket->texts.back()->find("revision"), std::string::npos);
   EXPECT_EQ(client.socket->texts.back(), other->texts.back());
   events.onClose();
+}
+
+TEST(Stream, OfAClientThatHasMostOfThemIsClosedForAnotherClient) {
+  Workshop workshop;
+  Metrics metrics;
+  StreamHub hub{
+      workshop.store, workshop.background, metrics, {4, {}, json::object(), {}, workshop.hooks.now}};
+  const auto session = workshop.store.create(json::object());
+  std::vector<std::shared_ptr<FakeSocket>> sockets;
+  std::vector<net::WebSocketEvents> joined;
+  const auto join = [&](const char* client) {
+    sockets.push_back(std::make_shared<FakeSocket>());
+    try {
+      joined.push_back(hub.join(session, sockets.back(), client));
+      return true;
+    } catch (const protocol::ProtocolError& error) {
+      EXPECT_EQ(error.status, 503);
+      return false;
+    }
+  };
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(join("a"));
+  EXPECT_FALSE(join("a"));
+  EXPECT_EQ(sockets[3]->closed, 0);
+  EXPECT_FALSE(join("b"));
+  EXPECT_EQ(sockets[3]->closed, 1013);
+  EXPECT_EQ(sockets[2]->closed, 0);
+  joined[3].onClose();
+  EXPECT_FALSE(join("a"));  // the place is kept
+  EXPECT_TRUE(join("b"));
+  EXPECT_EQ(hub.count(), 4u);
+  for (const std::size_t i : {0, 1, 2, 4}) joined[i].onClose();
 }
 
 TEST(Stream, EndsWhenTheOthersEditsCannotBeSent) {
