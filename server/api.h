@@ -28,7 +28,7 @@ namespace scolopax::server {
 struct ApiContext {
   const Config& config;
   const DatasetStore& datasets;
-  const SceneResolver& renderResolver;  ///< for POST /render, with that call's default sample count
+  const SceneResolver& renderResolver;  ///< for POST /render
   SessionStore& sessions;
   StreamHub& streams;
   Metrics& metrics;

@@ -74,7 +74,7 @@ json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
             {"clients", config.maxClients},
             {"renders", config.maxRenders},
             {"renderSeconds", config.maxRenderSeconds},
-            {"macrocells", SceneResolver::Options().maxIntervals},
+            {"macrocells", SceneResolver::kMaxIntervals},
             {"waitingPolls", Session::kMaxPolls},
             {"waitingPicks", PickQueue::kMaxPicks},
             {"waitingEdits", EditQueue::kMaxEdits},
@@ -100,8 +100,7 @@ struct Application::Impl {
   BackgroundThreads encoders{std::min<std::size_t>(2, processors())};
   Metrics metrics;
   std::shared_ptr<const DatasetStore> datasets;
-  std::shared_ptr<const SceneResolver> sessionResolver;
-  SceneResolver renderResolver;
+  std::shared_ptr<const SceneResolver> resolver;
   SessionStore sessions;
   RenderLoop renderLoop;
   EncodeLoop encodeLoop;
@@ -119,14 +118,9 @@ struct Application::Impl {
         makeRenderer(std::move(make)),
         memory(std::move(budget)),
         datasets(std::make_shared<const DatasetStore>(std::move(loaded), memory)),
-        sessionResolver(std::make_shared<const SceneResolver>(
-            datasets,
-            SceneResolver::Options{
-                .defaultSamples = config.sessionSamples, .maxPixels = config.maxPixels, .memory = memory})),
-        renderResolver(
-            datasets,
-            {.defaultSamples = config.renderSamples, .maxPixels = config.maxPixels, .memory = memory}),
-        sessions(sessionResolver, {config.maxSessions, config.keepSession},
+        resolver(std::make_shared<const SceneResolver>(
+            datasets, SceneResolver::Options{.maxPixels = config.maxPixels, .memory = memory})),
+        sessions(resolver, {config.maxSessions, config.keepSession},
                  {now, [this] { renderThread.wake(); }, [this] { encodeThread.wake(); },
                   [this] { renderLoop.interrupt(); }}),
         renderLoop(sessions,
@@ -144,13 +138,13 @@ struct Application::Impl {
                    [this](const PassResult& pass) { metrics.passEnded(pass); }),
         encodeLoop(
             sessions, now, log, pictures, [this] { encodeThread.wake(); }, memory),
-        capabilities(capabilitiesJson(config, sessionResolver->lists())),
+        capabilities(capabilitiesJson(config, resolver->lists())),
         streams(sessions, builds, metrics,
                 {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities, log, now}),
         answers(memory),
         context{config,
                 *datasets,
-                renderResolver,
+                *resolver,
                 sessions,
                 streams,
                 metrics,

@@ -29,8 +29,6 @@ struct Config {
   std::size_t maxBodyBytes = std::size_t{1} << 20;
   std::size_t maxMessageBytes = std::size_t{1} << 20;
   std::size_t maxJsonDepth = 32;
-  std::uint32_t sessionSamples = 4096;  ///< for a session without a stop rule
-  std::uint32_t renderSamples = 64;     ///< for a POST /render without a stop rule
   std::chrono::milliseconds keepSession{300'000};
   std::chrono::milliseconds pollTimeout{25'000};
   std::chrono::milliseconds stopGrace{3'000};

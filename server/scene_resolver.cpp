@@ -320,9 +320,9 @@ std::shared_ptr<const Dataset> SceneResolver::datasetOf(const json& scene) const
   return dataset;
 }
 
-SceneResolver::Resolved SceneResolver::replaceNow(const json& scene) const {
+SceneResolver::Resolved SceneResolver::replaceNow(const json& scene, std::uint32_t defaultSamples) const {
   const auto count = datasetOf(scene)->volume->channels().size();
-  return resolve(SparseScene().patched(scene, count), {});
+  return resolve(SparseScene().patched(scene, count), {}, defaultSamples);
 }
 
 SceneResolver::Resolved SceneResolver::patchNow(const ResolvedScene& base, const json& patch) const {
@@ -333,11 +333,12 @@ SceneResolver::Resolved SceneResolver::patchNow(const ResolvedScene& base, const
   if (resetsView(patch)) automatic.framed.reset();
   for (std::size_t i = 0; i < automatic.gradientRanges.size(); ++i)
     if (resetsGradientRange(patch, i)) automatic.gradientRanges[i].reset();
-  return resolve(std::move(sparse), automatic);
+  return resolve(std::move(sparse), automatic, base.defaultSamples);
 }
 
-SceneResolver::Resolved SceneResolver::replace(const json& scene, const std::stop_token& stop) const {
-  return whenMeasured(stop, [&] { return replaceNow(scene); });
+SceneResolver::Resolved SceneResolver::replace(const json& scene, const std::stop_token& stop,
+                                               std::uint32_t defaultSamples) const {
+  return whenMeasured(stop, [&] { return replaceNow(scene, defaultSamples); });
 }
 
 SceneResolver::Resolved SceneResolver::patch(const ResolvedScene& base, const json& patch,
@@ -364,7 +365,8 @@ std::optional<std::string> SceneResolver::tooLarge(const Scene& scene, bool aovs
   return std::nullopt;
 }
 
-SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const AutomaticValues& automatic) const {
+SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const AutomaticValues& automatic,
+                                               std::uint32_t defaultSamples) const {
   protocol::Scene scene = sparse.parsed(lists_);
   auto result = std::make_shared<ResolvedScene>();
   if (const std::uint64_t bytes = curveBytes(scene); bytes > MemoryBudget::kFreeBytes)
@@ -401,8 +403,8 @@ SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const Automat
   render.filter = valueOf<PixelFilter>(kPixelFilters, scene.image.filter);
   resolveGradientOpacity(scene, *result);  // late, so that refused scenes are not measured
   refuseAt("", [&] { checkScene(render, volume); });
-  if (!scene.stop.samples && !scene.stop.seconds && !scene.stop.error)
-    scene.stop.samples = options_.defaultSamples;
+  if (!scene.stop.samples && !scene.stop.seconds && !scene.stop.error) scene.stop.samples = defaultSamples;
+  result->defaultSamples = defaultSamples;
   result->stop = {scene.stop.samples.value_or(0), scene.stop.seconds.value_or(0),
                   scene.stop.error.value_or(0)};
   result->resolved = std::move(scene);

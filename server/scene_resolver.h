@@ -42,6 +42,7 @@ struct ResolvedScene {
   Scene render;
   StopRule stop;
   std::shared_ptr<const Dataset> dataset;
+  std::uint32_t defaultSamples = kRenderSamples;  ///< of this scene and of those that patches make of it
   AutomaticValues automatic = {};
   MemoryBudget::Share memory = {};
 };
@@ -57,28 +58,32 @@ protocol::Lists rendererLists();
 
 class SceneResolver {
  public:
+  /// Macrocells x channels that a data set may have, for macrocells below the default size.
+  static constexpr std::size_t kMaxIntervals = 1 << 25;
+
   struct Options {
-    std::uint32_t defaultSamples = 64;     ///< if the scene has no stop rule
-    std::uint64_t maxPixels = 16'777'216;  ///< width x height
-    std::size_t maxIntervals = 1 << 25;    ///< macrocells x channels, for macrocells below the default size
+    std::uint64_t maxPixels;  ///< width x height
+    std::size_t maxIntervals = kMaxIntervals;
     std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for pictures and long curves; null: no limit
   };
   SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options);
   virtual ~SceneResolver() = default;
 
   using Resolved = std::shared_ptr<const ResolvedScene>;
-  /// Resolves a whole scene. Chooses automatic values (the view and the ranges of gradients) from its curves,
-  /// and waits until the data that this needs has been measured. Throws ProtocolError(422) with the pointer
-  /// of the bad field, Error(cancelled) once `stop` is requested, and Error(busy or tooLarge) if there is not
-  /// enough memory.
-  Resolved replace(const nlohmann::json& scene, const std::stop_token& stop = {}) const;
+  /// Resolves a whole scene; `defaultSamples` is its stop rule if it has none. Chooses automatic values (the
+  /// view and the ranges of gradients) from its curves, and waits until the data that this needs has been
+  /// measured. Throws ProtocolError(422) with the pointer of the bad field, Error(cancelled) once `stop` is
+  /// requested, and Error(busy or tooLarge) if there is not enough memory.
+  Resolved replace(const nlohmann::json& scene, const std::stop_token& stop = {},
+                   std::uint32_t defaultSamples = kRenderSamples) const;
   /// Applies a patch to the sparse form of `base`. Automatic values stay, unless the patch asks for new ones
   /// (by a camera, eye, target, channel, gradientOpacity or range that is null, or by replacing all channels)
   /// or names another data set. Waits and throws as replace() does.
   Resolved patch(const ResolvedScene& base, const nlohmann::json& patch,
                  const std::stop_token& stop = {}) const;
   /// The same for callers that must not wait: throws Unmeasured instead.
-  virtual Resolved replaceNow(const nlohmann::json& scene) const;
+  virtual Resolved replaceNow(const nlohmann::json& scene,
+                              std::uint32_t defaultSamples = kRenderSamples) const;
   virtual Resolved patchNow(const ResolvedScene& base, const nlohmann::json& patch) const;
   /// The reason why a picture of the scene, with AOVs if they are recorded, can never fit into the memory
   /// budget; nullopt if it may fit.
@@ -86,7 +91,7 @@ class SceneResolver {
   const protocol::Lists& lists() const { return lists_; }
 
  private:
-  Resolved resolve(SparseScene sparse, const AutomaticValues& automatic) const;
+  Resolved resolve(SparseScene sparse, const AutomaticValues& automatic, std::uint32_t defaultSamples) const;
   void frame(const protocol::Scene& scene, ResolvedScene& result) const;
   void resolveGradientOpacity(protocol::Scene& scene, ResolvedScene& result) const;
   std::array<double, 2> gradientRange(const ResolvedScene& scene, int channel) const;

@@ -58,7 +58,9 @@ Session::SceneState Session::patch(const nlohmann::json& patch, const EditOrigin
 }
 
 Session::SceneState Session::replace(const nlohmann::json& scene, const EditOrigin& origin) {
-  return edit(origin, [&](const ResolvedScene&) { return resolver_->replaceNow(scene); });
+  return edit(origin, [&](const ResolvedScene& before) {
+    return resolver_->replaceNow(scene, before.defaultSamples);
+  });
 }
 
 void Session::checkRevision(const EditOrigin& origin) const {

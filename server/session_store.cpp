@@ -24,7 +24,7 @@ std::shared_ptr<Session> SessionStore::create(const nlohmann::json& scene, const
   const auto other = place ? std::nullopt : places_.hasTooMany(client);
   if (!place && !other) throw full();
   auto session = std::make_shared<Session>(createToken(), createToken(), resolver_,
-                                           resolver_->replaceNow(scene), hooks_);
+                                           resolver_->replaceNow(scene, kSessionSamples), hooks_);
   if (!place && endUnusedOf(*other)) place = places_.take(client);
   if (!place) throw full();
   list_->add({session, client, std::move(place)});

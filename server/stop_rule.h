@@ -7,6 +7,9 @@
 
 namespace scolopax::server {
 
+/// Samples per pixel of a scene without a stop rule: of a single render, and in a session.
+inline constexpr std::uint32_t kRenderSamples = 64, kSessionSamples = 4096;
+
 /// Rendering ends when the first of these limits is reached; 0 means no limit.
 struct StopRule {
   std::uint32_t samples = 0;

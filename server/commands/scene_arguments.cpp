@@ -10,6 +10,7 @@
 
 #include "protocol/json_text.h"
 #include "renderer/core/error.h"
+#include "server/config.h"
 #include "server/dataset_store.h"
 
 namespace scolopax {
@@ -65,7 +66,7 @@ std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& 
   const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
   const auto store = std::make_shared<server::DatasetStore>(
       io::loadDatasets(arguments.data, io::defaultMemoryLimitBytes(), warn));
-  const server::SceneResolver resolver(store, {});
+  const server::SceneResolver resolver(store, {.maxPixels = server::Config().maxPixels});
   auto resolved = resolver.replace(scene);
   for (const json& patch : patches) resolved = resolver.patch(*resolved, patch);
   // Resolved again as a whole, so that the automatic view fits the final curves.

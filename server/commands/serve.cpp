@@ -215,7 +215,7 @@ CLI::App* addServeCommand(CLI::App& root) {
       ->type_name("FILE");
   command->footer(
       "Macrocells smaller than 4 voxels are refused if a data set would have more than " +
-      std::to_string(server::SceneResolver::Options().maxIntervals) +
+      std::to_string(server::SceneResolver::kMaxIntervals) +
       " of them, counted once\nfor each channel.\n"
       "Each option can also be set in the environment (--max-body as SCOLOPAX_MAX_BODY) or in the file of\n"
       "--config; the command line takes precedence over the environment, the environment over the file.\n"

@@ -71,6 +71,12 @@ TEST(Schema, IsTheOneInTheRepository) {
 
 TEST(Schema, ListsAsManyChannelsAsAVolumeMayHave) { EXPECT_EQ(std::size_t{kMaxChannels}, kMaxChannelItems); }
 
+TEST(Schema, SaysHowManySamplesASceneWithoutAStopRuleGets) {
+  EXPECT_NE(Table<Stop>::doc.find(std::to_string(server::kRenderSamples) + " samples in a render and " +
+                                  std::to_string(server::kSessionSamples) + " in a session"),
+            std::string_view::npos);
+}
+
 TEST(Schema, GivesEveryFieldADescriptionAndADefaultThatIsTaken) {
   int fields = 0;
   forEachSchemaField(schema(), json::json_pointer(), [&](const json::json_pointer& path, const json& field) {

@@ -129,7 +129,7 @@ TEST(EditQueue, FailsWhatWaitsWhenItsClientLeaves) {
 TEST(EditQueue, TellsWhyWhatIsNeededCannotBeMeasured) {
   Workshop workshop;
   const auto datasets = testing::smallStore(std::make_shared<MemoryBudget>(1000));
-  SessionStore store(std::make_shared<const SceneResolver>(datasets, SceneResolver::Options{}),
+  SessionStore store(std::make_shared<const SceneResolver>(datasets, SceneResolver::Options{16'777'216}),
                      {32, std::chrono::minutes(5)}, workshop.hooks);
   Editor editor(store, workshop.background);
   editor.patch(gradientPatch());
@@ -158,8 +158,9 @@ TEST(EditQueue, RefusesMoreThanMayWait) {
 
 TEST(EditQueue, KeepsTheOrderOnThreadsOfItsOwn) {
   const SessionHooks hooks{[] { return std::chrono::steady_clock::now(); }, [] {}, [] {}, [] {}};
-  SessionStore store(std::make_shared<const SceneResolver>(testing::smallStore(), SceneResolver::Options{}),
-                     {32, std::chrono::minutes(5)}, hooks);
+  SessionStore store(
+      std::make_shared<const SceneResolver>(testing::smallStore(), SceneResolver::Options{16'777'216}),
+      {32, std::chrono::minutes(5)}, hooks);
   BackgroundThreads background;
   Editor editor(store, background), leaving(store, background);
   leaving.patch(gradientPatch());

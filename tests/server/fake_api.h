@@ -18,7 +18,7 @@ struct Api {
   Workshop workshop;
   Metrics metrics;
   std::shared_ptr<const DatasetStore> datasets = smallStore();
-  SceneResolver resolver{datasets, {64, 1000}};
+  SceneResolver resolver{datasets, {1000}};
   BackgroundThreads encoders{2};
   StreamHub streams{workshop.store, workshop.background, metrics, {64, {}, {}, {}, workshop.hooks.now}};
   std::atomic<bool> stopping{false};

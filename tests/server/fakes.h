@@ -235,7 +235,7 @@ struct Workshop {
   SessionHooks hooks{clock.now(), [this] { ++renderWakes; }, [this] { ++encoderWakes; },
                      [this] { render.interrupt(); }};
   std::shared_ptr<const SceneResolver> resolver =
-      std::make_shared<const SceneResolver>(smallStore(), SceneResolver::Options{4096, 16'777'216});
+      std::make_shared<const SceneResolver>(smallStore(), SceneResolver::Options{16'777'216});
   SessionStore store;
   FakeBackground background, passes, errors;
   PassResult last;  ///< the result of the render loop's last turn

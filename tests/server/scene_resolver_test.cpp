@@ -17,7 +17,7 @@ using nlohmann::json;
 using protocol::ProtocolError;
 using protocol::toJson;
 
-SceneResolver resolver() { return {testing::smallStore(), {64, 1'000'000}}; }
+SceneResolver resolver() { return {testing::smallStore(), {1'000'000}}; }
 
 /// Status and pointer of the error that resolving a scene throws.
 std::pair<int, std::string> errorOf(const json& scene) {
@@ -48,6 +48,16 @@ TEST(SceneResolver, FillsEveryValueOfAnEmptyScene) {
   EXPECT_EQ(scene->render.method, Method::automatic);
   EXPECT_EQ(toJson(scene->resolved)["stop"], (json{{"samples", 64}}));
   EXPECT_EQ(scene->stop.samples, 64u);
+}
+
+TEST(SceneResolver, TakesItsCallersSampleCountWithoutAStopRuleAndKeepsItInPatches) {
+  const SceneResolver one = resolver();
+  const auto scene = one.replace(json::object(), {}, 100);
+  EXPECT_EQ(scene->stop.samples, 100u);
+  const auto timed = one.patch(*scene, {{"stop", {{"seconds", 3}}}});
+  EXPECT_EQ(timed->stop.samples, 0u);
+  EXPECT_EQ(one.patch(*timed, {{"stop", nullptr}})->stop.samples, 100u);
+  EXPECT_EQ(one.replace(json::object())->stop.samples, kRenderSamples);
 }
 
 TEST(SceneResolver, LeavesStopRulesOutOfWhatDecidesThePicture) {
@@ -131,7 +141,7 @@ TEST(SceneResolver, NamesTheFieldThatIsWrong) {
 TEST(SceneResolver, BoundsTheNumberOfMacrocellsButTakesTheDefaultSizeAlways) {
   // Two channels of 3 x 2 x 1, 2 x 1 x 1 and 1 cells.
   const auto bounded = [](std::size_t most, int size) {
-    const SceneResolver resolver(testing::smallStore(), {64, 1'000'000, most});
+    const SceneResolver resolver(testing::smallStore(), {1'000'000, most});
     try {
       resolver.replace({{"integrator", {{"macrocell", size}}}});
     } catch (const ProtocolError& error) {
@@ -148,7 +158,7 @@ TEST(SceneResolver, BoundsTheNumberOfMacrocellsButTakesTheDefaultSizeAlways) {
 }
 
 TEST(SceneResolver, FillsInWhereClippingIs) {
-  const SceneResolver resolver(testing::smallStore(), {});
+  const SceneResolver resolver(testing::smallStore(), {1'000'000});
   const auto plain = resolver.replace(json::object());
   EXPECT_TRUE(plain->render.clip.empty());
   EXPECT_FALSE(plain->render.crop);
@@ -204,7 +214,7 @@ SceneResolver resolverOfBalls() {
   }
   std::vector<Dataset> datasets;
   datasets.push_back({"balls", "balls", {}, std::make_shared<const Volume>(grid, std::move(channels))});
-  return {std::make_shared<const DatasetStore>(std::move(datasets)), {64, 1'000'000}};
+  return {std::make_shared<const DatasetStore>(std::move(datasets)), {1'000'000}};
 }
 
 json rangeFrom(double lo) { return {{"channels", {{{"range", {lo, 255}}, {"density", 1}}}}}; }
@@ -270,7 +280,7 @@ SceneResolver resolverOfSquares() {
     }
     datasets.push_back({id, id, {}, std::make_shared<const Volume>(grid, std::move(channels))});
   }
-  return {std::make_shared<const DatasetStore>(std::move(datasets)), {64, 1'000'000}};
+  return {std::make_shared<const DatasetStore>(std::move(datasets)), {1'000'000}};
 }
 
 /// End of the automatic range of resolverOfSquares() if `count` voxels count and the steepest is in this bin.
@@ -444,7 +454,8 @@ json longCurves(int count) {
 }
 
 TEST(SceneResolver, RefusesPicturesForWhichThereIsNeverMemory) {
-  const SceneResolver resolve(testing::smallStore(), {.memory = std::make_shared<MemoryBudget>(64 << 20)});
+  const SceneResolver resolve(testing::smallStore(),
+                              {.maxPixels = 16'777'216, .memory = std::make_shared<MemoryBudget>(64 << 20)});
   const auto scene = [](int width) { return json{{"image", {{"width", width}, {"height", 700}}}}; };
   // 81 bytes a pixel for the film, 16 for the picture, 11 for its JPEG.
   const auto fits = resolve.replace(scene(880));
@@ -465,7 +476,8 @@ TEST(SceneResolver, RefusesPicturesForWhichThereIsNeverMemory) {
 }
 
 TEST(SceneResolver, LeavesPicturesToTheLastQuarterOfTheMemoryButNoLargeFilms) {
-  const SceneResolver resolve(testing::smallStore(), {.memory = std::make_shared<MemoryBudget>(1000 << 20)});
+  const SceneResolver resolve(
+      testing::smallStore(), {.maxPixels = 16'777'216, .memory = std::make_shared<MemoryBudget>(1000 << 20)});
   Scene scene;
   scene.channels.resize(2);
   scene.height = 2000;
@@ -477,7 +489,7 @@ TEST(SceneResolver, LeavesPicturesToTheLastQuarterOfTheMemoryButNoLargeFilms) {
 
 TEST(SceneResolver, ChargesScenesWithLongCurvesToTheMemoryOfRequests) {
   const auto memory = std::make_shared<MemoryBudget>(2 << 20);
-  const SceneResolver resolve(testing::smallStore(), {.memory = memory});
+  const SceneResolver resolve(testing::smallStore(), {.maxPixels = 16'777'216, .memory = memory});
   {
     const auto ordinary = resolve.replace(longCurves(100));
     EXPECT_EQ(memory->used(MemoryUse::scenes), 0u);

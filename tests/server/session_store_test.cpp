@@ -115,10 +115,10 @@ TEST(SessionStore, EndsAnUnusedSessionOfAClientThatHasMostOfThemForAnotherClient
 
 /// Counts the scenes that it resolves.
 struct CountingResolver : SceneResolver {
-  CountingResolver() : SceneResolver(testing::smallStore(), {}) {}
-  Resolved replaceNow(const json& scene) const override {
+  CountingResolver() : SceneResolver(testing::smallStore(), {16'777'216}) {}
+  Resolved replaceNow(const json& scene, std::uint32_t defaultSamples) const override {
     ++resolved;
-    return SceneResolver::replaceNow(scene);
+    return SceneResolver::replaceNow(scene, defaultSamples);
   }
   mutable int resolved = 0;
 };

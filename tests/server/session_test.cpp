@@ -62,6 +62,7 @@ TEST(Session, ReplacesTheWholeScene) {
   session->replace({{"image", {{"height", 16}}}}, {});
   EXPECT_EQ(session->scene().scene->sparse.whole(), (json{{"image", {{"height", 16}}}}));
   EXPECT_EQ(session->scene().scene->render.seed, 0u);
+  EXPECT_EQ(session->scene().scene->stop.samples, kSessionSamples);
 }
 
 TEST(Session, TellsTheOtherViewersOfAnEdit) {
@@ -91,7 +92,7 @@ TEST(Session, WritesTheMessageAboutAnEditOnceForAllViewers) {
 /// Resolves no patch until the test releases it.
 class HeldResolver : public SceneResolver {
  public:
-  HeldResolver() : SceneResolver(testing::smallStore(), {}) {}
+  HeldResolver() : SceneResolver(testing::smallStore(), {16'777'216}) {}
   Resolved patchNow(const ResolvedScene& base, const json& patch) const override {
     entered.count_down();
     released.wait();
@@ -295,7 +296,8 @@ TEST(Session, RecordsAovsUntilAnEditLongAfterTheLastQueryForThem) {
 TEST(Session, RecordsNoAovsForWhichThereIsNeverMemory) {
   Workshop workshop;
   const auto resolver = std::make_shared<const SceneResolver>(
-      testing::smallStore(), SceneResolver::Options{.memory = std::make_shared<MemoryBudget>(64 << 20)});
+      testing::smallStore(),
+      SceneResolver::Options{.maxPixels = 16'777'216, .memory = std::make_shared<MemoryBudget>(64 << 20)});
   const auto sized = [](int side) { return json{{"image", {{"width", side}, {"height", side}}}}; };
   Session session("id", "token", resolver, resolver->replaceNow(sized(700)), workshop.hooks);
   try {

@@ -26,9 +26,10 @@ struct RunningServer {
   Now now = [] { return std::chrono::steady_clock::now(); };
   SessionHooks hooks{now, [this] { renderThread.wake(); }, [this] { encodeThread.wake(); },
                      [this] { render.interrupt(); }};
-  SessionStore store{std::make_shared<const SceneResolver>(testing::smallStore(), SceneResolver::Options{}),
-                     {1000, 5min},
-                     hooks};
+  SessionStore store{
+      std::make_shared<const SceneResolver>(testing::smallStore(), SceneResolver::Options{16'777'216}),
+      {1000, 5min},
+      hooks};
   LoopThread watchThread;
   BackgroundThreads pictures, passes, errors, builds;
   RenderLoop render{

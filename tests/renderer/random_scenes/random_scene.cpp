@@ -388,7 +388,8 @@ RandomScene drawScene(std::uint64_t number) {
   std::vector<server::Dataset> datasets(1);
   datasets[0].id = "random";
   datasets[0].volume = drawn.volume;
-  const server::SceneResolver resolver(std::make_shared<server::DatasetStore>(std::move(datasets)), {});
+  const server::SceneResolver resolver(std::make_shared<server::DatasetStore>(std::move(datasets)),
+                                       {16'777'216});
   drawn.scene = resolver.replace(drawn.wire)->render;
   return drawn;
 }

@@ -99,7 +99,7 @@ TEST(RandomScene, IsTheSameAgainFromItsFiles) {
     }
     json scene;
     std::ifstream(folder + "/scene.json") >> scene;
-    const server::SceneResolver resolver(std::make_shared<server::DatasetStore>(datasets), {});
+    const server::SceneResolver resolver(std::make_shared<server::DatasetStore>(datasets), {16'777'216});
     EXPECT_TRUE(resolver.replace(scene)->render == drawn.scene) << number;
   }
 }
