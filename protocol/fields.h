@@ -3,6 +3,7 @@
 // documentation. A new field is one line here and one in scene.h, which also has its default.
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 #include <tuple>
@@ -44,11 +45,15 @@ struct Exclusive {
   bool bothAreAnError;
 };
 
+// Where the renderer has the same limits, server/scene_resolver.cpp checks that they are equal.
 inline constexpr std::size_t kMaxChannelItems = 32;
 inline constexpr std::size_t kMaxLightItems = 8;
 inline constexpr std::size_t kMaxClipItems = 8;
 inline constexpr std::size_t kMaxIsovalueItems = 32;
 inline constexpr std::size_t kMaxControlPoints = 4096;
+inline constexpr std::uint32_t kMaxSidePixels = 16384;
+inline constexpr std::uint32_t kMaxMacrocellVoxels = 64;
+inline constexpr std::uint32_t kMaxStopSamples = 1u << 24;
 
 /// Specialised below: title, doc, exclusive pairs and the tuple of fields of one struct.
 template <class Struct>
@@ -235,7 +240,7 @@ struct Table<Integrator> {
   static constexpr auto fields = std::tuple{
       field("method", &Integrator::method, "Rendering method.", {.names = &Lists::methods}),
       field("macrocell", &Integrator::macrocell, "Edge of the cells that bound the extinction.",
-            {.unit = "voxels", .atLeast = 1, .atMost = 64}),
+            {.unit = "voxels", .atLeast = 1, .atMost = kMaxMacrocellVoxels}),
       field("step", &Integrator::step,
             "Step of raymarch and hybrid, at least 0.01; with 0, steps end at the faces of voxel cells. auto "
             "chooses its own steps.",
@@ -252,8 +257,10 @@ struct Table<ImageSettings> {
   static constexpr std::string_view title = "ImageSettings";
   static constexpr std::string_view doc = "The picture.";
   static constexpr auto fields = std::tuple{
-      field("width", &ImageSettings::width, "Width.", {.unit = "pixels", .atLeast = 1, .atMost = 16384}),
-      field("height", &ImageSettings::height, "Height.", {.unit = "pixels", .atLeast = 1, .atMost = 16384}),
+      field("width", &ImageSettings::width, "Width.",
+            {.unit = "pixels", .atLeast = 1, .atMost = kMaxSidePixels}),
+      field("height", &ImageSettings::height, "Height.",
+            {.unit = "pixels", .atLeast = 1, .atMost = kMaxSidePixels}),
       field("background", &ImageSettings::background, "What 8-bit pictures are composited over.",
             {.color = true}),
       field("filter", &ImageSettings::filter, "Where the samples of a pixel lie.",
@@ -268,7 +275,7 @@ struct Table<Stop> {
       "When rendering ends: at the first of these limits that is reached. If none is set, after 64 samples "
       "in a render and 4096 in a session.";
   static constexpr auto fields = std::tuple{
-      field("samples", &Stop::samples, "Samples per pixel.", {.atLeast = 1, .atMost = 16777216}),
+      field("samples", &Stop::samples, "Samples per pixel.", {.atLeast = 1, .atMost = kMaxStopSamples}),
       field("seconds", &Stop::seconds, "Time spent rendering.", {.unit = "seconds", .above = 0}),
       field("error", &Stop::error, "Estimated RMSE over linear premultiplied RGBA, from 16 samples on.",
             {.above = 0}),

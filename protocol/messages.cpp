@@ -41,8 +41,8 @@ struct Table<ViewMessage> {
   static constexpr std::string_view type = "view";
   static constexpr auto fields =
       std::tuple{field("visible", &ViewMessage::visible, ""),
-                 field("maxWidth", &ViewMessage::maxWidth, "", {.atLeast = 1, .atMost = 16384}),
-                 field("maxHeight", &ViewMessage::maxHeight, "", {.atLeast = 1, .atMost = 16384}),
+                 field("maxWidth", &ViewMessage::maxWidth, "", {.atLeast = 1, .atMost = kMaxSidePixels}),
+                 field("maxHeight", &ViewMessage::maxHeight, "", {.atLeast = 1, .atMost = kMaxSidePixels}),
                  field("maxFps", &ViewMessage::maxFps, "", {.above = 0, .atMost = 1000})};
 };
 template <>
@@ -55,7 +55,7 @@ template <>
 struct Table<PickMessage> {
   static constexpr std::string_view type = "pick";
   static constexpr std::string_view required[] = {"id", "x", "y"};
-  static constexpr Traits pixels{.atLeast = 0, .below = 16384};
+  static constexpr Traits pixels{.atLeast = 0, .below = kMaxSidePixels};
   static constexpr auto fields =
       std::tuple{field("id", &PickMessage::id, "", {.atLeast = 1, .atMost = kU32Max}),
                  field("x", &PickMessage::x, "", pixels), field("y", &PickMessage::y, "", pixels),

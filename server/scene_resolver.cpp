@@ -26,9 +26,15 @@
 namespace scolopax::server {
 namespace {
 
+// The protocol does not depend on the renderer, so its limits are numbers of its own.
+static_assert(protocol::kMaxChannelItems == std::size_t(kMaxChannels));
+static_assert(protocol::kMaxLightItems == std::size_t(kernel::kMaxLights));
 static_assert(protocol::kMaxIsovalueItems == std::size_t(kernel::kMaxSurfaces));
 static_assert(protocol::kMaxClipItems == std::size_t(kernel::kMaxClipPlanes));
 static_assert(std::tuple_size_v<decltype(protocol::Crop::regions)> == std::size_t(kernel::kCropRegions));
+static_assert(protocol::kMaxSidePixels == std::uint32_t(kMaxImageSide));
+static_assert(protocol::kMaxMacrocellVoxels == std::uint32_t(kMaxMacrocell));
+static_assert(protocol::kMaxStopSamples == kMaxSamples);
 
 using nlohmann::json;
 using protocol::ProtocolError;

@@ -2,12 +2,6 @@
 #include "server/stop_rule.h"
 
 namespace scolopax::server {
-namespace {
-
-/// The maximum that a scene may ask for. Sample numbers beyond 2^31 would repeat random numbers.
-constexpr std::uint32_t kMaxSamples = 1u << 24;
-
-}  // namespace
 
 void measureFor(const StopRule& stop, const Renderer& renderer, const std::stop_token& cancel) {
   if (stop.error > 0 && renderer.errorTakesLong()) renderer.estimatedError(cancel);

@@ -9,6 +9,9 @@ namespace scolopax::server {
 
 /// Samples per pixel of a scene without a stop rule: of a single render, and in a session.
 inline constexpr std::uint32_t kRenderSamples = 64, kSessionSamples = 4096;
+/// The most samples per pixel that a scene may ask for, and that are ever made. Sample numbers beyond 2^31
+/// would repeat random numbers.
+inline constexpr std::uint32_t kMaxSamples = 1u << 24;
 
 /// Rendering ends when the first of these limits is reached; 0 means no limit.
 struct StopRule {

@@ -46,8 +46,9 @@ void checkScene(const Scene& scene, const Volume& volume) {
   for (const Light& light : scene.lights) checkLight(light);
   checkClipping(scene.clip, scene.crop, volume.channels().size());
   checkStep(scene.step);
-  if (scene.macrocell < 1 || scene.macrocell > 64)
-    failBadInput("integrator.macrocell: expected 1 to 64, found " + std::to_string(scene.macrocell));
+  if (scene.macrocell < 1 || scene.macrocell > kMaxMacrocell)
+    failBadInput("integrator.macrocell: expected 1 to " + std::to_string(kMaxMacrocell) + ", found " +
+                 std::to_string(scene.macrocell));
 }
 
 }  // namespace scolopax

@@ -6,6 +6,8 @@
 
 namespace scolopax {
 
+inline constexpr int kMaxMacrocell = 64;  ///< voxels per macrocell edge
+
 /// Throws Error(badInput) if a side is not in 1..kMaxImageSide.
 void checkImageSize(const Scene& scene);
 /// Throws Error(badInput) for a light whose direction is zero, whose position or direction has no finite

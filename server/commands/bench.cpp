@@ -15,6 +15,7 @@
 
 #include "protocol/scene_json.h"
 #include "renderer/core/error.h"
+#include "renderer/data/scene_checks.h"
 #include "renderer/data/shared_macrocells.h"
 #include "renderer/io/image_file.h"
 #include "renderer/io/output_file.h"
@@ -25,6 +26,7 @@
 #include "server/commands/render_device.h"
 #include "server/commands/scene_arguments.h"
 #include "server/commands/validators.h"
+#include "server/stop_rule.h"
 
 namespace scolopax {
 namespace {
@@ -257,14 +259,14 @@ CLI::App* addBenchCommand(CLI::App& root) {
       ->delimiter(',');
   command->add_option("--samples", o->samples, "Sample counts; default: 1,4,16,64")
       ->delimiter(',')
-      ->check(CLI::Range(1u, 1u << 24));
+      ->check(CLI::Range(1u, server::kMaxSamples));
   command
       ->add_option("--steps", o->steps, "Steps of the methods that have one, in voxels; default: 4,2,1,0.5,0")
       ->delimiter(',')
       ->check(numberUpTo(100, true));
   command->add_option("--macrocells", o->macrocells, "Macrocell edges, in voxels; default: the scene's")
       ->delimiter(',')
-      ->check(CLI::Range(1, 64));
+      ->check(CLI::Range(1, kMaxMacrocell));
   checkDevice(command->add_option("--device", o->device, kDeviceDoc))->capture_default_str();
   command->add_option("--threads", o->threads, "Numbers of threads; 0: all")
       ->delimiter(',')

@@ -182,7 +182,7 @@ CLI::App* addRenderCommand(CLI::App& root) {
                    "premultiplied RGBA)")
       ->required();
   command->add_option("--samples", o->samples, "Stop after this many samples per pixel")
-      ->check(CLI::Range(1u, 1u << 24));
+      ->check(CLI::Range(1u, server::kMaxSamples));
   command->add_option("--seconds", o->seconds, "Stop after this time")->check(numberUpTo(1e9, false));
   command->add_option("--error", o->error, "Stop at this estimated RMSE over linear premultiplied RGBA")
       ->check(numberUpTo(1e9, false));
