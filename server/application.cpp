@@ -11,14 +11,11 @@
 #include <thread>
 #include <utility>
 
-#include "protocol/frame_header.h"
 #include "protocol/problem.h"
-#include "renderer/data/colormap.h"
 #include "server/api.h"
 #include "server/auth.h"
 #include "server/background.h"
-#include "server/edit_queue.h"
-#include "server/hex_color.h"
+#include "server/capabilities.h"
 #include "server/loop_thread.h"
 #include "server/net/server.h"
 #include "server/render_loop.h"
@@ -26,60 +23,10 @@
 namespace scolopax::server {
 namespace {
 
-using nlohmann::json;
-
 constexpr std::string_view kNoPage =
     "Scolopax is running, but its page is not built.\n\n"
     "Build it with:  cd client_web && npm ci && npm run build\n"
     "and reload this address, or use the HTTP interface under api/v1/ (see api/v1/openapi.json).\n";
-
-json named(const std::vector<protocol::EnumEntry>& entries) {
-  json list = json::array();
-  for (const auto& entry : entries) list.push_back({{"name", entry.name}, {"doc", entry.doc}});
-  return list;
-}
-
-json capabilitiesJson(const Config& config, const protocol::Lists& lists) {
-  json maps = json::array();
-  for (const auto& entry : lists.colormaps) {
-    json points = json::array();
-    for (const ColorKnot& knot : colormapKnots(entry.name))
-      points.push_back({knot.position, hexOf(knot.color)});
-    maps.push_back({{"name", entry.name}, {"doc", entry.doc}, {"points", std::move(points)}});
-  }
-  json aovs = json::array();
-  for (const NamedValue& aov : kAovs) aovs.push_back({{"name", aov.name}, {"doc", aov.doc}});
-  return {{"version", SCOLOPAX_VERSION},
-          {"protocolVersion", protocol::kProtocolVersion},
-          {"backend", config.backend},
-          {"blendModes", named(lists.blendModes)},
-          {"methods", named(lists.methods)},
-          {"filters", named(lists.filters)},
-          {"samplings", named(lists.samplings)},
-          {"aovs", std::move(aovs)},
-          {"lightTypes", named(lists.lightTypes)},
-          {"peaks", named(lists.peaks)},
-          {"interpolations", named(lists.interpolations)},
-          {"colormaps", std::move(maps)},
-          {"imageFormats", imageMediaTypes()},
-          {"limits",
-           {{"bodyBytes", config.maxBodyBytes},
-            {"messageBytes", config.maxMessageBytes},
-            {"sceneDepth", config.maxJsonDepth},
-            {"imageWidth", kMaxImageSide},
-            {"imageHeight", kMaxImageSide},
-            {"imagePixels", config.maxPixels},
-            {"memoryBytes", config.maxMemoryBytes},
-            {"sessions", config.maxSessions},
-            {"clients", config.maxClients},
-            {"renders", config.maxRenders},
-            {"renderSeconds", config.maxRenderSeconds},
-            {"macrocells", SceneResolver::kMaxIntervals},
-            {"waitingPolls", Session::kMaxPolls},
-            {"waitingPicks", PickQueue::kMaxPicks},
-            {"waitingEdits", EditQueue::kMaxEdits},
-            {"pickPixels", kMaxPickPixels}}}};
-}
 
 }  // namespace
 
@@ -104,7 +51,7 @@ struct Application::Impl {
   SessionStore sessions;
   RenderLoop renderLoop;
   EncodeLoop encodeLoop;
-  json capabilities;
+  nlohmann::json capabilities;
   StreamHub streams;
   UnsentAnswers answers;
   ApiContext context;
@@ -120,45 +67,51 @@ struct Application::Impl {
         datasets(std::make_shared<const DatasetStore>(std::move(loaded), memory)),
         resolver(std::make_shared<const SceneResolver>(
             datasets, SceneResolver::Options{.maxPixels = config.maxPixels, .memory = memory})),
-        sessions(resolver, {config.maxSessions, config.keepSession},
-                 {now, [this] { renderThread.wake(); }, [this] { encodeThread.wake(); },
-                  [this] { renderLoop.interrupt(); }}),
+        sessions(resolver, {.maxSessions = config.maxSessions, .keep = config.keepSession},
+                 {.now = now,
+                  .wakeRender = [this] { renderThread.wake(); },
+                  .wakeEncoder = [this] { encodeThread.wake(); },
+                  .interruptRender = [this] { renderLoop.interrupt(); }}),
         renderLoop(sessions,
-                   {makeRenderer,
-                    {},
-                    now,
-                    log,
-                    pictures,
-                    passes,
-                    errors,
-                    builds,
-                    [this] { renderThread.wake(); },
-                    memory,
-                    [this] { watchThread.wake(); }},
+                    {.makeRenderer = makeRenderer,
+                     .policy = {},
+                     .now = now,
+                     .log = log,
+                     .pictures = pictures,
+                     .passes = passes,
+                     .errors = errors,
+                     .builds = builds,
+                     .wake = [this] { renderThread.wake(); },
+                     .memory = memory,
+                     .wakeWatch = [this] { watchThread.wake(); }},
                    [this](const PassResult& pass) { metrics.passEnded(pass); }),
         encodeLoop(
             sessions, now, log, pictures, [this] { encodeThread.wake(); }, memory),
-        capabilities(capabilitiesJson(config, resolver->lists())),
+        capabilities(capabilitiesJson(config)),
         streams(sessions, builds, metrics,
-                {config.maxClients, {config.maxMessageBytes, config.maxJsonDepth}, capabilities, log, now}),
+                {.maxClients = config.maxClients,
+                 .limits = {.bytes = config.maxMessageBytes, .depth = config.maxJsonDepth},
+                 .capabilities = capabilities,
+                 .log = log,
+                 .now = now}),
         answers(memory),
-        context{config,
-                *datasets,
-                *resolver,
-                sessions,
-                streams,
-                metrics,
-                encoders,
-                makeRenderer,
-                memory,
-                answers,
-                log,
-                stopping,
-                abortRequests.get_token(),
-                now,
-                [this] { return capabilities; },
-                [this] { return server->unreadTextBytes(); },
-                [this] { return server->requestBodyBytes(); }},
+        context{.config = config,
+                .datasets = *datasets,
+                .renderResolver = *resolver,
+                .sessions = sessions,
+                .streams = streams,
+                .metrics = metrics,
+                .encoders = encoders,
+                .makeRenderer = makeRenderer,
+                .memory = memory,
+                .answers = answers,
+                .log = log,
+                .stopping = stopping,
+                .abortRequests = abortRequests.get_token(),
+                .now = now,
+                .capabilities = [this] { return capabilities; },
+                .unreadTextBytes = [this] { return server->unreadTextBytes(); },
+                .requestBodyBytes = [this] { return server->requestBodyBytes(); }},
         authorizer(config.token, isLoopback(config.host), config.allowedOrigins,
                    !config.certificateFile.empty()) {
     net::Options options = networkOptions();

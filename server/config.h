@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "protocol/json_text.h"
+
 namespace scolopax::server {
 
 struct Config {
@@ -20,15 +22,17 @@ struct Config {
   std::vector<std::string> allowedOrigins;  ///< other than the server's own
   std::vector<std::string> trustedProxies;  ///< as net::Options::trustedProxies
 
-  std::size_t maxSessions = 32;
-  std::size_t maxClients = 64;                            ///< streams at once
+  // The limits of limits.h.
+  std::uint64_t maxSessions = 32;
+  std::uint64_t maxClients = 64;                          ///< streams at once
   std::uint64_t maxPixels = 16'777'216;                   ///< of one picture
   std::uint64_t maxMemoryBytes = std::uint64_t{4} << 30;  ///< of memory that requests make the server hold
   double maxRenderSeconds = 60;                           ///< of one POST /render
-  int maxRenders = 2;                                     ///< number of POST /render that render at once
-  std::size_t maxBodyBytes = std::size_t{1} << 20;
-  std::size_t maxMessageBytes = std::size_t{1} << 20;
-  std::size_t maxJsonDepth = 32;
+  std::uint64_t maxRenders = 2;                           ///< number of POST /render that render at once
+  std::uint64_t maxBodyBytes = protocol::Limits().bytes;
+  std::uint64_t maxMessageBytes = protocol::Limits().bytes;
+  std::uint64_t maxJsonDepth = protocol::Limits().depth;
+
   std::chrono::milliseconds keepSession{300'000};
   std::chrono::milliseconds pollTimeout{25'000};
   std::chrono::milliseconds stopGrace{3'000};

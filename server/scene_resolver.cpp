@@ -39,12 +39,6 @@ static_assert(protocol::kMaxStopSamples == kMaxSamples);
 using nlohmann::json;
 using protocol::ProtocolError;
 
-std::vector<protocol::EnumEntry> entries(std::span<const NamedValue> values) {
-  std::vector<protocol::EnumEntry> list;
-  for (const NamedValue& value : values) list.push_back({std::string(value.name), std::string(value.doc)});
-  return list;
-}
-
 /// The value with this wire name, which parseScene has checked.
 template <class Enum, std::size_t N>
 Enum valueOf(const NamedValue (&list)[N], std::string_view name) {
@@ -247,19 +241,6 @@ json pictureJson(const protocol::Scene& resolved) {
   json picture = protocol::toJson(pictureOf(resolved));
   picture.erase("stop");
   return picture;
-}
-
-protocol::Lists rendererLists() {
-  protocol::Lists lists;
-  lists.blendModes = entries(kBlendModes);
-  lists.methods = entries(kMethods);
-  lists.filters = entries(kPixelFilters);
-  lists.samplings = entries(kSamplings);
-  lists.colormaps = entries(colormaps());
-  lists.lightTypes = entries(kLightTypes);
-  lists.peaks = entries(kPeaks);
-  lists.interpolations = entries(kInterpolations);
-  return lists;
 }
 
 SceneResolver::SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options)

@@ -18,6 +18,7 @@
 #include "renderer/data/macrocell_grid.h"
 #include "renderer/data/scene.h"
 #include "server/dataset_store.h"
+#include "server/enum_lists.h"
 #include "server/sparse_scene.h"
 #include "server/stop_rule.h"
 #include "server/unmeasured.h"
@@ -52,9 +53,6 @@ struct ResolvedScene {
 bool makeSameFilm(const ResolvedScene& a, const ResolvedScene& b);
 /// The parts of the resolved scene that determine the picture at a given number of samples.
 nlohmann::json pictureJson(const protocol::Scene& resolved);
-
-/// The names that the renderer knows, for validation, schema and capabilities.
-protocol::Lists rendererLists();
 
 class SceneResolver {
  public:

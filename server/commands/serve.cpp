@@ -14,6 +14,9 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <type_traits>
+#include <variant>
 #include <vector>
 
 #include "renderer/core/error.h"
@@ -23,6 +26,7 @@
 #include "server/command_config.h"
 #include "server/commands/render_device.h"
 #include "server/commands/validators.h"
+#include "server/limits.h"
 #include "server/net/client_address.h"
 #include "server/net/server.h"
 #include "server/scene_resolver.h"
@@ -41,6 +45,9 @@ struct ServeOptions {
   double keepSeconds = 300;
   std::uint64_t maxMemoryMebibytes = io::defaultMemoryLimitBytes() / 2 >> 20;
 };
+
+/// The option that sets Config::maxMemoryBytes, in MiB.
+constexpr std::string_view kMaxMemory = "max-memory";
 
 /// The folder of the built page: where the build put it, or relative to the program; empty if there is none.
 std::string findWebRoot() {
@@ -180,25 +187,26 @@ void addServerOptions(CLI::App& command, ServeOptions& options) {
 }
 
 void addLimits(CLI::App& command, ServeOptions& options) {
-  server::Config& config = options.config;
-  const auto limit = [&command](const std::string& name, auto& value, const std::string& doc) {
+  const auto add = [&command](const std::string& name, auto& value, std::string doc) {
+    doc[0] = char(std::toupper(static_cast<unsigned char>(doc[0])));
     return addOption(command, name, value, doc)->group("Limits")->type_name("N");
   };
-  limit("max-sessions", config.maxSessions, "Sessions at once")->check(CLI::PositiveNumber);
-  limit("max-clients", config.maxClients, "Streams at once")->check(CLI::PositiveNumber);
-  limit("max-image", config.maxPixels, "Pixels of one picture")->check(CLI::PositiveNumber);
-  limit("max-memory", options.maxMemoryMebibytes,
-        "MiB of memory for films, pictures, encodings, macrocells, gradient histograms, scenes with long "
-        "curves and long answers, without the volumes; a quarter of the machine's by default")
-      ->check(CLI::Range(std::uint64_t(64), std::uint64_t(1) << 32));
-  limit("max-render-seconds", config.maxRenderSeconds, "Seconds of one POST /render")
-      ->check(CLI::PositiveNumber);
-  limit("max-renders", config.maxRenders, "POST /render that render at once")->check(CLI::PositiveNumber);
-  limit("max-body", config.maxBodyBytes, "Bytes of one request's body")->check(CLI::PositiveNumber);
-  limit("max-message", config.maxMessageBytes, "Bytes of one WebSocket message")->check(CLI::PositiveNumber);
-  limit("max-json-depth", config.maxJsonDepth, "Nesting depth of lists and objects")
-      ->check(CLI::PositiveNumber);
-  limit("keep-session", options.keepSeconds, "Seconds until a session without clients ends")
+  for (const server::Limit& limit : server::limits()) {
+    const std::string name(limit.option);
+    if (name == kMaxMemory)
+      add(name, options.maxMemoryMebibytes,
+          "MiB of memory for films, pictures, encodings, macrocells, gradient histograms, scenes with long "
+          "curves and long answers, without the volumes; a quarter of the machine's by default")
+          ->check(CLI::Range(std::uint64_t(64), std::uint64_t(1) << 32));
+    else if (!name.empty())
+      std::visit(
+          [&](auto setting) {
+            if constexpr (std::is_member_pointer_v<decltype(setting)>)
+              add(name, options.config.*setting, std::string(limit.of))->check(CLI::PositiveNumber);
+          },
+          limit.value);
+  }
+  add("keep-session", options.keepSeconds, "Seconds until a session without clients ends")
       ->check(numberUpTo(1e9, true));
 }
 

@@ -28,8 +28,8 @@ struct Options {
   std::uint16_t port = 8080;       ///< 0: any free one
 
   std::size_t headerLimit = 16 << 10;  ///< bytes of a request's head; beyond: 431
-  std::size_t bodyLimit = 4 << 20;     ///< bytes of a request's body; beyond: 413
-  std::size_t messageLimit = 1 << 20;  ///< bytes of a WebSocket message; beyond: closed with 1009
+  std::size_t bodyLimit = 0;           ///< bytes of a request's body; beyond: 413
+  std::size_t messageLimit = 0;        ///< bytes of a WebSocket message; beyond: closed with 1009
   TextLimits unsentTexts;
   /// Beyond: 503. At most half may be strangers, whose client is not known yet (`knows`).
   std::size_t maxConnections = 512;
@@ -49,7 +49,7 @@ struct Options {
   /// Addresses, as usualAddress() writes them, of proxies whose X-Forwarded-For names the client
   /// (clientAddress()).
   std::vector<std::string> trustedProxies;
-  std::string staticRoot;                   ///< folder of the page; empty: none
+  std::string staticRoot;  ///< folder of the page; empty: none
 
   /// PEM files: the certificate with its chain, and its key. With both, the server speaks only TLS; with
   /// neither, it speaks none.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/net/web_socket_connection.h"
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/strand.hpp>
@@ -111,7 +112,7 @@ class WebSocketConnection : public PreparedWebSocket,
     stream_.emplace(std::move(transport));
     closeTimer_.emplace(executor);
     stream_->set_option(websocket::stream_base::timeout{kHandshakeTimeout, core_.options.pingTimeout, true});
-    stream_->read_message_max(core_.options.messageLimit);
+    stream_->read_message_max(std::max<std::size_t>(core_.options.messageLimit, 1));  // 0: no limit
     stream_->auto_fragment(false);
     {
       const std::lock_guard lock(mutex_);

@@ -10,6 +10,7 @@
 #include "protocol/scene_json.h"
 #include "protocol/schema.h"
 #include "renderer/renderer.h"
+#include "server/limits.h"
 #include "server/scene_resolver.h"
 #include "tests/protocol/fixtures.h"
 
@@ -37,14 +38,30 @@ std::vector<std::string> blocks(const std::string& fence) {
   return found;
 }
 
-TEST(ProtocolDocument, HoldsTheSectionOfTheTable) {
-  const std::string begin = "<!-- fields: generated, do not edit -->\n", end = "<!-- end of fields -->";
+/// Compares the section between two comments with a generated text.
+void expectSection(const std::string& name, const std::string& generated) {
+  const std::string begin = "<!-- " + name + ": generated, do not edit -->\n",
+                    end = "<!-- end of " + name + " -->";
   const std::string text = readText(protocolFile("PROTOCOL.md"));
   const std::size_t from = text.find(begin), to = text.find(end);
   ASSERT_NE(from, std::string::npos);
   ASSERT_NE(to, std::string::npos);
-  expectFile(protocolFile("PROTOCOL.md"),
-             text.substr(0, from) + begin + '\n' + fieldsMarkdown(server::rendererLists()) + text.substr(to));
+  expectFile(protocolFile("PROTOCOL.md"), text.substr(0, from) + begin + '\n' + generated + text.substr(to));
+}
+
+TEST(ProtocolDocument, HoldsTheSectionOfTheTable) {
+  expectSection("fields", fieldsMarkdown(server::rendererLists()));
+}
+
+TEST(ProtocolDocument, HoldsTheTableOfLimits) { expectSection("limits", server::limitsMarkdown()); }
+
+TEST(ProtocolDocument, ShowsTheLimitsOfAServerWithoutOptions) {
+  for (const std::string& text : blocks("json"))
+    if (const json block = parseJson(text); block.contains("limits")) {
+      EXPECT_EQ(block["limits"], server::limitsJson(server::Config()));
+      return;
+    }
+  FAIL() << "there are no limits";
 }
 
 TEST(ProtocolDocument, StatesWhatTakesMemory) {

@@ -19,6 +19,7 @@ using std::chrono::milliseconds;
 Options onAnyPort() {
   Options options;
   options.port = 0;
+  options.bodyLimit = 1000;
   return options;
 }
 
