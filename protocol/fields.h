@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The table of the scene's fields: the single source for validation, serialisation, JSON Schema, patches and
-// documentation. A new field is one line here and one in scene.h, which also has its default.
+// documentation. A new field is a line here and a member in scene.h, which has its default; what it means for
+// the picture, server/scene_resolver.cpp hands to the renderer's scene.
 #pragma once
 #include <cstddef>
 #include <cstdint>

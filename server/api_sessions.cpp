@@ -6,6 +6,8 @@
 
 #include "protocol/problem.h"
 #include "protocol/scene_json.h"
+#include "renderer/core/short_text.h"
+#include "renderer/data/aov.h"
 #include "server/api.h"
 
 namespace scolopax::server {
@@ -107,9 +109,11 @@ net::Response describe(ApiContext& context, const net::Request& request) {
   return jsonResponse(200, description);
 }
 
+double secondsOf(std::chrono::milliseconds time) { return std::chrono::duration<double>(time).count(); }
+
 std::chrono::milliseconds pollTimeout(const Config& config, const net::Request& request) {
   if (!request.queryValue("timeout")) return config.pollTimeout;
-  const double most = std::chrono::duration<double>(config.pollTimeout).count();
+  const double most = secondsOf(config.pollTimeout);
   const double seconds = queryNumber(request, "timeout");
   if (seconds < 0)
     throw ProtocolError(422, "", "query parameter timeout: expected a number of seconds >= 0, found less");
@@ -119,13 +123,9 @@ std::chrono::milliseconds pollTimeout(const Config& config, const net::Request& 
 std::optional<Aov> queryAov(const net::Request& request) {
   const std::string* asked = request.queryValue("aov");
   if (!asked) return std::nullopt;
-  std::string known;
-  for (std::size_t i = 0; i < std::size(kAovs); ++i) {
-    if (kAovs[i].name == *asked) return Aov(i);
-    known += (i > 0 ? ", " : "") + std::string(kAovs[i].name);
-  }
+  if (const auto aov = aovOf(*asked)) return aov;
   throw ProtocolError(
-      422, "", "query parameter aov: expected one of " + known + ", found \"" + shortened(*asked) + '"');
+      422, "", "query parameter aov: expected one of " + aovNames() + ", found \"" + shortened(*asked) + '"');
 }
 
 net::Response frame(ApiContext& context, const net::Request& request) {
@@ -268,9 +268,10 @@ std::vector<Route> sessionRoutes(ApiContext& context) {
         {"after", "query", "integer", "Number of the last frame seen; waits for a newer one"},
         {"minSamples", "query", "integer", "Least number of samples per pixel, unless the frame is final"},
         {"format", "query", "string", imageTypesText(&ImageType::format, " (default)")},
-        {"aov", "query", "string",
-         "What to return instead of colours: depth, transmittance, channel or cost"},
-        {"timeout", "query", "number", "Seconds to wait, at most 25, which is the default"}},
+        {"aov", "query", "string", "What to return instead of colours, one of " + aovNames()},
+        {"timeout", "query", "number",
+         "Seconds to wait, at most " + shortText(secondsOf(context.config.pollTimeout)) +
+             ", which is the default"}},
        "",
        imageMediaTypes(),
        net::RouteKind::waiting,

@@ -46,6 +46,19 @@ Image imageOf(const AovValues& aov, Color&& color) {
 
 }  // namespace
 
+std::optional<Aov> aovOf(std::string_view name) {
+  const auto found = std::find_if(std::begin(kAovs), std::end(kAovs),
+                                  [&](const NamedValue& aov) { return aov.name == name; });
+  if (found == std::end(kAovs)) return std::nullopt;
+  return Aov(found - std::begin(kAovs));
+}
+
+std::string aovNames() {
+  std::string names;
+  for (const NamedValue& aov : kAovs) names.append(names.empty() ? "" : ", ").append(aov.name);
+  return names;
+}
+
 Image aovImage(const AovValues& aov) {
   return imageOf(aov, [](float v) { return glm::vec3(v); });
 }

@@ -3,7 +3,10 @@
 // it does for the film; files and responses take the values.
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "renderer/data/image.h"
@@ -11,6 +14,11 @@
 #include "renderer/kernel/sample_records.h"
 
 namespace scolopax {
+
+/// The AOV with this name; nullopt if there is none.
+std::optional<Aov> aovOf(std::string_view name);
+/// All names, for messages: "depth, transmittance, ...".
+std::string aovNames();
 
 /// One value per pixel, top row first: depth in world units, transmittance in [0,1], channel as an index in
 /// the volume, cost in fetches per sample. NaN where the variable is undefined: depth and channel of a pixel

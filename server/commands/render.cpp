@@ -49,13 +49,10 @@ struct AovFile {
 /// "depth=depth.exr".
 AovFile aovFileOf(const std::string& text) {
   const auto equals = text.find('=');
-  std::string known;
-  for (std::size_t i = 0; i < std::size(kAovs); ++i) {
-    if (equals != std::string::npos && equals + 1 < text.size() && kAovs[i].name == text.substr(0, equals))
-      return {Aov(i), text.substr(equals + 1)};
-    known += (i > 0 ? ", " : "") + std::string(kAovs[i].name);
-  }
-  throw CLI::ValidationError("--aov", "expected NAME=FILE, NAME one of " + known + ", found '" + text + "'");
+  const auto aov = aovOf(text.substr(0, equals));
+  if (aov && equals != std::string::npos && equals + 1 < text.size()) return {*aov, text.substr(equals + 1)};
+  throw CLI::ValidationError("--aov",
+                             "expected NAME=FILE, NAME one of " + aovNames() + ", found '" + text + "'");
 }
 
 void writeAov(const AovFile& file, const Renderer& renderer) {

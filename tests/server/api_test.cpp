@@ -406,6 +406,17 @@ TEST(Api, DescribesEveryRouteInOpenApi) {
   EXPECT_TRUE(description["paths"]["/api/v1/render"]["post"].contains("requestBody"));
 }
 
+TEST(Api, DescribesParametersByTheListsAndSettingsThatItUses) {
+  Api api;
+  std::string docs;
+  for (const json& one : openApi(api.routes)["paths"]["/api/v1/sessions/{id}/frame"]["get"]["parameters"])
+    docs += one["name"].get<std::string>() + ": " + one["description"].get<std::string>() + '\n';
+  EXPECT_NE(docs.find("aov: What to return instead of colours, one of depth, transmittance, channel, cost\n"),
+            std::string::npos)
+      << docs;
+  EXPECT_NE(docs.find("timeout: Seconds to wait, at most 0, "), std::string::npos) << docs;
+}
+
 TEST(Api, CountsInTheMetrics) {
   Api api;
   api.workshop.store.create(json::object());
