@@ -5,6 +5,8 @@
 #pragma once
 #include <cuda_runtime.h>
 
+#include <type_traits>
+
 #include "cuda/launch.h"
 #include "renderer/kernel/blend_modes.h"
 #include "renderer/kernel/render_pixel.h"
@@ -21,8 +23,14 @@ struct RenderBand {
   int firstRow, rows;
 };
 
+/// Blocks that a multiprocessor must be able to run at once; 0 leaves that to the compiler, which spills
+/// registers to local memory so that more blocks fit. Kernels of plain scenes may instead take every register
+/// that there is: those of quadrature with light then spill nothing (tests/cuda/check_resources.py).
+template <class View>
+inline constexpr unsigned kBlocksAtOnce = std::is_base_of_v<kernel::PlainSceneView, View> ? 1 : 0;
+
 template <class Integrator, class Blend, class Lighting, class View>
-__global__ void __launch_bounds__(kBlockWidth* kBlockHeight)
+__global__ void __launch_bounds__(kBlockWidth* kBlockHeight, kBlocksAtOnce<View>)
     renderPixels(RenderBand<Integrator, Blend, Lighting, View> band) {
   const int width = band.render.scene.width;
   const int x = int(blockIdx.x * blockDim.x + threadIdx.x);

@@ -9,11 +9,13 @@ from concurrent.futures import ThreadPoolExecutor
 
 ARCHITECTURES = os.environ.get("SCOLOPAX_ARCHITECTURES", "sm_90").split()
 # What the kernels need at present: (registers, bytes of spills, bytes of stack) at most. Whoever raises a limit says
-# why. A block of 128 threads leaves 168 registers where three are to fit, 128 for four. The stack holds arrays with an
-# entry for each of 32 channels: the ends of a segment and, where the largest extinction hides the others, the visible
-# part of each channel; the cubics of a voxel cell; with light, what a stratum remembers, and a segment of the shadow
-# ray; in scenes that are not plain, the next surface of each channel. Kernels of all scenes save registers around calls
-# of what few scenes need, which counts as spills; those of plain scenes are compiled apart so that they need not.
+# why. A block of 128 threads leaves 168 registers where three are to fit, 128 for four. Kernels of plain scenes may take
+# every register (kBlocksAtOnce in cuda/pixel_kernels.h), so that those of quadrature with light spill none. The stack
+# holds arrays with an entry for each of 32 channels: the ends of a segment and, where the largest extinction hides the
+# others, the visible part of each channel; the cubics of a voxel cell; with light, what a stratum remembers, and a
+# segment of the shadow ray; in scenes that are not plain, the next surface of each channel. Kernels of all scenes save
+# registers around calls of what few scenes need, which counts as spills; those of plain scenes are compiled apart so
+# that they need not.
 LIMITS = {
     # plain scene, integrator, lit, extinctions add up
     (True, "tracker", False, True): (168, 144, 96),
