@@ -46,7 +46,8 @@ class RowsLeft {
 class CudaLauncher final : public Launcher {
  public:
   CudaLauncher(SharedDevices devices, int threads, DeviceFailure failure)
-      : devices_(std::move(devices)),
+      : shared_(std::move(devices)),
+        devices_(shared_->all),
         cpu_(makeCpuLauncher(threads)),
         failure_(std::move(failure)),
         scenes_(devices_.size()) {}
@@ -84,7 +85,7 @@ class CudaLauncher final : public Launcher {
   }
 
  private:
-  bool onCpu() const { return failed_ && failure_.continueOnCpu; }
+  bool onCpu() const { return shared_->failed && failure_.continueOnCpu; }
   /// Calls f(), unless a device has failed or fails now and rendering goes on on the CPU: then returns false.
   template <class F>
   bool unlessFailed(F&& f) {
@@ -94,7 +95,7 @@ class CudaLauncher final : public Launcher {
       return true;
     } catch (const Error& error) {
       if (error.code() != ErrorCode::device) throw;
-      const bool known = failed_.exchange(true);
+      const bool known = shared_->failed.exchange(true);
       if (!failure_.continueOnCpu) throw;
       if (!known && failure_.log) failure_.log(std::string(error.what()) + "; rendering goes on on the CPU");
       return false;
@@ -115,7 +116,7 @@ class CudaLauncher final : public Launcher {
   /// Bands under way; gives them back, or releases them if they have not been finished.
   class Flights {
    public:
-    explicit Flights(const SharedDevices& devices) : devices_(devices) {}
+    explicit Flights(const Devices::List& devices) : devices_(devices) {}
     Flights(const Flights&) = delete;
     Flights& operator=(const Flights&) = delete;
     ~Flights() {
@@ -157,7 +158,7 @@ class CudaLauncher final : public Launcher {
     }
 
    private:
-    const SharedDevices& devices_;
+    const Devices::List& devices_;
     std::deque<Flight> bands_;
   };
 
@@ -207,10 +208,10 @@ class CudaLauncher final : public Launcher {
     return scene;
   }
 
-  const SharedDevices devices_;
+  const SharedDevices shared_;
+  const Devices::List& devices_;
   const std::unique_ptr<Launcher> cpu_;
   const DeviceFailure failure_;
-  std::atomic<bool> failed_{false};
   std::mutex mutex_;
   std::vector<std::shared_ptr<const DeviceScene>> scenes_;  // per device: the last plan's
 };
@@ -241,10 +242,10 @@ std::vector<DeviceInfo> devices(std::string* why) {
 }
 
 SharedDevices openDevices(const std::vector<int>& indexes) {
-  SharedDevices devices;
+  const auto devices = std::make_shared<Devices>();
   for (const int index : indexes) {
-    devices.push_back(std::make_shared<Device>(index));
-    devices.back()->use();
+    devices->all.push_back(std::make_unique<Device>(index));
+    devices->all.back()->use();
   }
   return devices;
 }

@@ -23,15 +23,18 @@ struct DeviceInfo {
 /// if given, then says so in a few words.
 std::vector<DeviceInfo> devices(std::string* why = nullptr);
 
-class Device;
-/// Devices that all launchers of a program share.
-using SharedDevices = std::vector<std::shared_ptr<Device>>;
+struct Devices;
+/// Devices that all launchers of a program share. A failure is shared, too, because a device that has failed
+/// works for nobody in the process.
+using SharedDevices = std::shared_ptr<Devices>;
+/// Throws Error(device) if one of them cannot be used.
 SharedDevices openDevices(const std::vector<int>& indexes);
 
-/// What to do once a device has failed: a failure of the device is one of the whole process.
+/// What launchers do once a device has failed.
 struct DeviceFailure {
   bool continueOnCpu = true;  ///< otherwise Error(device) is thrown, at every launch
-  std::function<void(const std::string&)> log;
+  std::function<void(const std::string&)>
+      log;  ///< receives one line in all: that the CPU takes over, and why
 };
 
 /// Bands of a picture's rows go to whichever of the devices is free. `threads`: of the CPU, for everything

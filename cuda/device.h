@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A CUDA device as all launchers of the process share it: its memory, the volumes on it, and bands.
+// CUDA devices as all launchers of the process share them: their memory, the volumes on them, and bands.
 #pragma once
 #include <atomic>
 #include <list>
@@ -49,6 +49,12 @@ class Device {
   std::list<std::shared_ptr<DeviceVolume>> volumes_;  // the most recently used first
   std::vector<std::unique_ptr<Band>> bands_;          // those that nobody uses
   std::atomic<float> nsPerPixel_{50};
+};
+
+struct Devices {
+  using List = std::vector<std::unique_ptr<Device>>;
+  List all;
+  std::atomic<bool> failed{false};  ///< one of them has failed
 };
 
 }  // namespace scolopax::cuda

@@ -5,7 +5,7 @@
 
 namespace scolopax::cuda {
 
-class Device {};
+struct Devices {};
 
 std::vector<DeviceInfo> devices(std::string* why) {
   if (why) *why = "this program was built without CUDA";

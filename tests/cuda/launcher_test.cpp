@@ -2,51 +2,13 @@
 // The CUDA launcher against a runtime that fails, runs out of memory and loses devices on request.
 #include "cuda/cuda_launcher.h"
 
-#include <gtest/gtest.h>
-
-#include <cstring>
-
 #include "renderer/core/error.h"
-#include "tests/cuda/device_scenes.h"
-#include "tests/cuda/substitute_runtime.h"
+#include "tests/cuda/launcher_fixture.h"
 
 namespace scolopax {
 namespace {
 
 using namespace test;
-
-/// Every test begins and ends with a runtime in which nothing is in use.
-class CudaLauncher : public testing::Test {
- protected:
-  void SetUp() override { ASSERT_TRUE(substitute::reset()); }
-  void TearDown() override {
-    EXPECT_EQ(substitute::leaks(), substitute::Leaks());
-    EXPECT_TRUE(substitute::reset());
-  }
-};
-
-/// One channel, so that little is uploaded.
-Scene smallScene(const Volume& volume) {
-  Scene scene = obliqueScene(volume, 16, 24);
-  for (std::size_t i = 1; i < scene.channels.size(); ++i) scene.channels[i].visible = false;
-  return scene;
-}
-
-Image rendered(Renderer& renderer, const Scene& scene, int samples = 2) {
-  renderer.setScene(scene);
-  for (int i = 0; i < samples; ++i) EXPECT_TRUE(renderer.renderSample(kNever));
-  return renderer.image();
-}
-
-void expectSamePicture(const Image& found, const Image& expected) {
-  ASSERT_EQ(found.pixels.size(), expected.pixels.size());
-  EXPECT_EQ(std::memcmp(found.pixels.data(), expected.pixels.data(), found.pixels.size() * sizeof(glm::vec4)),
-            0);
-}
-
-Image pictureOfTheCpu(const std::shared_ptr<const Volume>& volume, const Scene& scene, int samples = 2) {
-  return rendered(*makeCpuRenderer(volume, 1), scene, samples);
-}
 
 TEST_F(CudaLauncher, HasNoDevicesWhenTheDriverIsMissingOrTooOld) {
   ASSERT_EQ(cuda::devices().size(), 1u);
@@ -141,6 +103,30 @@ TEST_F(CudaLauncher, GoesOnOnTheCpuWhicheverCallFails) {
   std::size_t call = 1;
   while (attempt(call)) ++call;
   EXPECT_GT(call, 30u);
+}
+
+TEST_F(CudaLauncher, LeavesADeviceAloneThatHasFailedForAnotherSession) {
+  const auto volume = mixedVolume();
+  const Scene scene = smallScene(*volume);
+  const Image expected = pictureOfTheCpu(volume, scene);
+  const auto devices = cuda::openDevices({0});
+  int lines = 0;
+  const auto make = [&] {
+    return makeRenderer(cuda::makeCudaLauncher(
+                            devices, 1, {.continueOnCpu = true, .log = [&](const std::string&) { ++lines; }}),
+                        volume);
+  };
+  const auto first = make(), second = make();
+  substitute::failCall(1, cudaErrorIllegalAddress);
+  expectSamePicture(rendered(*first, scene), expected);
+  const auto third = make();
+  const std::size_t calls = substitute::callCount();
+  for (Renderer* other : {second.get(), third.get()}) {
+    EXPECT_EQ(other->backendName(), "cpu");
+    expectSamePicture(rendered(*other, scene), expected);
+  }
+  EXPECT_EQ(substitute::callCount(), calls);
+  EXPECT_EQ(lines, 1);
 }
 
 TEST_F(CudaLauncher, EndsInWordsWhenADeviceIsLostIfThatIsWanted) {
