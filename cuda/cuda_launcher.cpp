@@ -9,6 +9,7 @@
 #include "cuda/check.h"
 #include "cuda/device.h"
 #include "renderer/core/error.h"
+#include "renderer/core/short_text.h"
 
 namespace scolopax::cuda {
 namespace {
@@ -51,21 +52,18 @@ class CudaLauncher final : public Launcher {
         cpu_(makeCpuLauncher(threads)),
         failure_(std::move(failure)),
         scenes_(devices_.size()) {}
-  ~CudaLauncher() override {
-    for (std::size_t d = 0; d < devices_.size(); ++d) {
-      useQuietly(*devices_[d]);
-      scenes_[d].reset();
-    }
-  }
+  ~CudaLauncher() override { forgetScenes(); }
 
   std::string_view name() const override { return onCpu() ? "cpu" : "cuda"; }
   void run(const std::function<void()>& f) override { cpu_->run(f); }
 
   void upload(const std::shared_ptr<const RenderPlan>& plan, const std::stop_token& stop) override {
     unlessFailed([&] {
-      for (std::size_t d = 0; d < devices_.size(); ++d)
-        if (!sceneOn(d, *plan, [&] { return stop.stop_requested(); }))
-          throw Error(ErrorCode::cancelled, "the upload was cancelled");
+      inMemory(*plan, [&] {
+        for (std::size_t d = 0; d < devices_.size(); ++d)
+          if (!sceneOn(d, *plan, [&] { return stop.stop_requested(); }))
+            throw Error(ErrorCode::cancelled, "the upload was cancelled");
+      });
     });
   }
   bool uploadTakesLong(const RenderPlan& before, const Scene& scene) const override {
@@ -81,7 +79,8 @@ class CudaLauncher final : public Launcher {
 
   bool launch(const Pass& pass) override {
     bool complete = false;
-    return unlessFailed([&] { complete = launchOnDevices(pass); }) ? complete : cpu_->launch(pass);
+    const auto render = [&] { inMemory(*pass.plan, [&] { complete = launchOnDevices(pass); }); };
+    return unlessFailed(render) ? complete : cpu_->launch(pass);
   }
 
  private:
@@ -107,6 +106,58 @@ class CudaLauncher final : public Launcher {
       device.use();
     } catch (const Error&) {
     }
+  }
+
+  /// Calls f(). If that needs more memory than there is, calls it again without the scene before, whose
+  /// channels the next one may not show. Throws Error(tooLarge) and, if others hold the memory, Error(busy).
+  template <class F>
+  void inMemory(const RenderPlan& plan, F&& f) {
+    for (bool again = true;; again = false) {
+      try {
+        f();
+        return;
+      } catch (const Error& error) {
+        if (error.code() != ErrorCode::tooLarge) throw;
+        const bool forgot = forgetScenes();
+        if (!again || !forgot) throw lackOfMemory(plan, error);
+      }
+    }
+  }
+  /// To be called when the launcher holds no memory itself.
+  Error lackOfMemory(const RenderPlan& plan, const Error& error) const {
+    std::size_t needed = 0;
+    for (const int n : plan.visibleChannels()) {
+      const VoxelView& voxels = plan.volume()->channels()[std::size_t(n)].voxels;
+      needed += voxels.count() * sizeBytes(voxels.type());
+    }
+    std::optional<Error> busy;
+    for (const auto& device : devices_) {
+      device->use();
+      const std::size_t most = device->capacity(), held = device->heldBytes();
+      const auto textOf = [&](const std::string& use) {
+        return "memory of a CUDA device: expected at most " + mebibytes(most) + use + ", found " +
+               mebibytes(needed);
+      };
+      if (needed > most) return Error(ErrorCode::tooLarge, textOf(""));
+      if (held > 0) busy.emplace(ErrorCode::busy, textOf(", of which " + mebibytes(held) + " are in use"));
+    }
+    return busy.value_or(error);
+  }
+  /// Returns whether there were any.
+  bool forgetScenes() {
+    std::vector<std::shared_ptr<const DeviceScene>> scenes(devices_.size());
+    {
+      const std::lock_guard lock(mutex_);
+      scenes.swap(scenes_);
+    }
+    bool any = false;
+    for (std::size_t d = 0; d < devices_.size(); ++d) {
+      if (!scenes[d]) continue;
+      useQuietly(*devices_[d]);
+      scenes[d].reset();
+      any = true;
+    }
+    return any;
   }
 
   struct Flight {
@@ -202,9 +253,9 @@ class CudaLauncher final : public Launcher {
     const std::lock_guard lock(mutex_);
     std::shared_ptr<const DeviceScene>& scene = scenes_[d];
     if (scene && scene->plan().get() == &plan) return scene;
-    std::shared_ptr<DeviceVolume> volume = device.volume(plan.volume());
-    if (!volume->upload(plan.visibleChannels(), stop)) return nullptr;
-    scene = device.makeScene(plan.shared_from_this(), std::move(volume), scene.get());
+    auto planes = device.volume(plan.volume())->upload(plan.visibleChannels(), stop);
+    if (!planes) return nullptr;
+    scene = device.makeScene(plan.shared_from_this(), std::move(*planes), scene.get());
     return scene;
   }
 
@@ -241,10 +292,10 @@ std::vector<DeviceInfo> devices(std::string* why) {
   return found;
 }
 
-SharedDevices openDevices(const std::vector<int>& indexes) {
+SharedDevices openDevices(const std::vector<int>& indexes, std::function<bool()> release) {
   const auto devices = std::make_shared<Devices>();
   for (const int index : indexes) {
-    devices->all.push_back(std::make_unique<Device>(index));
+    devices->all.push_back(std::make_unique<Device>(index, release));
     devices->all.back()->use();
   }
   return devices;

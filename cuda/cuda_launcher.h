@@ -27,8 +27,10 @@ struct Devices;
 /// Devices that all launchers of a program share. A failure is shared, too, because a device that has failed
 /// works for nobody in the process.
 using SharedDevices = std::shared_ptr<Devices>;
-/// Throws Error(device) if one of them cannot be used.
-SharedDevices openDevices(const std::vector<int>& indexes);
+/// Before a launcher refuses a scene because others hold a device's memory, it calls `release`, if given, on
+/// any thread and with no lock held that another launcher needs. If it returns true, it has released some
+/// launcher, and the memory is looked for again. Throws Error(device) if one of the devices cannot be used.
+SharedDevices openDevices(const std::vector<int>& indexes, std::function<bool()> release = nullptr);
 
 /// What launchers do once a device has failed.
 struct DeviceFailure {

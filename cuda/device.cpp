@@ -31,15 +31,43 @@ std::shared_ptr<DeviceVolume> Device::volume(const std::shared_ptr<const Volume>
 }
 
 bool Device::makeRoom() {
-  std::shared_ptr<DeviceVolume> oldest;  // released without the mutex
+  if (dropUnused()) return true;
+  if (!release_ || !release_()) return false;
+  use();  // what was released may have been on another device, too
+  return true;
+}
+
+bool Device::dropUnused() {
+  using Volumes = std::list<std::shared_ptr<DeviceVolume>>;
+  Volumes volumes;
+  {
+    const std::lock_guard lock(mutex_);
+    volumes = volumes_;
+  }
+  // Freed without the mutex, because that waits for the device.
+  const bool dropped =
+      std::any_of(volumes.rbegin(), volumes.rend(), [](const auto& volume) { return volume->dropUnused(); });
+  volumes.clear();
+  Volumes empty;  // likewise
   const std::lock_guard lock(mutex_);
-  for (auto at = volumes_.rbegin(); at != volumes_.rend(); ++at)
-    if (at->use_count() == 1) {
-      oldest = std::move(*at);
-      volumes_.erase(std::next(at).base());
-      return true;
-    }
-  return false;
+  for (auto at = volumes_.begin(); at != volumes_.end();) {
+    const auto volume = at++;
+    if (volume->use_count() == 1 && (*volume)->isEmpty()) empty.splice(empty.end(), volumes_, volume);
+  }
+  return dropped;
+}
+
+std::size_t Device::capacity() const {
+  std::size_t free = 0, total = 0;
+  check(cudaMemGetInfo(&free, &total), "asking for the free memory");
+  return free + memory_->reserved();
+}
+
+std::size_t Device::heldBytes() const {
+  const std::lock_guard lock(mutex_);
+  std::size_t bytes = 0;
+  for (const auto& volume : volumes_) bytes += volume->heldBytes();
+  return bytes;
 }
 
 std::unique_ptr<Band> Device::takeBand() {

@@ -2,6 +2,7 @@
 // CUDA devices as all launchers of the process share them: their memory, the volumes on them, and bands.
 #pragma once
 #include <atomic>
+#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -18,19 +19,23 @@ namespace scolopax::cuda {
 /// Every function may be called from any thread.
 class Device {
  public:
-  explicit Device(int index) : index_(index) {}
+  /// `release`: as for openDevices().
+  Device(int index, std::function<bool()> release) : index_(index), release_(std::move(release)) {}
   ~Device();
 
   /// Makes it the current device of the calling thread, on which the other functions depend.
   void use() const;
-  /// The volume on the device, empty at first. It stays there until memory is short.
+  /// The volume on the device, empty at first. What nobody holds of it stays there until memory is short.
   std::shared_ptr<DeviceVolume> volume(const std::shared_ptr<const Volume>& volume);
   std::shared_ptr<const DeviceScene> makeScene(std::shared_ptr<const RenderPlan> plan,
-                                               std::shared_ptr<DeviceVolume> volume,
-                                               const DeviceScene* before) {
-    return std::make_shared<const DeviceScene>(std::move(plan), std::move(volume), *memory_, uploader_,
+                                               DeviceVolume::Planes planes, const DeviceScene* before) {
+    return std::make_shared<const DeviceScene>(std::move(plan), std::move(planes), *memory_, uploader_,
                                                before);
   }
+  /// The most bytes that this process could have on the device: those that it has, and those that are free.
+  std::size_t capacity() const;
+  /// Bytes of the volumes that are rendered.
+  std::size_t heldBytes() const;
   std::unique_ptr<Band> takeBand();
   void giveBack(std::unique_ptr<Band> band);
 
@@ -41,11 +46,13 @@ class Device {
 
  private:
   bool makeRoom();
+  bool dropUnused();
 
   const int index_;
+  const std::function<bool()> release_;
   const std::shared_ptr<DeviceMemory> memory_ = std::make_shared<DeviceMemory>([this] { return makeRoom(); });
   Uploader uploader_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::list<std::shared_ptr<DeviceVolume>> volumes_;  // the most recently used first
   std::vector<std::unique_ptr<Band>> bands_;          // those that nobody uses
   std::atomic<float> nsPerPixel_{50};

@@ -56,9 +56,9 @@ DeviceBytes DeviceMemory::allocate(std::size_t bytes) {
           }};
 }
 
-std::size_t DeviceMemory::used() const {
+std::size_t DeviceMemory::reserved() const {
   const std::lock_guard lock(mutex_);
-  return used_;
+  return used_ + keptBytes_;
 }
 
 void DeviceMemory::giveBack(std::byte* block, std::size_t bytes) {

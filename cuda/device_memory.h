@@ -25,8 +25,8 @@ class DeviceMemory : public std::enable_shared_from_this<DeviceMemory> {
   /// Uninitialised memory, aligned for any type; null for no bytes. Throws Error(tooLarge) if there is not
   /// enough. Kernels that use a block must have completed when its last owner gives it up.
   DeviceBytes allocate(std::size_t bytes);
-  /// Bytes in blocks that are in use.
-  std::size_t used() const;
+  /// Bytes of all blocks: those in use, and those kept for later.
+  std::size_t reserved() const;
 
  private:
   void giveBack(std::byte* block, std::size_t bytes);

@@ -133,14 +133,14 @@ class DeviceScene::Upload {
   std::vector<Patch> patches_;
 };
 
-DeviceScene::DeviceScene(std::shared_ptr<const RenderPlan> plan, std::shared_ptr<DeviceVolume> volume,
+DeviceScene::DeviceScene(std::shared_ptr<const RenderPlan> plan, DeviceVolume::Planes planes,
                          DeviceMemory& memory, Uploader& uploader, const DeviceScene* before)
-    : plan_(std::move(plan)), volume_(std::move(volume)), view_(plan_->view()) {
+    : plan_(std::move(plan)), planes_(std::move(planes)), view_(plan_->view()) {
   Upload upload(*this, before);
   std::vector<kernel::ChannelView> channels(view_.channels, view_.channels + view_.channelCount);
   for (int n = 0; n < view_.channelCount; ++n) {
     kernel::ChannelView& channel = channels[std::size_t(n)];
-    channel.field.voxels = volume_->voxels(plan_->visibleChannels()[std::size_t(n)]);
+    channel.field.voxels = planes_[std::size_t(n)].get();
     channel.field.lane = 0;
     channel.field.stride = 1;
     upload.add(&channel.opacity);

@@ -13,11 +13,11 @@ namespace scolopax::cuda {
 
 class DeviceScene {
  public:
-  /// Uploads what `before`, if given, does not already hold: an edit moves what it changes. The visible
-  /// channels of `volume` must be on the device; `memory` and `uploader` must be those of the device. Throws
-  /// Error(tooLarge).
-  DeviceScene(std::shared_ptr<const RenderPlan> plan, std::shared_ptr<DeviceVolume> volume,
-              DeviceMemory& memory, Uploader& uploader, const DeviceScene* before = nullptr);
+  /// Uploads what `before`, if given, does not already hold: an edit moves what it changes. `planes`: of the
+  /// visible channels; the scene holds them, and no others. `memory` and `uploader` must be those of the
+  /// device. Throws Error(tooLarge).
+  DeviceScene(std::shared_ptr<const RenderPlan> plan, DeviceVolume::Planes planes, DeviceMemory& memory,
+              Uploader& uploader, const DeviceScene* before = nullptr);
   const std::shared_ptr<const RenderPlan>& plan() const { return plan_; }
   /// `host`, a view of the plan with other values than its own, with device pointers. They are valid while
   /// this object lives.
@@ -34,7 +34,7 @@ class DeviceScene {
   class Upload;
 
   const std::shared_ptr<const RenderPlan> plan_;
-  const std::shared_ptr<DeviceVolume> volume_;
+  const DeviceVolume::Planes planes_;
   std::vector<Array> arrays_;
   DeviceBytes channels_;  // kernel::ChannelView, of this plan alone
   DeviceBytes totals_,

@@ -12,7 +12,7 @@ std::vector<DeviceInfo> devices(std::string* why) {
   return {};
 }
 
-SharedDevices openDevices(const std::vector<int>&) {
+SharedDevices openDevices(const std::vector<int>&, std::function<bool()>) {
   throw Error(ErrorCode::device, "CUDA: this program was built without it");
 }
 

@@ -33,7 +33,7 @@ void Uploader::prepare() {
 std::size_t Uploader::copy(std::byte* device, std::size_t bytes, std::size_t begin, const Gather& gather,
                            const std::function<bool()>& stop) {
   while (begin < bytes && !stop()) {
-    const std::lock_guard lock(mutex_);  // for one piece, so that a small copy does not wait for a volume
+    const std::lock_guard turn(mutex_);  // for one piece, so that a small copy does not wait for a volume
     prepare();
     const Piece& piece = pieces_[next_];
     next_ = 1 - next_;

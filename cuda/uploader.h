@@ -6,7 +6,8 @@
 
 #include <cstddef>
 #include <functional>
-#include <mutex>
+
+#include "cuda/fair_mutex.h"
 
 namespace scolopax::cuda {
 
@@ -36,7 +37,7 @@ class Uploader {
   };
   void prepare();
 
-  std::mutex mutex_;
+  FairMutex mutex_;
   cudaStream_t stream_ = nullptr;
   Piece pieces_[2];
   int next_ = 0;

@@ -52,6 +52,15 @@ void MemoryBudget::setRelease(std::function<bool()> release) {
   release_ = std::move(release);
 }
 
+bool MemoryBudget::releaseSome() {
+  std::function<bool()> release;
+  {
+    const std::lock_guard lock(mutex_);
+    release = release_;
+  }
+  return release && release();
+}
+
 void MemoryBudget::change(MemoryUse use, std::uint64_t from, std::uint64_t to) {
   for (;;) {
     std::function<bool()> release;

@@ -59,6 +59,9 @@ class MemoryBudget : public std::enable_shared_from_this<MemoryBudget> {
   /// Before a request is refused because others hold the memory, `release` is called, on any thread and with
   /// no lock held; if it returns true, it has released some, and the request is tried again.
   void setRelease(std::function<bool()> release);
+  /// Calls `release`, also for memory that is not charged here, such as that of devices. Returns whether some
+  /// was released.
+  bool releaseSome();
 
   std::uint64_t limit() const { return limit_; }
   /// The most that may be in use after a share of this size has been taken.

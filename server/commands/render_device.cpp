@@ -64,7 +64,8 @@ RendererFactory rendererFactory(const std::string& device, int threads, std::sha
     return {"cpu", [threads, memory = std::move(memory)](std::shared_ptr<const Volume> volume) {
               return makeCpuRenderer(std::move(volume), threads, memory);
             }};
-  return {"cuda", [devices = cuda::openDevices(indexes), threads, memory = std::move(memory),
+  const auto release = [memory] { return memory && memory->releaseSome(); };
+  return {"cuda", [devices = cuda::openDevices(indexes, release), threads, memory = std::move(memory),
                    failure = cuda::DeviceFailure{continueOnCpu, std::move(log)}](
                       std::shared_ptr<const Volume> volume) {
             return makeRenderer(cuda::makeCudaLauncher(devices, threads, failure), std::move(volume), memory);

@@ -154,13 +154,13 @@ class KernelTimer {
 class DeviceFrames {
  public:
   explicit DeviceFrames(std::shared_ptr<const Volume> volume)
-      : volume_(std::move(volume)),
-        onDevice_(std::make_shared<cuda::DeviceVolume>(volume_, *memory_, uploader_)) {}
+      : volume_(std::move(volume)), onDevice_(volume_, *memory_, uploader_) {}
 
   void set(const Scene& scene) {
     plan_ = std::make_shared<const RenderPlan>(volume_, scene, plan_.get());
-    onDevice_->upload(plan_->visibleChannels(), [] { return false; });
-    scene_ = std::make_unique<cuda::DeviceScene>(plan_, onDevice_, *memory_, uploader_, scene_.get());
+    auto planes = onDevice_.upload(plan_->visibleChannels(), [] { return false; });
+    scene_ =
+        std::make_unique<cuda::DeviceScene>(plan_, std::move(*planes), *memory_, uploader_, scene_.get());
     pixels_ = memory_->allocate(std::size_t(scene.width) * std::size_t(scene.height) * sizeof(glm::vec4));
   }
   const RenderPlan& plan() const { return *plan_; }
@@ -196,7 +196,7 @@ class DeviceFrames {
       std::make_shared<cuda::DeviceMemory>([] { return false; });
   cuda::Uploader uploader_;
   const std::shared_ptr<const Volume> volume_;
-  const std::shared_ptr<cuda::DeviceVolume> onDevice_;
+  cuda::DeviceVolume onDevice_;
   std::shared_ptr<const RenderPlan> plan_;
   std::unique_ptr<const cuda::DeviceScene> scene_;
   cuda::DeviceBytes pixels_;

@@ -21,59 +21,6 @@ TEST_F(CudaLauncher, HasNoDevicesWhenTheDriverIsMissingOrTooOld) {
   EXPECT_EQ(cudaGetLastError(), cudaSuccess);
 }
 
-TEST_F(CudaLauncher, ThatDoesNotFitTheDeviceSaysSoAndRendersOnceThereIsMemory) {
-  const auto volume = mixedVolume();
-  const Scene scene = obliqueScene(*volume, 24, 24);
-  const Image expected = pictureOfTheCpu(volume, scene);
-  int failures = 0;
-  bool fits = false;
-  // Each allocation in turn fails first.
-  for (std::size_t limit = 0; !fits; limit += 16384) {
-    const auto renderer = makeCudaRenderer(volume);
-    substitute::limitMemory(limit);
-    try {
-      rendered(*renderer, scene);
-      fits = true;
-    } catch (const Error& error) {
-      ++failures;
-      EXPECT_EQ(error.code(), ErrorCode::tooLarge);
-      EXPECT_STREQ(error.what(), "CUDA: allocating device memory failed: out of memory");
-      substitute::limitMemory(std::size_t(1) << 32);
-      expectSamePicture(rendered(*renderer, scene), expected);
-    }
-  }
-  EXPECT_GT(failures, 5);
-}
-
-TEST_F(CudaLauncher, OfAnotherSessionIsUnharmedWhenMemoryIsShort) {
-  const auto volume = mixedVolume();
-  const Scene scene = smallScene(*volume);
-  const auto devices = cuda::openDevices({0});
-  const auto first = makeCudaRenderer(volume, devices), second = makeCudaRenderer(volume, devices);
-  rendered(*first, scene, 1);
-  substitute::limitMemory(0);
-  EXPECT_THROW(rendered(*second, obliqueScene(*volume, 16, 24), 1), Error);
-  ASSERT_TRUE(first->renderSample(kNever));
-  expectSamePicture(first->image(), pictureOfTheCpu(volume, scene));
-}
-
-TEST_F(CudaLauncher, MakesRoomByForgettingVolumesThatNobodyRenders) {
-  const glm::ivec3 dims(160);  // 4 MiB
-  const auto volume = [&](int seed) {
-    return volumeOf(gridOf(dims), channelOf<std::uint8_t>(
-                                      dims, [&](int x, int y, int z) { return (x * y + z + seed) % 251; }));
-  };
-  const auto devices = cuda::openDevices({0});
-  substitute::limitMemory(std::size_t{12}
-                          << 20);  // with bands and macrocells, for one volume but not for two
-  for (int i = 0; i < 3; ++i) {
-    const auto each = volume(i);
-    Scene scene = obliqueScene(*each, 16, 16);
-    const auto renderer = makeCudaRenderer(each, devices);
-    expectSamePicture(rendered(*renderer, scene), pictureOfTheCpu(each, scene));
-  }
-}
-
 // Whichever call fails, one of two things happens: the device fails as a whole and the CPU makes the picture,
 // or it is an error of memory and the next attempt succeeds.
 TEST_F(CudaLauncher, GoesOnOnTheCpuWhicheverCallFails) {

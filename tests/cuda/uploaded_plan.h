@@ -2,6 +2,7 @@
 // A plan on device 0, for tests that launch kernels themselves.
 #pragma once
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -36,10 +37,10 @@ class ExactPixels {
 class UploadedPlan {
  public:
   UploadedPlan(const std::shared_ptr<const Volume>& volume, const Scene& scene)
-      : plan_(std::make_shared<const RenderPlan>(volume, scene)),
-        volume_(std::make_shared<cuda::DeviceVolume>(volume, *memory_, uploader_)) {
-    volume_->upload(plan_->visibleChannels(), [] { return false; });
-    scene_.emplace(plan_, volume_, *memory_, uploader_);
+      : plan_(std::make_shared<const RenderPlan>(volume, scene)) {
+    cuda::DeviceVolume onDevice(volume, *memory_, uploader_);
+    auto planes = onDevice.upload(plan_->visibleChannels(), [] { return false; });
+    scene_.emplace(plan_, std::move(*planes), *memory_, uploader_);
   }
   const RenderPlan& plan() const { return *plan_; }
   /// Renders the first sample of the whole picture.
@@ -58,7 +59,6 @@ class UploadedPlan {
       std::make_shared<cuda::DeviceMemory>([] { return false; });
   cuda::Uploader uploader_;
   const std::shared_ptr<const RenderPlan> plan_;
-  const std::shared_ptr<cuda::DeviceVolume> volume_;
   std::optional<cuda::DeviceScene> scene_;
 };
 

@@ -4,6 +4,7 @@
 SCOLOPAX_TEST_DEVICE states whether the program has one."""
 import os
 import sys
+import tempfile
 import unittest
 
 sys.path.insert(0, os.path.dirname(__file__))
@@ -62,6 +63,23 @@ class CudaDevices(unittest.TestCase):
             self.assertEqual(status, 503)
             self.assertIn(b"CUDA: ", answer)
             self.assertEqual(render(server)[0], 200)  # another renderer, on a device that works again
+
+
+    def test_forget_what_nobody_watches_when_memory_is_short(self):
+        with tempfile.TemporaryDirectory() as folder:
+            paths = []
+            for name, depth in (("one", 256), ("other", 255)):
+                paths.append(os.path.join(folder, f"{name}_256x256x{depth}_uint8.raw"))
+                with open(paths[-1], "wb") as file:
+                    file.write(bytes(range(256)) * (256 * depth))
+            # For one of them.
+            with Server(paths=paths, environment={"DEVICE_BYTES": str(30 << 20)}) as server:
+                for dataset in server.json("GET", "/api/v1/datasets")[1]["datasets"]:
+                    scene = {**SCENE, "dataset": dataset["id"]}
+                    status, session = server.json("POST", "/api/v1/sessions", {"scene": scene})
+                    self.assertEqual(status, 201, session)
+                    status, _, answer = server.call("GET", f"/api/v1/sessions/{session['id']}/frame?timeout=30")
+                    self.assertEqual(status, 200, answer[:200])
 
 
 if __name__ == "__main__":

@@ -76,6 +76,15 @@ TEST(MemoryBudget, HasMemoryReleasedBeforeItRefuses) {
   EXPECT_TRUE(spare.empty());
 }
 
+TEST(MemoryBudget, ReleasesMemoryAlsoForWhatIsNotChargedToIt) {
+  const auto budget = budgetOf(100);
+  EXPECT_FALSE(budget->releaseSome());
+  int left = 1;
+  budget->setRelease([&] { return left-- > 0; });
+  EXPECT_TRUE(budget->releaseSome());
+  EXPECT_FALSE(budget->releaseSome());
+}
+
 TEST(MemoryBudget, StaysAsItWasWhenAShareCannotGrow) {
   const auto budget = budgetOf(100);
   auto share = MemoryBudget::take(budget, MemoryUse::films, 60 * kMiB);
