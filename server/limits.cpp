@@ -8,6 +8,7 @@
 #include "renderer/data/pick.h"
 #include "renderer/data/scene.h"
 #include "server/edit_queue.h"
+#include "server/pick_queue.h"
 #include "server/scene_resolver.h"
 #include "server/session.h"
 
