@@ -65,8 +65,9 @@ TEST(Filters, OfTheNearestVoxelShowABlockOfVoxels) {
       for (int column = 0; column < 18; ++column) {
         const bool inside = row / 6 == 1 && column / 6 == 1;
         const double value = double(found.pixels[std::size_t(18 * row + column)].a);
-        // Trackers: six standard errors of 2048 samples.
-        const double tolerance = !inside ? 0 : hasStep(method) ? 1e-6 : 6 * std::sqrt(0.25 / 2048);
+        // Trackers: six standard errors.
+        const double tolerance =
+            !inside ? 0 : hasStep(method) ? 1e-6 : 6 * std::sqrt(0.25 / timesFactor(2048));
         ASSERT_NEAR(value, inside ? alpha : 0, tolerance) << nameOf(method) << ' ' << row << ' ' << column;
       }
   }
