@@ -408,8 +408,9 @@ TEST(Api, DescribesEveryRouteInOpenApi) {
 
 TEST(Api, DescribesParametersByTheListsAndSettingsThatItUses) {
   Api api;
+  const json description = openApi(api.routes);
   std::string docs;
-  for (const json& one : openApi(api.routes)["paths"]["/api/v1/sessions/{id}/frame"]["get"]["parameters"])
+  for (const json& one : description["paths"]["/api/v1/sessions/{id}/frame"]["get"]["parameters"])
     docs += one["name"].get<std::string>() + ": " + one["description"].get<std::string>() + '\n';
   EXPECT_NE(docs.find("aov: What to return instead of colours, one of depth, transmittance, channel, cost\n"),
             std::string::npos)

@@ -291,7 +291,9 @@ TEST(Pick, ThatFailsLetsABackgroundJobEndWell) {
     const auto viewer = std::make_shared<FakeViewer>();
     picker.session->addViewer(viewer);
     workshop.steps(2);
-    FakeBackground& background = job == Beside::addition ? workshop.background : workshop.passes;
+    FakeBackground& background = job == Beside::addition ? workshop.background
+                                 : job == Beside::pass   ? workshop.passes
+                                                         : workshop.errors;
     if (job == Beside::pass) {
       workshop.control->duringPass = [&] { workshop.clock.advance(1s); };
       workshop.step();

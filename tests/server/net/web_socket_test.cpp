@@ -29,6 +29,7 @@ class WebSocketTest : public testing::Test {
   static Options quickOptions() {
     Options options;
     options.port = 0;
+    options.bodyLimit = 1000;
     options.messageLimit = 1000;
     options.unsentTexts.count = 8;
     options.allowedOrigins = {"https://lab.example"};
