@@ -135,8 +135,8 @@ struct Rendered {
   decltype(net::Response::headers) headers;  ///< state how it was made
 };
 
-/// The picture of the scene, whose stop.seconds is at most the server's limit. The place and the memory of the
-/// film are free again when this returns.
+/// The picture of the scene, whose stop.seconds is at most the server's limit. The place and the memory of
+/// the film are free again when this returns.
 Rendered renderPicture(const ApiContext& context, FairPlaces& places, const net::Request& request,
                        const std::shared_ptr<const ResolvedScene>& scene) {
   const double limit = context.config.maxRenderSeconds;

@@ -66,8 +66,9 @@ TEST(Filters, OfTheNearestVoxelShowABlockOfVoxels) {
         const bool inside = row / 6 == 1 && column / 6 == 1;
         const double value = double(found.pixels[std::size_t(18 * row + column)].a);
         // Trackers: six standard errors.
-        const double tolerance =
-            !inside ? 0 : hasStep(method) ? 1e-6 : 6 * std::sqrt(0.25 / timesFactor(2048));
+        const double tolerance = !inside           ? 0
+                                 : hasStep(method) ? 1e-6
+                                                   : 6 * std::sqrt(0.25 / timesFactor(2048));
         ASSERT_NEAR(value, inside ? alpha : 0, tolerance) << nameOf(method) << ' ' << row << ' ' << column;
       }
   }
