@@ -30,19 +30,24 @@ class Unread(HostileTest):
         """A viewer that reads only when it is asked to."""
         return connect(self.server, session["stream"], max_queue=1, read_limit=1024)
 
-    def assert_closed(self, codes):
+    def assert_closed(self, codes, at_least=CLIENTS):
         """The close code: 1008, or 1006 if a client did not even read the reason for 5 s."""
-        self.assertGreaterEqual(len(codes), CLIENTS)
+        self.assertGreaterEqual(len(codes), at_least)
         self.assertIn(1008, codes)
         self.assertLessEqual(set(codes), {1006, 1008})
 
     async def close_code(self, viewer):
-        """Reads all texts; returns how many refusals there were, and the code with which the server closed."""
+        """Reads all texts; returns how many refusals there were, and the code with which the server closed, or None
+        if the connection is open and answers a ping."""
         refusals = 0
         try:
+            await viewer.send(json.dumps({"type": "ping", "id": 0}))
             while True:
                 message = await asyncio.wait_for(viewer.recv(), 20)
-                refusals += isinstance(message, str) and json.loads(message)["type"] == "error"
+                kind = json.loads(message)["type"] if isinstance(message, str) else "frame"
+                if kind == "pong":
+                    return refusals, None
+                refusals += kind == "error"
         except websockets.ConnectionClosed as closed:
             return refusals, closed.code
 
@@ -121,23 +126,25 @@ class Unread(HostileTest):
         async def round_of_edits(over):
             stalled = [await self.stall(session) for _ in range(CLIENTS)]
             most = number = 0
-            # The texts of a connection are dropped when it is closed. Until then it holds about most / CLIENTS.
+            # The texts of a connection are dropped when it is closed. Until then it holds about most / CLIENTS, unless
+            # the kernel's buffers have taken more of them than for the others: then it may still be open afterwards.
             while not over.is_set() and (now := await asyncio.to_thread(unread)) >= most / (2 * CLIENTS):
                 most, number = max(most, now), number + 1
                 status, _, _ = await asyncio.to_thread(
                     self.server.call, "PATCH", path + "/scene", {"channels": {"0": {"opacity": CURVE[:4000 + number % 90]}}})
                 self.assertEqual(status, 200)
             for viewer in stalled:
-                if over.is_set():
+                code = None if over.is_set() else (await self.close_code(viewer))[1]
+                if code is None:
                     viewer.transport.abort()
                 else:
-                    closed.append((await self.close_code(viewer))[1])
+                    closed.append(code)
 
         async def run(over):
             while not over.is_set():
                 await round_of_edits(over)
         self.under(lambda over: asyncio.run(run(over)), UNREAD, 20 if FULL else 8)
-        self.assert_closed(closed)
+        self.assert_closed(closed, CLIENTS // 2)
 
 
 class UnreadAnswers(HostileTest):
