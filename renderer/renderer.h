@@ -104,7 +104,7 @@ class Renderer {
   /// rendered. `scene` must be the one given to setScene(), but its size, filter, method and step may differ,
   /// as a picture shown for a while may be smaller and coarser. Method::automatic picks as superposed does.
   /// Must not be called during setScene(). The result keeps to the scene that is set now, even if another is
-  /// set later, and may be used from any thread while the renderer lives.
+  /// set later, and may be used from any thread, even after the renderer has ended.
   virtual std::unique_ptr<Picking> pick(const Scene& scene, const PixelArea& area) const = 0;
   virtual Image image() const = 0;
 };

@@ -182,7 +182,11 @@ net::Response pick(ApiContext& context, const net::Request& request) {
   const auto session = sessionOf(context, request);
   const auto found = session->waitForPick(pickQuery(request), context.config.pollTimeout, request.gone);
   if (!found && context.stopping) throw stoppingProblem();
-  if (!found) throw ProtocolError(503, "", "the scene was not ready for picking in time");
+  if (!found)
+    throw ProtocolError(503, "",
+                        "the pick was not answered within " +
+                            shortText(secondsOf(context.config.pollTimeout)) +
+                            " seconds: the scene was not ready, or its rays take long");
   return jsonResponse(200, *found);
 }
 

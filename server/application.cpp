@@ -40,8 +40,8 @@ struct Application::Impl {
   std::stop_source abortRequests;
   const Now now = [] { return std::chrono::steady_clock::now(); };
   LoopThread renderThread, watchThread, encodeThread;
-  // Separate, so that short jobs do not wait for long ones: a part of a pass is short, measuring an error
-  // takes many times longer.
+  // Separate, so that short jobs do not wait for long ones: a part of a pass or a pick is short, measuring an
+  // error takes many times longer.
   BackgroundThreads pictures, passes{std::max<std::size_t>(1, processors() / 2)}, errors, builds;
   // Few threads, so that encoding for one client does not delay the frames of others.
   BackgroundThreads encoders{std::min<std::size_t>(2, processors())};
@@ -83,7 +83,8 @@ struct Application::Impl {
                     .builds = builds,
                     .wake = [this] { renderThread.wake(); },
                     .memory = memory,
-                    .wakeWatch = [this] { watchThread.wake(); }},
+                    .wakeWatch = [this] { watchThread.wake(); },
+                    .maxPickSeconds = config.maxRenderSeconds},
                    [this](const PassResult& pass) { metrics.passEnded(pass); }),
         encodeLoop(
             sessions, now, log, pictures, [this] { encodeThread.wake(); }, memory),

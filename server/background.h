@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs jobs in the background that would delay the thread that needs their results: building scenes, passes
-// with slow rays, making and encoding large pictures.
+// and picks with slow rays, making and encoding large pictures.
 #pragma once
 #include <algorithm>
 #include <condition_variable>

@@ -27,7 +27,7 @@ struct Config {
   std::uint64_t maxClients = 64;                          ///< streams at once
   std::uint64_t maxPixels = 16'777'216;                   ///< of one picture
   std::uint64_t maxMemoryBytes = std::uint64_t{4} << 30;  ///< of memory that requests make the server hold
-  double maxRenderSeconds = 60;                           ///< of one POST /render
+  double maxRenderSeconds = 60;                           ///< of one POST /render or one pick
   std::uint64_t maxRenders = 2;                           ///< number of POST /render that render at once
   std::uint64_t maxBodyBytes = protocol::Limits().bytes;
   std::uint64_t maxMessageBytes = protocol::Limits().bytes;

@@ -26,7 +26,7 @@ constexpr Limit kLimits[] = {
     {"imagePixels", "pixels of one picture: width times height", "422", &Config::maxPixels, "max-image"},
     {"sessions", "sessions at a time; shared among addresses", "503", &Config::maxSessions, "max-sessions"},
     {"clients", "streams at a time; shared among addresses", "503", &Config::maxClients, "max-clients"},
-    {"renderSeconds", "seconds of one POST api/v1/render", "422", &Config::maxRenderSeconds,
+    {"renderSeconds", "seconds of one POST api/v1/render or one pick", "422", &Config::maxRenderSeconds,
      "max-render-seconds"},
     {"renders",
      "POST api/v1/render that render at a time; shared among addresses; those that wait to be encoded do not "

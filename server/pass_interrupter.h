@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Interrupts sample passes on the render thread. Shared by RenderLoop and ProgressiveRender.
+// Interrupts sample passes and picks on the render thread. Shared by RenderLoop, ProgressiveRender and
+// CurrentPick.
 #pragma once
 #include <atomic>
 #include <functional>
@@ -11,8 +12,8 @@
 namespace scolopax::server {
 
 /// A pass is interrupted by an edit, unless the pass is urgent, and always when the loop stops or when one of
-/// its rays takes too long (a pass checks its own time limit only between rays). An interruption lasts until
-/// the next reset().
+/// its rays takes too long (a pass checks its own time limit only between rays). A pick is like a pass that
+/// is not urgent. An interruption lasts until the next reset().
 class PassInterrupter {
  public:
   /// `wake` makes watch() run again.

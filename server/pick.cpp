@@ -4,15 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <new>
 #include <set>
 #include <string>
 #include <utility>
 
 #include "protocol/problem.h"
-#include "renderer/core/error.h"
-#include "renderer/renderer.h"
-#include "server/session.h"
 
 namespace scolopax::server {
 namespace {
@@ -81,33 +77,6 @@ json pickedJson(const ResolvedScene& scene, std::uint32_t revision, const PickQu
     if (seen.insert(nearestVoxel(picked, scene.dataset->volume->grid().dims)).second)
       hits.push_back(hitJson(scene, picked));
   return answer;
-}
-
-void CurrentPick::run(const PendingPick& pick, const ResolvedScene& scene, std::uint32_t revision,
-                      const Renderer& renderer, std::chrono::nanoseconds slice, Session& session,
-                      const std::function<void(const std::string&)>& log) {
-  PickAnswer answer;
-  try {
-    if (!picking_ || id_ != pick.id) {
-      // The picture may have become smaller since the query came.
-      const PixelArea area = areaOf(pick.query, scene.render.width, scene.render.height);
-      picking_ = renderer.pick(scene.render, area);
-      id_ = pick.id;
-    }
-    if (!picking_->run(slice)) return;
-    answer.found = pickedJson(scene, revision, pick.query, picking_->found());
-  } catch (const ProtocolError&) {
-    answer.failure = std::current_exception();
-  } catch (const Error&) {
-    answer.failure = std::current_exception();
-  } catch (const std::bad_alloc&) {
-    answer.failure = std::make_exception_ptr(Error(ErrorCode::busy, "not enough memory for this pick"));
-  } catch (const std::exception& error) {
-    log("session " + session.id() + ": a pick failed: " + error.what());
-    answer.failure = std::make_exception_ptr(ProtocolError(500, "", "the server failed to answer this pick"));
-  }
-  picking_.reset();
-  session.answerPick(pick.id, std::move(answer));
 }
 
 }  // namespace scolopax::server

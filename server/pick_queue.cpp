@@ -8,9 +8,9 @@
 
 namespace scolopax::server {
 
-PickId PickQueue::add(const PickQuery& query, ViewerId viewer, OnPicked answered) {
+PickId PickQueue::add(const PickQuery& query, std::uint32_t revision, ViewerId viewer, OnPicked answered) {
   if (picks_.size() >= kMaxPicks) throw protocol::limitReached(429, kMaxPicks, "picks waiting in a session");
-  picks_.push_back({{++last_, query}, viewer, std::move(answered)});
+  picks_.push_back({{++last_, query, revision}, viewer, std::move(answered)});
   return last_;
 }
 

@@ -16,8 +16,9 @@ class PickQueue {
   /// Maximum number of picks that wait at once.
   static constexpr std::size_t kMaxPicks = 8;
 
-  /// `viewer`: the one that asks. Throws ProtocolError(429) if too many picks wait already.
-  PickId add(const PickQuery& query, ViewerId viewer, OnPicked answered);
+  /// `revision`: of the scene now. `viewer`: the one that asks. Throws ProtocolError(429) if too many picks
+  /// wait already.
+  PickId add(const PickQuery& query, std::uint32_t revision, ViewerId viewer, OnPicked answered);
   bool empty() const { return picks_.empty(); }
   /// The pick to be answered first.
   std::optional<PendingPick> oldest() const;

@@ -19,12 +19,6 @@ double secondsBetween(TimePoint from, TimePoint to) {
 
 std::uint32_t microseconds(double seconds) { return std::uint32_t(std::clamp(seconds * 1e6, 0.0, 4e9)); }
 
-/// If a part of a pass exceeds its slice by this time, single rays take that long. On a busy machine, any
-/// part may exceed it a little.
-constexpr std::chrono::milliseconds kSlowRay{300};
-/// Time for which passes are then rendered in the background, where they delay no other session.
-constexpr std::chrono::seconds kSlowTime{10};
-
 }  // namespace
 
 ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, const RenderContext& context,
@@ -32,17 +26,23 @@ ProgressiveRender::ProgressiveRender(std::shared_ptr<Session> session, const Ren
     : session_(std::move(session)),
       context_(context),
       interrupter_(interrupter),
+      pick_(*session_, context, interrupter),
       resolution_(context.policy) {}
 
 ProgressiveRender::~ProgressiveRender() {
-  if (job_) job_->cancel();
+  endTask();
   unpark();
   dropRenderer();
 }
 
+void ProgressiveRender::endTask() {
+  if (job_) job_->cancel();
+  job_.reset();
+  task_ = {};
+}
+
 /// Done in the background, because releasing the memory of a large film takes time.
 void ProgressiveRender::dropRenderer() {
-  pick_.forget();
   film_.scene.reset();
   volume_.reset();
   quick_ = false;
@@ -54,7 +54,6 @@ void ProgressiveRender::dropRenderer() {
 }
 
 void ProgressiveRender::park() {
-  pick_.forget();
   context_.parked->park(this, std::move(renderer_));
   renderer_.reset();
   parked_ = true;
@@ -74,9 +73,12 @@ RenderRequest ProgressiveRender::request() const {
   return request;
 }
 
-/// Whether there is a pick, and the renderer has its scene and is not building another one.
-bool ProgressiveRender::pickable(const RenderRequest& request) const {
-  return request.pick && film_.scene && !build_ && film_.revision == request.revision;
+/// Whether there is a pick that can go on or begin. It begins when the renderer has a scene that is new
+/// enough and is not building another one.
+bool ProgressiveRender::pickReady(const RenderRequest& request) const {
+  if (!request.pick) return false;
+  if (pick_.has(request.pick->id)) return !pick_.busy();
+  return film_.scene && !building() && film_.revision >= request.pick->revision;
 }
 
 bool ProgressiveRender::finished(const RenderRequest& request) const {
@@ -92,13 +94,14 @@ ProgressiveRender::Step ProgressiveRender::step(const RenderRequest& request) co
   if ((film_.stale(request) && !film_.shieldsPass(request, context_.policy, context_.now())) ||
       film_.lateForEdit(request, context_.policy))
     return Step::buildScene;
+  if (!request.pictures) return Step::none;
   if (!finished(request)) return Step::addSample;
   return showDue(request) ? Step::show : Step::none;
 }
 
 ProgressiveRender::Urgency ProgressiveRender::urgency() const {
   const RenderRequest request = this->request();
-  if (pickable(request)) return Urgency::urgent;
+  if (pickReady(request)) return Urgency::urgent;
   const Urgency toShow = film_.firstOfEdit(request) ? Urgency::urgent : Urgency::atRest;
   if (parked_) return request.wanted ? toShow : Urgency::none;
   if (job_) return job_->done() ? toShow : Urgency::none;
@@ -112,6 +115,11 @@ bool ProgressiveRender::edited() const {
 }
 
 std::optional<TimePoint> ProgressiveRender::dueAt() const {
+  const auto picture = pictureDueAt(), pick = pick_.dueAt();
+  return picture && pick ? std::min(*picture, *pick) : picture ? picture : pick;
+}
+
+std::optional<TimePoint> ProgressiveRender::pictureDueAt() const {
   if (job_) return std::nullopt;  // its end wakes the loop
   const RenderRequest request = this->request();
   if (!request.wanted || request.retryAt) return request.retryAt;
@@ -143,15 +151,15 @@ std::uint64_t ProgressiveRender::filmSize() const {
   return std::uint64_t(scene.width) * std::uint64_t(scene.height);
 }
 
-void ProgressiveRender::perform(Background* background, Background::Work work, Next next,
-                                PassResult& result) {
+template <class T>
+void ProgressiveRender::perform(Background* background, std::shared_ptr<T> task, PassResult& result) {
+  task_ = task;
   if (!background) {
-    work({});
-    (this->*next)(result);
-    return;
+    task->run(std::stop_token());
+    return taskDone(result);
   }
-  next_ = next;
-  job_ = background->start(session_->id(), std::move(work), context_.wake);
+  job_ = background->start(
+      session_->id(), [task](const std::stop_token& stop) { task->run(stop); }, context_.wake);
   if (job_->done()) collect(result);
 }
 
@@ -161,29 +169,36 @@ void ProgressiveRender::collect(PassResult& result) {
     job->rethrow();
   } catch (const Error& error) {
     if (error.code() != ErrorCode::cancelled) throw;
-    result.abandoned = build_ != nullptr;
-    build_.reset();
-    part_.reset();
-    picture_.reset();
+    result.abandoned = building();
+    task_ = {};
     return;
   }
-  (this->*next_)(result);
+  taskDone(result);
+}
+
+void ProgressiveRender::taskDone(PassResult& result) {
+  const Task task = std::exchange(task_, {});
+  std::visit([&](const auto& done) { ended(done, result); }, task);
+}
+
+bool ProgressiveRender::taskUseless(const RenderRequest& request) const {
+  if (const auto* build = std::get_if<std::shared_ptr<SceneBuild>>(&task_))
+    return !request.wanted || (*build)->uselessFor(request);
+  if (!request.pictures) return true;
+  if (std::holds_alternative<std::shared_ptr<RenderPart>>(task_))
+    return film_.stale(request) && !film_.shieldsPass(request, context_.policy, context_.now());
+  return std::holds_alternative<std::shared_ptr<PictureJob>>(task_) && film_.stale(request);
 }
 
 void ProgressiveRender::supervise() {
+  pick_.supervise();
   const RenderRequest request = this->request();
   if (!job_ && renderer_ && !request.wanted) park();
-  if (!job_ || job_->done()) return;
-  const bool useless =
-      build_  ? build_->uselessFor(request)
-      : part_ ? film_.stale(request) && !film_.shieldsPass(request, context_.policy, context_.now())
-              : picture_ && film_.stale(request);
-  if (!request.wanted || useless) job_->cancel();
+  if (job_ && !job_->done() && taskUseless(request)) job_->cancel();
 }
 
 void ProgressiveRender::buildScene(const RenderRequest& request, const OtherSessions& others,
                                    PassResult& result) {
-  pick_.forget();
   if (film_.begunInteractive && film_.unfinished && film_.scene)
     resolution_.passGivenUp(true, filmSize(), film_.passSeconds);
   const auto volume = request.scene->dataset->volume;
@@ -195,29 +210,23 @@ void ProgressiveRender::buildScene(const RenderRequest& request, const OtherSess
   volume_ = volume;
   film_.abandoned = film_.unfinished;
   film_.unfinished = false;
-  build_ = std::make_shared<SceneBuild>();
-  build_->request = request;
-  build_->begin = context_.now();
-  build_->divisor = wantedDivisor(request, others.edited);
-  build_->scene = drawnScene(*request.scene, build_->divisor, request.interactive);
-  build_->record = request.aovs && !film_.recording;
-  build_->renderer = renderer_;
+  const auto build = std::make_shared<SceneBuild>();
+  build->request = request;
+  build->begin = context_.now();
+  build->divisor = wantedDivisor(request, others.edited);
+  build->scene = drawnScene(*request.scene, build->divisor, request.interactive);
+  build->record = request.aovs && !film_.recording;
+  build->renderer = renderer_;
+  build->make = context_.makeRenderer;
   // Recording begins by clearing a lot of memory.
-  build_->inBackground = !renderer_ || build_->record || renderer_->takesLong(build_->scene);
-  Scene chosen = build_->scene;
+  build->inBackground = !renderer_ || build->record || renderer_->takesLong(build->scene);
+  Scene chosen = build->scene;
   if (chosen.method == Method::automatic) chosen.method = Method::hybrid;
-  build_->onlyChooses = build_->inBackground && renderer_ && !build_->record && !renderer_->takesLong(chosen);
-  const auto setScene = [build = build_, volume, make = context_.makeRenderer](const std::stop_token& stop) {
-    if (!build->renderer) build->renderer = make(volume);
-    build->stats = build->renderer->setScene(build->scene, stop);
-    if (build->record) build->renderer->recordAovs();
-  };
-  perform(build_->inBackground ? &context_.builds : nullptr, setScene, &ProgressiveRender::sceneBuilt,
-          result);
+  build->onlyChooses = build->inBackground && renderer_ && !build->record && !renderer_->takesLong(chosen);
+  perform(build->inBackground ? &context_.builds : nullptr, build, result);
 }
 
-void ProgressiveRender::sceneBuilt(PassResult& result) {
-  const auto build = std::exchange(build_, nullptr);
+void ProgressiveRender::ended(const std::shared_ptr<SceneBuild>& build, PassResult& result) {
   const RenderRequest& request = build->request;
   renderer_ = build->renderer;
   if (build->record) {
@@ -249,49 +258,40 @@ std::chrono::microseconds ProgressiveRender::urgentSlice(int editedOthers) const
 
 void ProgressiveRender::addSample(const RenderRequest& request, const OtherSessions& others,
                                   PassResult& result) {
-  const bool urgent = film_.firstOfEdit(request), othersWait = others.urgent || request.pick;
+  // A pick that goes on in the background does not wait for this pass.
+  const bool urgent = film_.firstOfEdit(request),
+             othersWait = others.urgent || (request.pick && !pick_.busy());
   const RenderPolicy& policy = context_.policy;
   const auto slice = urgent ? urgentSlice(others.edited) : othersWait ? policy.politeSlice : policy.slice;
   const TimePoint begin = context_.now();
   if (!film_.unfinished) film_.passBegan = begin, film_.passSeconds = 0;
-  part_ = std::make_shared<PassPart>();
-  part_->slice = slice;
+  const auto render = [renderer = renderer_](const std::atomic<bool>& cancel,
+                                             std::chrono::nanoseconds budget) {
+    return renderer->renderPixels(cancel, budget);
+  };
+  const auto part = std::make_shared<RenderPart>(render, slice, context_.now);
   // Not known to be quick: what takes long must not delay those at which edits arrive.
-  part_->inBackground = begin < slowUntil_ || (!quick_ && others.edited > 0);
-  if (part_->inBackground) {
-    const auto render = [part = part_, renderer = renderer_, now = context_.now](
-                            const std::stop_token& stop) { part->render(*renderer, now, stop); };
-    perform(&context_.passes, render, &ProgressiveRender::partRendered, result);
-    return;
-  }
-  const auto render = [&](const std::stop_token&) {
-    const PassInterrupter::Watched watched(interrupter_, begin + slice + kSlowRay);
-    // A turn between two urgent ones is short but not interrupted, so that it makes progress however fast
-    // edits arrive.
-    part_->render(*renderer_, context_.now, interrupter_.flag(urgent || othersWait));
-  };
-  perform(nullptr, render, &ProgressiveRender::partRendered, result);
+  if (begin < slowUntil_ || (!quick_ && others.edited > 0)) return perform(&context_.passes, part, result);
+  // A turn between two urgent ones is short but not interrupted, so that it makes progress however fast edits
+  // arrive.
+  part->run(interrupter_, urgent || othersWait);
+  ended(part, result);
 }
 
-void ProgressiveRender::partRendered(PassResult& result) {
-  const auto part = std::exchange(part_, nullptr);
-  const bool slow = part->seconds >= std::chrono::duration<double>(part->slice + kSlowRay).count();
-  if (slow) slowUntil_ = context_.now() + kSlowTime;
+void ProgressiveRender::ended(const std::shared_ptr<RenderPart>& part, PassResult& result) {
+  const bool slow = part->hasSlowRays();
+  if (slow) slowUntil_ = context_.now() + RenderPart::kSlowTime;
   quick_ = !slow;
-  result.cancelled = part->interrupted && !slow;
-  film_.passSeconds += part->seconds;
-  film_.unfinished = !part->complete;
-  if (!part->complete) return;
-  const auto add = [renderer = renderer_, estimate = film_.scene->stop.error > 0](const std::stop_token&) {
-    renderer->addPixels();
-    // Makes the error known when it is needed. If estimating it takes long, show() does it.
-    if (estimate && !renderer->errorTakesLong()) renderer->estimatedError();
-  };
-  perform(renderer_->filmIsLarge() ? &context_.pictures : nullptr, add, &ProgressiveRender::sampleAdded,
-          result);
+  result.cancelled = part->interrupted() && !slow;
+  film_.passSeconds += part->seconds();
+  film_.unfinished = !part->complete();
+  if (!part->complete()) return;
+  const auto addition =
+      std::make_shared<SampleAddition>(SampleAddition{renderer_, film_.scene->stop.error > 0});
+  perform(renderer_->filmIsLarge() ? &context_.pictures : nullptr, addition, result);
 }
 
-void ProgressiveRender::sampleAdded(PassResult& result) {
+void ProgressiveRender::ended(const std::shared_ptr<SampleAddition>&, PassResult& result) {
   film_.abandoned = false;
   result.rendered = true;
   result.renderSeconds = film_.passSeconds;
@@ -304,8 +304,11 @@ void ProgressiveRender::sampleAdded(PassResult& result) {
 void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
   film_.shownFailures = request.failures;
   film_.shownDrops = request.drops;
-  picture_ = std::make_shared<PictureJob>();
-  FrameInfo& info = picture_->frame.info;
+  const auto picture = std::make_shared<PictureJob>();
+  picture->renderer = renderer_;
+  picture->pixels = filmSize();
+  picture->memory = context_.memory;
+  FrameInfo& info = picture->frame.info;
   info.revision = film_.revision;
   info.samples = renderer_->samples();
   info.method = renderer_->choice().method;
@@ -314,22 +317,19 @@ void ProgressiveRender::show(const RenderRequest& request, PassResult& result) {
   info.reduced = film_.divisor != 1;
   info.interactive = request.interactive || info.reduced;
   info.final = !info.interactive && finished(request);
-  picture_->frame.background = film_.scene->render.background;
-  picture_->interactive = request.interactive;
-  picture_->aovs = film_.recording && !request.interactive;
+  picture->frame.background = film_.scene->render.background;
+  picture->interactive = request.interactive;
+  picture->aovs = film_.recording && !request.interactive;
   // The reduced picture on the screen is blended into the picture that replaces it.
-  if (!request.interactive && !info.final && request.pollSamples.empty()) picture_->reduced = reduced_;
-  picture_->sampleError = sampleError_;
-  const auto make = [picture = picture_, renderer = renderer_, pixels = filmSize(), memory = context_.memory](
-                        const std::stop_token& stop) { picture->make(*renderer, pixels, memory, stop); };
+  if (!request.interactive && !info.final && request.pollSamples.empty()) picture->reduced = reduced_;
+  picture->sampleError = sampleError_;
   Background* const background = renderer_->errorTakesLong() ? &context_.errors
                                  : renderer_->filmIsLarge()  ? &context_.pictures
                                                              : nullptr;
-  perform(background, make, &ProgressiveRender::pictureMade, result);
+  perform(background, picture, result);
 }
 
-void ProgressiveRender::pictureMade(PassResult&) {
-  const auto picture = std::exchange(picture_, nullptr);
+void ProgressiveRender::ended(const std::shared_ptr<PictureJob>& picture, PassResult&) {
   const FrameInfo& info = picture->frame.info;
   if (info.mixed && picture->share > 0.98) reduced_.reset();
   if (info.reduced) {
@@ -344,12 +344,10 @@ void ProgressiveRender::pictureMade(PassResult&) {
   session_->submit(std::move(picture->frame));
 }
 
-/// Runs a slice of a pick if there is one and the last turn was not a pick's.
+/// Gives the turn to a pick, if there is one that can go on and the last turn was not a pick's.
 bool ProgressiveRender::pickIn(const RenderRequest& request) {
-  pickedLast_ = pickable(request) && !pickedLast_;
-  if (pickedLast_)
-    pick_.run(*request.pick, *request.scene, film_.revision, *renderer_, context_.policy.politeSlice,
-              *session_, context_.log);
+  pickedLast_ = pickReady(request) && !pickedLast_;
+  if (pickedLast_) pick_.run(*request.pick, film_.scene, film_.revision, renderer_);
   return pickedLast_;
 }
 
@@ -358,17 +356,18 @@ void ProgressiveRender::turn(const RenderRequest& request, const OtherSessions& 
   if (pickIn(request)) return;
   if (job_ && !job_->done()) return;
   const bool collected = job_ != nullptr;
-  bool built = build_ != nullptr;
+  const bool built = building();
   if (collected) collect(result);
   if (!request.wanted || job_) return;
+  // A pick begins before the next build or pass, so that it need not wait for it.
+  if (built && pickIn(request)) return;
   Step next = step(request);
   if (next == Step::buildScene) {
     buildScene(request, others, result);
-    if (job_ || !film_.scene) return;
-    built = true;
+    if (job_ || !film_.scene || pickIn(request)) return;
     next = step(request);
   }
-  if (built && pickIn(request)) return;  // so that the pick does not wait for a pass
+  if (next == Step::none) return;
   const auto mayShow = [&] { return !job_ && !film_.unfinished && showDue(request); };
   // A sample added in the background is shown before the next pass begins.
   if (collected && mayShow()) return show(request, result);
@@ -395,17 +394,13 @@ PassResult ProgressiveRender::run(const OtherSessions& others) {
 
 void ProgressiveRender::fail(const RenderRequest& request, const Error& error) {
   // The failure may concern a scene that an edit has replaced in the meantime.
-  const std::uint32_t revision = build_        ? build_->request.revision
+  const auto* build = std::get_if<std::shared_ptr<SceneBuild>>(&task_);
+  const std::uint32_t revision = build         ? (*build)->request.revision
                                  : film_.scene ? film_.revision
                                                : request.revision;
   session_->fail(revision, error);
   // The state after an error cannot be trusted.
-  if (job_) job_->cancel();
-  job_.reset();
-  next_ = nullptr;
-  build_.reset();
-  part_.reset();
-  picture_.reset();
+  endTask();
   dropRenderer();
 }
 

@@ -2,24 +2,20 @@
 // A session's renderer and film, and the decisions what to do with them next. Used only by the render thread.
 // Takes scenes from Session and submits pictures to it.
 #pragma once
-#include <functional>
 #include <memory>
 #include <optional>
+#include <variant>
 
-#include "renderer/core/memory_budget.h"
 #include "renderer/renderer.h"
 #include "server/background.h"
+#include "server/current_pick.h"
 #include "server/film_state.h"
-#include "server/parked_renderers.h"
 #include "server/pass_interrupter.h"
+#include "server/render_context.h"
 #include "server/resolution.h"
 #include "server/session.h"
 
 namespace scolopax::server {
-
-using MakeRenderer = std::function<std::unique_ptr<Renderer>(std::shared_ptr<const Volume>)>;
-/// Receives a line that clients must not see.
-using Log = std::function<void(const std::string&)>;
 
 /// The outcome of one turn, for the metrics.
 struct PassResult {
@@ -31,24 +27,9 @@ struct PassResult {
   double renderSeconds = 0, rebuildSeconds = 0;
 };
 
-/// Shared by the renders of all sessions. `wake` makes the render loop check its sessions again.
-struct RenderContext {
-  MakeRenderer makeRenderer;
-  RenderPolicy policy;
-  Now now;
-  Log log;
-  Background& pictures;  ///< for large pictures (adding samples, making, encoding) and for releasing films
-  Background& passes;    ///< for passes with slow rays
-  Background& errors;    ///< for pictures whose error takes long to measure
-  Background& builds;    ///< for scenes, including the automatic choice of the method
-  std::function<void()> wake;
-  std::shared_ptr<MemoryBudget> memory = nullptr;  ///< for pictures; null: no limit
-  std::function<void()> wakeWatch = [] {};         ///< makes RenderLoop::watch() run again
-  std::shared_ptr<ParkedRenderers> parked = std::make_shared<ParkedRenderers>();
-};
-
 struct SceneBuild;
-struct PassPart;
+class RenderPart;
+struct SampleAddition;
 struct PictureJob;
 
 class ProgressiveRender {
@@ -74,14 +55,14 @@ class ProgressiveRender {
 
   const std::shared_ptr<Session>& session() const { return session_; }
   /// Urgency of the work that run() would do now; none while a background job is running, unless a pick can
-  /// be answered.
+  /// go on.
   Urgency urgency() const;
   /// Whether edits arrive.
   bool edited() const;
   /// The time at which there may be work again even if nothing wakes the loop.
   std::optional<TimePoint> dueAt() const;
-  /// Cancels the background job if its result is no longer wanted, and parks the renderer while nobody
-  /// watches.
+  /// Cancels the background jobs whose results are no longer wanted, ends a pick that has taken too long, and
+  /// parks the renderer while nobody watches.
   void supervise();
   /// Runs one turn: a slice of a pick, or at most one sample pass with the rebuild before it and the
   /// submission after it. Long steps run in the background and are completed in a later turn. Does not throw:
@@ -89,7 +70,9 @@ class ProgressiveRender {
   PassResult run(const OtherSessions& others);
 
  private:
-  using Next = void (ProgressiveRender::*)(PassResult&);
+  /// Work on the renderer.
+  using Task = std::variant<std::monostate, std::shared_ptr<SceneBuild>, std::shared_ptr<RenderPart>,
+                            std::shared_ptr<SampleAddition>, std::shared_ptr<PictureJob>>;
   /// The work of a turn, unless a background job is running or the turn is a pick's.
   enum class Step { none, buildScene, addSample, show };
 
@@ -97,38 +80,42 @@ class ProgressiveRender {
   Step step(const RenderRequest& request) const;
   bool finished(const RenderRequest& request) const;
   bool showDue(const RenderRequest& request) const;
-  bool pickable(const RenderRequest& request) const;
+  bool building() const { return std::holds_alternative<std::shared_ptr<SceneBuild>>(task_); }
+  bool taskUseless(const RenderRequest& request) const;
+  bool pickReady(const RenderRequest& request) const;
+  std::optional<TimePoint> pictureDueAt() const;
   bool filmGoesOn(const RenderRequest& request) const;
   double wantedDivisor(const RenderRequest& request, int editedOthers);
   std::uint64_t filmSize() const;
   void fail(const RenderRequest& request, const Error& error);
+  void endTask();
   void dropRenderer();
   void park();
   void unpark();
 
   bool pickIn(const RenderRequest& request);
   void turn(const RenderRequest& request, const OtherSessions& others, PassResult& result);
-  /// Runs `work`, on this thread if `background` is null, and then `next` on this thread.
-  void perform(Background* background, Background::Work work, Next next, PassResult& result);
+  /// Runs a task, on this thread if `background` is null, and then ended() on this thread.
+  template <class T>
+  void perform(Background* background, std::shared_ptr<T> task, PassResult& result);
   void collect(PassResult& result);
+  void taskDone(PassResult& result);
+  void ended(std::monostate, PassResult&) {}
+  void ended(const std::shared_ptr<SceneBuild>& build, PassResult& result);
+  void ended(const std::shared_ptr<RenderPart>& part, PassResult& result);
+  void ended(const std::shared_ptr<SampleAddition>&, PassResult& result);
+  void ended(const std::shared_ptr<PictureJob>& picture, PassResult& result);
   void buildScene(const RenderRequest& request, const OtherSessions& others, PassResult& result);
-  void sceneBuilt(PassResult& result);
   std::chrono::microseconds urgentSlice(int editedOthers) const;
   void addSample(const RenderRequest& request, const OtherSessions& others, PassResult& result);
-  void partRendered(PassResult& result);
-  void sampleAdded(PassResult& result);
   void show(const RenderRequest& request, PassResult& result);
-  void pictureMade(PassResult& result);
 
   const std::shared_ptr<Session> session_;
   const RenderContext& context_;
   PassInterrupter& interrupter_;
 
-  std::shared_ptr<Background::Job> job_;  ///< while it exists, it owns the renderer, except for picks
-  Next next_ = nullptr;                   ///< to be called when the job is done
-  std::shared_ptr<SceneBuild> build_;     ///< the scene that is being built; else null
-  std::shared_ptr<PassPart> part_;        ///< the part of a pass that is being rendered; else null
-  std::shared_ptr<PictureJob> picture_;   ///< the picture that is being made; else null
+  Task task_;                             ///< what is being done with the renderer, here or in the background
+  std::shared_ptr<Background::Job> job_;  ///< does the task; owns the renderer, though picks may begin
 
   CurrentPick pick_;
   bool pickedLast_ = false;  ///< the last turn was a pick's, so the next is the picture's

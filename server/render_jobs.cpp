@@ -26,29 +26,45 @@ Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive
   return scene;
 }
 
-void PassPart::render(Renderer& renderer, const Now& now, const std::atomic<bool>& interrupt) {
-  const TimePoint begin = now();
-  complete = renderer.renderPixels(interrupt, slice);
-  interrupted = !complete && interrupt;
-  seconds = std::chrono::duration<double>(now() - begin).count();
+void SceneBuild::run(const std::stop_token& stop) {
+  if (!renderer) renderer = make(request.scene->dataset->volume);
+  stats = renderer->setScene(scene, stop);
+  if (record) renderer->recordAovs();
 }
 
-void PassPart::render(Renderer& renderer, const Now& now, const std::stop_token& stop) {
-  const std::stop_callback stopped(stop, [this] { cancel = true; });
-  render(renderer, now, cancel);
+void RenderPart::run(const std::stop_token& stop) {
+  const std::stop_callback stopped(stop, [this] { cancel_ = true; });
+  runUntil(cancel_);
 }
 
-void PictureJob::make(const Renderer& renderer, std::uint64_t pixels,
-                      const std::shared_ptr<MemoryBudget>& memory, const std::stop_token& stop) {
+void RenderPart::run(PassInterrupter& interrupter, bool urgent) {
+  const PassInterrupter::Watched watched(interrupter, now_() + slice_ + kSlowRay);
+  runUntil(interrupter.flag(urgent));
+}
+
+void RenderPart::runUntil(const std::atomic<bool>& cancel) {
+  const TimePoint begin = now_();
+  complete_ = render_(cancel, slice_);
+  interrupted_ = !complete_ && cancel;
+  seconds_ = std::chrono::duration<double>(now_() - begin).count();
+}
+
+void SampleAddition::run(const std::stop_token&) {
+  renderer->addPixels();
+  // Makes the error known when it is needed. If estimating it takes long, PictureJob does it.
+  if (estimate && !renderer->errorTakesLong()) renderer->estimatedError();
+}
+
+void PictureJob::run(const std::stop_token& stop) {
   FrameInfo& info = frame.info;
-  info.error = float(renderer.estimatedError(stop));
+  info.error = float(renderer->estimatedError(stop));
   const auto take = [&](std::size_t pixelBytes) {
     return MemoryBudget::take(memory, MemoryUse::pictures, pixels * pixelBytes);
   };
   // Blending makes a second image from the reduced picture.
   auto imageMemory = take(sizeof(glm::vec4) * (reduced ? 2 : 1));
   auto aovMemory = take(aovs ? std::size(kAovs) * sizeof(float) : 0);
-  Image picture = renderer.image();
+  Image picture = renderer->image();
   if (reduced) {
     // If the error is not known although there are samples enough, the picture is shown as it is.
     const double error = info.samples < 2 ? sampleError : std::isnan(info.error) ? 0 : double(info.error);
@@ -59,7 +75,7 @@ void PictureJob::make(const Renderer& renderer, std::uint64_t pixels,
   frame.image = withShare(std::move(imageMemory), std::move(picture));
   if (!aovs) return;
   std::vector<AovValues> values;
-  for (std::size_t i = 0; i < std::size(kAovs); ++i) values.push_back(renderer.aov(Aov(i)));
+  for (std::size_t i = 0; i < std::size(kAovs); ++i) values.push_back(renderer->aov(Aov(i)));
   frame.aovs = withShare(std::move(aovMemory), std::move(values));
 }
 

@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// The jobs of ProgressiveRender, which run on its own thread or in the background: building a scene,
-// rendering a part of a pass, and making a picture of the film.
+// The jobs of ProgressiveRender and CurrentPick, which run on the render thread or in the background:
+// building a scene, rendering a part of a pass or a pick, adding a sample to the film, and making a picture
+// of it.
 #pragma once
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <stop_token>
+#include <utility>
 
 #include "renderer/core/memory_budget.h"
 #include "renderer/renderer.h"
 #include "server/frame.h"
+#include "server/pass_interrupter.h"
+#include "server/render_context.h"
 #include "server/session.h"
 
 namespace scolopax::server {
@@ -27,10 +32,12 @@ struct SceneBuild {
   Scene scene;
   bool record = false;  ///< AOVs are recorded from this scene on
   bool inBackground = false;
-  bool onlyChooses = false;  ///< only the automatic choice of the method takes long
-  std::shared_ptr<Renderer> renderer;
+  bool onlyChooses = false;            ///< only the automatic choice of the method takes long
+  std::shared_ptr<Renderer> renderer;  ///< null: made by `make`
+  MakeRenderer make;
   RebuildStats stats;
 
+  void run(const std::stop_token& stop);
   /// Whether the expensive part of this build is of no use for `other`.
   bool uselessFor(const RenderRequest& other) const {
     return (onlyChooses && other.edit != request.edit) ||
@@ -39,23 +46,56 @@ struct SceneBuild {
   }
 };
 
-/// The part of a pass that one turn renders.
-struct PassPart {
-  std::chrono::microseconds slice{};
-  bool inBackground = false;
-  std::atomic<bool> cancel{false};  ///< ends the part early, if it is in the background
-  bool complete = false;            ///< the pass is complete
-  bool interrupted = false;         ///< the pass was interrupted
-  double seconds = 0;               ///< time it took
+/// The part of a pass or a pick that one turn renders.
+class RenderPart {
+ public:
+  /// If a part exceeds its slice by this time, single rays take that long. On a busy machine, any part may
+  /// exceed it a little.
+  static constexpr std::chrono::milliseconds kSlowRay{300};
+  /// Time for which parts are then rendered in the background, where they delay no other session.
+  static constexpr std::chrono::seconds kSlowTime{10};
 
-  /// Stops early once `interrupt` is true, even in the middle of a ray.
-  void render(Renderer& renderer, const Now& now, const std::atomic<bool>& interrupt);
-  /// The same in the background, once `stop` is requested.
-  void render(Renderer& renderer, const Now& now, const std::stop_token& stop);
+  /// Renderer::renderPixels() or Picking::run().
+  using Render = std::function<bool(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget)>;
+  RenderPart(Render render, std::chrono::microseconds slice, Now now)
+      : render_(std::move(render)), slice_(slice), now_(std::move(now)) {}
+
+  /// In the background: ends early, even in the middle of a ray, once `stop` is requested.
+  void run(const std::stop_token& stop);
+  /// On the render thread: ends early, even in the middle of a ray, if it is interrupted. An `urgent` part is
+  /// not interrupted by edits.
+  void run(PassInterrupter& interrupter, bool urgent);
+
+  // --- once it has run ---
+  bool complete() const { return complete_; }  ///< the pass or pick is complete
+  bool interrupted() const { return interrupted_; }
+  double seconds() const { return seconds_; }  ///< time it took
+  bool hasSlowRays() const { return seconds_ >= std::chrono::duration<double>(slice_ + kSlowRay).count(); }
+
+ private:
+  void runUntil(const std::atomic<bool>& cancel);
+
+  const Render render_;
+  const std::chrono::microseconds slice_;
+  const Now now_;
+  std::atomic<bool> cancel_{false};
+  bool complete_ = false, interrupted_ = false;
+  double seconds_ = 0;
+};
+
+/// The adding of a complete pass to the film.
+struct SampleAddition {
+  std::shared_ptr<Renderer> renderer;
+  bool estimate = false;  ///< the stop rule needs the error
+
+  void run(const std::stop_token& stop);
 };
 
 /// The making of a picture from the film.
 struct PictureJob {
+  std::shared_ptr<const Renderer> renderer;
+  std::uint64_t pixels = 0;
+  std::shared_ptr<MemoryBudget> memory;
   RenderedFrame frame;
   bool interactive = false;              ///< made while edits arrive
   bool aovs = false;                     ///< includes AOVs
@@ -64,8 +104,7 @@ struct PictureJob {
   double share = 0;  ///< weight of the new picture in the blend
 
   /// Throws Error(cancelled) if `stop` is requested while the error is measured.
-  void make(const Renderer& renderer, std::uint64_t pixels, const std::shared_ptr<MemoryBudget>& memory,
-            const std::stop_token& stop);
+  void run(const std::stop_token& stop);
 };
 
 }  // namespace scolopax::server

@@ -25,11 +25,11 @@ class RenderLoop {
   /// of them, a session at rest gets a short turn, so that no session starves.
   std::optional<TimePoint> step();
   /// Interrupts the running pass, unless it makes the first picture after an edit or is a short turn between
-  /// two of those. From any thread.
+  /// two of those. Interrupts a running pick. From any thread.
   void interrupt() { interrupter_.interrupt(); }
-  /// Interrupts the running pass and all later ones. From any thread.
+  /// Interrupts the running pass or pick and all later ones. From any thread.
   void stop() { interrupter_.stop(); }
-  /// Interrupts the running pass if one of its rays takes too long; the pass then continues in the
+  /// Interrupts the running pass or pick if one of its rays takes too long; it then continues in the
   /// background. A step of a loop of its own, which RenderContext::wakeWatch wakes.
   std::optional<TimePoint> watch() { return interrupter_.watch(); }
 

@@ -19,9 +19,10 @@ struct RenderPolicy {
   std::chrono::milliseconds stillInterval{500};       ///< between frames at rest, once there are many samples
   std::chrono::milliseconds tooLate{75};  ///< when an edit's first picture is restarted at a lower resolution
   int restFactor = 12;  ///< how many times longer a pass may take at each step to full resolution
-  std::chrono::milliseconds slice{100};      ///< of a slow pass, until the next session's turn
-  std::chrono::milliseconds politeSlice{8};  ///< the same while an edit's first picture or a pick waits
-  std::chrono::milliseconds shield{300};     ///< time for which a pass with a stale scene continues
+  std::chrono::milliseconds slice{100};  ///< of a slow pass, until the next session's turn
+  /// The same while an edit's first picture or a pick waits; also of a pick.
+  std::chrono::milliseconds politeSlice{8};
+  std::chrono::milliseconds shield{300};  ///< time for which a pass with a stale scene continues
 };
 
 /// The time for one session's pass while edits arrive at it and at `editedOthers` other sessions. All edited

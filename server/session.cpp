@@ -136,6 +136,7 @@ void Session::removeViewer(ViewerId id) {
   {
     const std::lock_guard lock(mutex_);
     if (viewers_.erase(id) > 0) left = picks_.takeOf(id);
+    if (!left.empty()) endWorkOnPicks();
     lastUsed_ = hooks_.now();
     hooks_.wakeRender();  // the loop also determines when the session ends
   }
@@ -208,7 +209,7 @@ PickId Session::pick(const PickQuery& query, OnPicked answered, ViewerId viewer)
   areaOf(query, scene_->render.width, scene_->render.height);
   retryIfBusy();
   if (failedRevision_ == revision_) throw Error(*failure_);
-  const PickId id = picks_.add(query, viewer, std::move(answered));
+  const PickId id = picks_.add(query, revision_, viewer, std::move(answered));
   lastUsed_ = hooks_.now();
   hooks_.interruptRender();
   hooks_.wakeRender();
@@ -227,11 +228,17 @@ std::optional<nlohmann::json> Session::waitForPick(const PickQuery& query, std::
   frameCame_.wait_for(lock, gone, timeout, [&] { return closed_ || came->has_value(); });
   if (!*came) {
     picks_.take(id);
-    hooks_.wakeRender();  // to end the work on it
+    endWorkOnPicks();
     return std::nullopt;
   }
   if ((*came)->failure) std::rethrow_exception((*came)->failure);
   return std::make_optional<nlohmann::json>(std::move((*came)->found));
+}
+
+/// Has the render loop see at once that a pick is no longer wanted.
+void Session::endWorkOnPicks() {
+  hooks_.interruptRender();
+  hooks_.wakeRender();
 }
 
 std::shared_ptr<const EncodedFrame> Session::latestFrame() const {
@@ -282,7 +289,8 @@ RenderRequest Session::request() const {
   request.failures = failures_;
   request.drops = drops_;
   request.pick = picks_.oldest();
-  request.wanted = !closed_ && (seen() || !pollSamples_.empty() || request.pick);
+  request.pictures = !closed_ && (seen() || !pollSamples_.empty());
+  request.wanted = request.pictures || request.pick;
   if (failedRevision_ == revision_) {
     if (request.wanted) request.retryAt = retryAt_;
     request.wanted = request.retryAt && hooks_.now() >= *request.retryAt;

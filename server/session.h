@@ -9,7 +9,8 @@
 //     loops need it for every session in every step.
 //  3. The mutex is never held while rendering or encoding: both work on snapshots (shared_ptr to const).
 //  4. The renderer and its film belong to the render thread (ProgressiveRender) or to the background job that
-//     it has started; no lock guards them. Picks continue during such a job unless it builds a scene.
+//     it has started; no lock guards them. A pick can begin during such a job unless it builds a scene. From
+//     then on it is independent of the renderer, and a background job of its own may work on it.
 //  5. Only the encoder thread offers frames to viewers. A frame of an older scene is not published, so it
 //     cannot replace a newer one.
 //  6. Viewers are called with the mutex held, so that they see edits in order. A ViewerSink therefore only
@@ -77,7 +78,8 @@ struct FrameQuery {
 struct RenderRequest {
   std::shared_ptr<const ResolvedScene> scene;
   std::uint32_t revision = 0;
-  bool wanted = false;       ///< a viewer or a script wants pictures, and the scene can be rendered
+  bool wanted = false;       ///< somebody wants pictures or a pick, and the scene can be rendered
+  bool pictures = false;     ///< a viewer or a script wants pictures
   bool interactive = false;  ///< edits arrive
   TimePoint interactiveEnd;  ///< when `interactive` ends if no further edit comes
   std::uint32_t edit = 0;    ///< revision of the last edit that changed the film; 0 if nobody watches
@@ -96,7 +98,7 @@ struct SessionHooks {
   Now now;
   std::function<void()> wakeRender;
   std::function<void()> wakeEncoder;
-  std::function<void()> interruptRender;  ///< interrupts the running pass, unless it is urgent
+  std::function<void()> interruptRender;  ///< interrupts the running pass, unless it is urgent, or pick
 };
 
 class Session {
@@ -206,6 +208,7 @@ class Session {
   SceneState edit(const EditOrigin& origin, const Resolve& resolve);
   void checkRevision(const EditOrigin& origin) const;
   void retryIfBusy();
+  void endWorkOnPicks();
   std::vector<OnPicked> takeFailed(std::uint32_t revision, const Error& error);
 
   const std::string id_, token_;

@@ -2,6 +2,7 @@
 // Picking: what is visible at a point of the picture. Chooses which pixels are sampled, and which sample
 // represents a pixel. A backend takes the samples.
 #pragma once
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <glm/vec2.hpp>
@@ -48,9 +49,12 @@ struct Picked {
 class Picking {
  public:
   virtual ~Picking() = default;
-  /// Continues until all samples are taken and returns true, or returns false if the budget is used up first.
-  /// The budget is checked every few samples.
-  virtual bool run(std::chrono::nanoseconds budget) = 0;
+  /// Continues until all samples are taken and returns true, or returns false if `cancel` became true or
+  /// `budget` ran out first. A cancel also ends a sample that takes long, which is then taken again. The
+  /// budget is checked every few samples.
+  virtual bool run(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) = 0;
+  /// Number of samples taken so far.
+  virtual std::size_t samples() const = 0;
   /// What is visible at pixelsToPick(), in their order, without pixels that show nothing. Call it after run()
   /// has returned true.
   virtual const std::vector<Picked>& found() const = 0;

@@ -171,7 +171,7 @@ class Engine final : public Renderer {
   }
 
   std::unique_ptr<Picking> pick(const Scene& scene, const PixelArea& area) const override {
-    return makePicking(*launcher_, plan_, scene, area);
+    return makePicking(launcher_, plan_, scene, area);
   }
 
  private:
@@ -278,7 +278,7 @@ class Engine final : public Renderer {
   /// Those of a film of kLargePicture pixels without records.
   static constexpr std::size_t kLargeBytes = kLargePicture * (Film::kPixelBytes + sizeof(std::uint8_t));
 
-  const std::unique_ptr<Launcher> launcher_;
+  const std::shared_ptr<Launcher> launcher_;  // shared with picks
   const std::shared_ptr<MemoryBudget> budget_;
   MemoryBudget::Share memory_;  // for the film and its records
   const std::shared_ptr<const Volume> volume_;

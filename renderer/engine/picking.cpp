@@ -10,16 +10,14 @@
 namespace scolopax {
 namespace {
 
-const std::atomic<bool> kNever{false};
-
 /// Distance between samples with the filter `point`, in pixels: so small that they are practically one point.
 constexpr float kPointUnit = 0x1p-20f;
 
 class SampledPicking final : public Picking {
  public:
-  SampledPicking(Launcher& launcher, std::shared_ptr<const RenderPlan> plan, const Scene& scene,
-                 const PixelArea& area)
-      : launcher_(launcher),
+  SampledPicking(std::shared_ptr<Launcher> launcher, std::shared_ptr<const RenderPlan> plan,
+                 const Scene& scene, const PixelArea& area)
+      : launcher_(std::move(launcher)),
         plan_(std::move(plan)),
         method_(scene.method),
         number_(sampleNumber(Sampling::independent, 0)),
@@ -45,20 +43,25 @@ class SampledPicking final : public Picking {
     done_.resize(samples);
   }
 
-  bool run(std::chrono::nanoseconds budget) override {
+  bool run(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
     const auto deadline = std::chrono::steady_clock::now() + budget;
     for (; at_ < pixels_.size(); ++at_) {
       // Renders a picture of the pixel in which every pixel is a sample, because kernels take many pixels at
       // a time.
       const glm::vec2 corner = glm::vec2(pixels_[at_]) + (isPoint_ ? 0.5f : 0.0f);
       view_.rays.halfSize = (halfSize_ - corner) / unit_;
-      if (!launcher_.launch({plan_.get(), method_, view_, number_, colors_.data(), nullptr, met_.data(),
-                             done_.data(), &kNever, deadline}))
+      if (!launcher_->launch({plan_.get(), method_, view_, number_, colors_.data(), nullptr, met_.data(),
+                              done_.data(), &cancel, deadline}))
         return false;
       if (const auto sample = visibleSample(met_)) found_.push_back(pickedBy(int(*sample)));
       std::fill(done_.begin(), done_.end(), std::uint8_t(0));
     }
     return true;
+  }
+
+  std::size_t samples() const override {
+    const auto undone = std::count(done_.begin(), done_.end(), std::uint8_t(0));
+    return (at_ + 1) * done_.size() - std::size_t(undone);
   }
 
   const std::vector<Picked>& found() const override { return found_; }
@@ -76,7 +79,7 @@ class SampledPicking final : public Picking {
             plan_->visibleChannels()[std::size_t(met.channel)], start_ + double(met.depth)};
   }
 
-  Launcher& launcher_;
+  const std::shared_ptr<Launcher> launcher_;
   const std::shared_ptr<const RenderPlan> plan_;
   const Method method_;
   const kernel::SampleNumber number_;
@@ -96,9 +99,10 @@ class SampledPicking final : public Picking {
 
 }  // namespace
 
-std::unique_ptr<Picking> makePicking(Launcher& launcher, std::shared_ptr<const RenderPlan> plan,
-                                     const Scene& scene, const PixelArea& area) {
-  return std::make_unique<SampledPicking>(launcher, std::move(plan), scene, area);
+std::unique_ptr<Picking> makePicking(std::shared_ptr<Launcher> launcher,
+                                     std::shared_ptr<const RenderPlan> plan, const Scene& scene,
+                                     const PixelArea& area) {
+  return std::make_unique<SampledPicking>(std::move(launcher), std::move(plan), scene, area);
 }
 
 }  // namespace scolopax

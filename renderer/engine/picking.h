@@ -9,8 +9,9 @@
 
 namespace scolopax {
 
-/// `scene` is that of the plan, except that size, method, step and filter may differ. Borrows the launcher.
-std::unique_ptr<Picking> makePicking(Launcher& launcher, std::shared_ptr<const RenderPlan> plan,
-                                     const Scene& scene, const PixelArea& area);
+/// `scene` is that of the plan, except that size, method, step and filter may differ.
+std::unique_ptr<Picking> makePicking(std::shared_ptr<Launcher> launcher,
+                                     std::shared_ptr<const RenderPlan> plan, const Scene& scene,
+                                     const PixelArea& area);
 
 }  // namespace scolopax

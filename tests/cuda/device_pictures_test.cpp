@@ -44,7 +44,7 @@ void expectSameRecords(const Renderer& cpu, const Renderer& device, const Scene&
   }
   const PixelArea area{scene.width / 2, scene.height / 2, 2, 2};
   const auto expected = cpu.pick(scene, area), found = device.pick(scene, area);
-  ASSERT_TRUE(expected->run(Renderer::kNoBudget) && found->run(Renderer::kNoBudget));
+  ASSERT_TRUE(expected->run(kNever, Renderer::kNoBudget) && found->run(kNever, Renderer::kNoBudget));
   ASSERT_EQ(found->found().size(), expected->found().size());
   for (std::size_t i = 0; i < found->found().size(); ++i) {
     EXPECT_EQ(found->found()[i].channel, expected->found()[i].channel);

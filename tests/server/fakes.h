@@ -54,6 +54,9 @@ struct FakeControl {
       ~0u;  ///< from this many samples on the error takes long, until it is measured
   std::function<void(std::stop_token)> measuring;  ///< called during that measurement
   int incompletePicks = 0;           ///< calls that use up their budget before a pick is complete
+  std::size_t samplesPerTurn = 8;    ///< samples that such a call takes
+  std::function<void()> duringPick;  ///< called in the middle of each call
+  int cancelledPicks = 0;            ///< calls that a cancel ended
   std::string pickFailure;           ///< if set, picks throw a std::runtime_error with this message
   std::vector<std::uint32_t> picks;  ///< the scene's seed in each pick that was begun
   std::vector<Picked> found;         ///< the result of each pick
@@ -64,8 +67,10 @@ class FakeBackground : public Background {
  public:
   bool atOnce = true;
   std::vector<std::function<void()>> waiting;
+  std::vector<std::string> flows;  ///< of all jobs
 
-  std::shared_ptr<Job> start(const std::string&, Work work, std::function<void()> ended) override {
+  std::shared_ptr<Job> start(const std::string& flow, Work work, std::function<void()> ended) override {
+    flows.push_back(flow);
     auto job = std::make_shared<Job>(std::move(work));
     const auto run = [job, ended = std::move(ended)] {
       job->run();
@@ -86,17 +91,23 @@ class FakeBackground : public Background {
 class FakePicking : public Picking {
  public:
   explicit FakePicking(std::shared_ptr<FakeControl> control) : control_(std::move(control)) {}
-  bool run(std::chrono::nanoseconds budget) override {
+  bool run(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
     if (!control_->pickFailure.empty()) throw std::runtime_error(control_->pickFailure);
+    // A copy, because the function may replace itself.
+    if (const auto during = control_->duringPick) during();
+    if (cancel) return ++control_->cancelledPicks, false;
     if (control_->incompletePicks == 0) return true;
     if (control_->clock)
       control_->clock->advance(std::chrono::duration_cast<std::chrono::microseconds>(budget));
+    samples_ += control_->samplesPerTurn;
     return --control_->incompletePicks, false;
   }
+  std::size_t samples() const override { return samples_; }
   const std::vector<Picked>& found() const override { return control_->found; }
 
  private:
   const std::shared_ptr<FakeControl> control_;
+  std::size_t samples_ = 0;
 };
 
 /// A renderer whose picture shows which scenes its samples belong to: red is the seed if they all belong to

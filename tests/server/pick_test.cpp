@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "protocol/problem.h"
-#include "tests/server/fakes.h"
+#include "tests/server/picker.h"
 
 namespace scolopax::server {
 namespace {
@@ -20,6 +20,8 @@ using nlohmann::json;
 using protocol::ProtocolError;
 using testing::FakeBackground;
 using testing::FakeViewer;
+using testing::Picker;
+using testing::pickProblem;
 using testing::seedPatch;
 using testing::Workshop;
 
@@ -55,19 +57,6 @@ TEST(PickArea, IsRefusedOutsideOfThePicture) {
   EXPECT_EQ(pointerOf({0, 0, 3, {}}), "/y2");
   EXPECT_EQ(pointerOf({0, 0, {}, 3}), "/x2");
 }
-
-/// A session and the answers to its picks.
-struct Picker {
-  Workshop workshop;
-  std::shared_ptr<Session> session = workshop.store.create(seedPatch(5));
-  std::vector<PickAnswer> answers;
-
-  void pick(const PickQuery& query = {1, 2}) {
-    session->pick(query, [this](const PickAnswer& answer) { answers.push_back(answer); });
-  }
-  /// A hit at a voxel position of the fake volume.
-  Picked at(glm::dvec3 voxel) const { return {voxel, voxel, 1, 7.5}; }
-};
 
 TEST(Pick, TellsTheValuesOfAllChannelsAlsoOfHiddenOnes) {
   Picker picker;
@@ -179,49 +168,6 @@ TEST(Pick, WaitsForTheSceneButNotForWhatElseIsDoneInTheBackground) {
   EXPECT_EQ(workshop.errors.waiting.size(), 1u);
 }
 
-TEST(Pick, InterruptsAPass) {
-  Picker picker;
-  picker.session->addViewer(std::make_shared<FakeViewer>());
-  picker.workshop.steps(2);
-  const auto passes = picker.workshop.control->passes.size();
-  picker.workshop.control->duringPass = [&] {
-    picker.workshop.control->duringPass = nullptr;
-    picker.pick();
-  };
-  picker.workshop.step();
-  EXPECT_EQ(picker.workshop.control->passes.size(), passes);
-  picker.workshop.step();
-  EXPECT_EQ(picker.answers.size(), 1u);
-}
-
-TEST(Pick, ThatTakesLongLeavesThePictureEveryOtherTurn) {
-  Picker picker;
-  picker.session->addViewer(std::make_shared<FakeViewer>());
-  picker.workshop.steps(2);
-  const auto passes = picker.workshop.control->passes.size();
-  picker.workshop.control->incompletePicks = 3;
-  picker.pick();
-  picker.workshop.steps(6);
-  EXPECT_TRUE(picker.answers.empty());
-  EXPECT_EQ(picker.workshop.control->passes.size(), passes + 3);
-  picker.workshop.step();
-  EXPECT_EQ(picker.answers.size(), 1u);
-  EXPECT_EQ(picker.workshop.control->picks.size(), 1u);  // the pick continued where it had stopped
-}
-
-TEST(Pick, BeginsAnewAfterAnEdit) {
-  Picker picker;
-  picker.workshop.control->incompletePicks = 1;
-  picker.pick();
-  picker.workshop.step();
-  EXPECT_TRUE(picker.answers.empty());
-  picker.session->patch(seedPatch(6), {});
-  picker.workshop.steps(2);
-  ASSERT_EQ(picker.answers.size(), 1u);
-  EXPECT_EQ(picker.answers[0].found["revision"], 2);
-  EXPECT_EQ(picker.workshop.control->picks, (std::vector<std::uint32_t>{5, 6}));
-}
-
 TEST(Pick, OutsideOfAPictureThatHasBecomeSmallerIsRefused) {
   Picker picker;
   EXPECT_THROW(picker.pick({600, 0}), ProtocolError);
@@ -247,15 +193,6 @@ TEST(Pick, IsToldThatTheSceneCannotBeRendered) {
   EXPECT_THROW(picker.session->waitForPick({1, 2}, 0ms), Error);
 }
 
-/// The HTTP status and the detail of a failed pick.
-std::pair<int, std::string> pickProblem(const PickAnswer& answer) {
-  try {
-    if (answer.failure) std::rethrow_exception(answer.failure);
-    return {200, ""};
-  } catch (const ProtocolError& error) {
-    return {error.status, error.what()};
-  }
-}
 const std::pair<int, std::string> kPickFailed{500, "the server failed to answer this pick"};
 
 TEST(Pick, ThatFailsSaysSoAndThePictureGoesOn) {

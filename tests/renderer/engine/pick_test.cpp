@@ -21,7 +21,7 @@ constexpr Method kMethodsAndAutomatic[] = {Method::automatic, Method::superposed
 
 std::vector<Picked> pickedIn(const Renderer& renderer, const Scene& scene, const PixelArea& area) {
   const auto picking = renderer.pick(scene, area);
-  EXPECT_TRUE(picking->run(Renderer::kNoBudget));
+  EXPECT_TRUE(picking->run(kNever, Renderer::kNoBudget));
   return picking->found();
 }
 
@@ -314,7 +314,7 @@ TEST(Pick, IsTheSameWhateverIsLitOrDrawnForAWhile) {
 
 TEST(Pick, StaysWithItsSceneWhateverComesAfter) {
   const Ball ball;
-  const auto renderer = makeCpuRenderer(ball.volume, 1);
+  auto renderer = makeCpuRenderer(ball.volume, 1);
   renderer->setScene(ball.scene);
   const PixelArea area{8, 2, 16, 16};
   const auto expected = pickedIn(*renderer, ball.scene, area);
@@ -323,7 +323,8 @@ TEST(Pick, StaysWithItsSceneWhateverComesAfter) {
   for (ChannelAppearance& channel : other.channels) channel.opacity = {{0, 0}, {1, 0}};
   other.macrocell = ball.scene.macrocell + 1;
   renderer->setScene(other);
-  EXPECT_TRUE(picking->run(Renderer::kNoBudget));
+  renderer.reset();
+  EXPECT_TRUE(picking->run(kNever, Renderer::kNoBudget));
   ASSERT_EQ(picking->found().size(), expected.size());
   ASSERT_FALSE(expected.empty());
   for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ(picking->found()[i].point, expected[i].point);
@@ -334,13 +335,32 @@ TEST(Pick, GoesOnWhereItsBudgetEnded) {
   const auto renderer = makeCpuRenderer(ball.volume, 1);
   renderer->setScene(ball.scene);
   const auto picking = renderer->pick(ball.scene, {8, 2, 16, 16});
-  EXPECT_FALSE(picking->run(std::chrono::nanoseconds(0)));
+  EXPECT_FALSE(picking->run(kNever, std::chrono::nanoseconds(0)));
   int slices = 1;
-  while (!picking->run(std::chrono::microseconds(100))) ++slices;
+  while (!picking->run(kNever, std::chrono::microseconds(100))) ++slices;
   EXPECT_GT(slices, 1);
   const auto whole = pickedIn(*renderer, ball.scene, {8, 2, 16, 16});
   ASSERT_EQ(picking->found().size(), whole.size());
   for (std::size_t i = 0; i < whole.size(); ++i) EXPECT_EQ(picking->found()[i].point, whole[i].point);
+}
+
+TEST(Pick, EndsWhenItIsCancelledAndGoesOnLater) {
+  for (const Method method : {Method::superposed, Method::raymarch}) {
+    Ball ball;
+    ball.scene.method = method;
+    const auto renderer = makeCpuRenderer(ball.volume, 1);
+    renderer->setScene(ball.scene);
+    const auto picking = renderer->pick(ball.scene, {20, 12, 2, 1});
+    const std::atomic<bool> cancelled{true};
+    EXPECT_FALSE(picking->run(cancelled, Renderer::kNoBudget));
+    EXPECT_EQ(picking->samples(), 0u);  // not even the first ray counts: it may have ended too early
+    EXPECT_TRUE(picking->run(kNever, Renderer::kNoBudget));
+    EXPECT_EQ(picking->samples(), 2u * 64);
+    const auto whole = pickedIn(*renderer, ball.scene, {20, 12, 2, 1});
+    ASSERT_EQ(picking->found().size(), 2u);
+    ASSERT_EQ(whole.size(), 2u);
+    for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(picking->found()[i].point, whole[i].point);
+  }
 }
 
 }  // namespace
