@@ -344,9 +344,9 @@ void ProgressiveRender::ended(const std::shared_ptr<PictureJob>& picture, PassRe
   session_->submit(std::move(picture->frame));
 }
 
-/// Gives the turn to a pick, if there is one that can go on and the last turn was not a pick's.
+/// Gives the turn to a pick, if there is one that can go on. Picks and pictures take turns.
 bool ProgressiveRender::pickIn(const RenderRequest& request) {
-  pickedLast_ = pickReady(request) && !pickedLast_;
+  pickedLast_ = pickReady(request) && !(pickedLast_ && request.pictures);
   if (pickedLast_) pick_.run(*request.pick, film_.scene, film_.revision, renderer_);
   return pickedLast_;
 }
