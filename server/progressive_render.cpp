@@ -124,7 +124,7 @@ std::optional<TimePoint> ProgressiveRender::pictureDueAt() const {
   const RenderRequest request = this->request();
   if (!request.wanted || request.retryAt) return request.retryAt;
   // The end may have passed between urgency() and here. Then the turn is due at once.
-  if (request.interactive || film_.shown.interactive) return request.interactiveEnd;
+  if (request.pictures && (request.interactive || film_.shown.interactive)) return request.interactiveEnd;
   return std::nullopt;
 }
 

@@ -239,11 +239,16 @@ TEST(CurrentPick, InTheBackgroundLeavesTurnsAndTheirLengthToThePicturesOfItsSess
 TEST(CurrentPick, InTheBackgroundMakesNoPicturesThatNobodyWants) {
   PickBesideAnother test;
   test.other->close("");
-  test.workshop.step();
+  const ViewerId viewer = test.session->addViewer(std::make_shared<FakeViewer>());
+  test.workshop.steps(2);
+  test.session->patch(seedPatch(6), {});
+  test.workshop.steps(2);
+  test.session->removeViewer(viewer);
   const auto passes = test.workshop.control->passes.size();
   test.pickSlowly();
   test.workshop.steps(5);
   EXPECT_EQ(test.workshop.control->passes.size(), passes);
+  EXPECT_GT(test.workshop.render.step(), test.workshop.hooks.now());  // it sleeps
 }
 
 TEST(CurrentPick, EndsAtOnceWhenItsViewerLeaves) {
