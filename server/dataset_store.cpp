@@ -12,6 +12,7 @@
 #include "protocol/problem.h"
 #include "renderer/core/error.h"
 #include "renderer/data/field_view.h"
+#include "server/hex_color.h"
 
 namespace scolopax::server {
 namespace {
@@ -112,33 +113,69 @@ std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesys
   std::vector<std::filesystem::path> below;
   for (const auto& path : paths) {
     // Symbolic links are resolved first, so that none leads outside.
-    const auto whole = std::filesystem::weakly_canonical(base / path);
+    const auto [file, inner] = io::splitName(base / path);
+    const auto whole = std::filesystem::weakly_canonical(file);
     const auto relative = whole.lexically_relative(base);
     if (relative.empty() || *relative.begin() == "..")
       throw Error(ErrorCode::badInput, path.string() + ": expected a file below --data-root " +
                                            base.string() + ", found " + whole.string());
-    below.push_back(whole);
+    below.push_back(inner.empty() ? whole : std::filesystem::path(whole.string() + ":" + inner));
   }
   return below;
 }
 
-json describeJson(const Dataset& dataset) {
-  const Grid& grid = dataset.volume->grid();
+namespace {
+
+/// What loaded and unloaded data sets have in common.
+template <class AnyDataset>
+json describeGrid(const AnyDataset& dataset, const Grid& grid) {
   json description = {
       {"id", dataset.id}, {"title", dataset.title}, {"dims", {grid.dims.x, grid.dims.y, grid.dims.z}}};
+  description["worldUnit"] = dataset.worldUnit;
+  description["times"] = {
+      {"count", dataset.times.count}, {"values", dataset.times.values}, {"unit", dataset.times.unit}};
   description["spacing"] = list(grid.spacing());
   description["diagonal"] = grid.diagonal();
   json matrix = json::array();  // column by column
   for (int column = 0; column < 4; ++column)
     for (int row = 0; row < 4; ++row) matrix.push_back(grid.worldFromVoxel[column][row]);
   description["worldFromVoxel"] = std::move(matrix);
+  return description;
+}
+
+/// What the file says of a channel's look is only there if it says it.
+json describeChannel(const std::string& name, const std::string& unit, std::string_view type,
+                     const StatedLook& look) {
+  json channel = {{"name", name}, {"unit", unit}, {"type", type}};
+  if (look.color) channel["color"] = hexOf(*look.color);
+  if (look.window) channel["window"] = {look.window->lo, look.window->hi};
+  if (look.labels) channel["labels"] = true;
+  return channel;
+}
+
+}  // namespace
+
+json describeJson(const Dataset& dataset) {
+  json description = describeGrid(dataset, dataset.volume->grid());
   json& channels = description["channels"] = json::array();
-  for (const Channel& channel : dataset.volume->channels())
-    channels.push_back({{"name", channel.name},
-                        {"unit", channel.unit},
-                        {"type", nameOf(channel.voxels.type())},
-                        {"minimum", channel.histogram.minimum},
-                        {"maximum", channel.histogram.maximum}});
+  for (const Channel& c : dataset.volume->channels()) {
+    channels.push_back(describeChannel(c.name, c.unit, nameOf(c.voxels.type()), c.look));
+    channels.back()["minimum"] = c.histogram.minimum;
+    channels.back()["maximum"] = c.histogram.maximum;
+  }
+  return description;
+}
+
+json describeJson(const io::Dataset& dataset) {
+  json description = describeGrid(dataset, dataset.levels[0]);
+  json& levels = description["levels"] = json::array();
+  for (const Grid& level : dataset.levels)
+    levels.push_back(
+        {{"dims", {level.dims.x, level.dims.y, level.dims.z}}, {"spacing", list(level.spacing())}});
+  description["memoryBytes"] = io::memoryBytes(dataset);
+  json& channels = description["channels"] = json::array();
+  for (const io::ChannelInfo& c : dataset.channels)
+    channels.push_back(describeChannel(c.name, c.unit, io::nameOf(c.type), c.look));
   return description;
 }
 

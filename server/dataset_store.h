@@ -17,7 +17,7 @@
 #include "renderer/core/memory_budget.h"
 #include "renderer/data/gradient_histogram.h"
 #include "renderer/data/scene.h"
-#include "renderer/io/format.h"
+#include "renderer/io/datasets.h"
 
 namespace scolopax::server {
 
@@ -67,6 +67,9 @@ std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesys
 
 /// Grid and channels of one data set, as in the answer to GET /datasets/{id}.
 nlohmann::json describeJson(const Dataset& dataset);
+/// The same of a data set that has not been loaded: without the ranges of values, and with the types of the
+/// files.
+nlohmann::json describeJson(const io::Dataset& dataset);
 /// Histogram with 256 bins over the finite values. Throws ProtocolError(422) if there is no such channel.
 nlohmann::json histogramJson(const Dataset& dataset, int channel);
 /// The same for |gradient|, beginning at 0; with `joint`, also for every bin of values.

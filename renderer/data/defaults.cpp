@@ -17,7 +17,9 @@ constexpr double kBelowOnly = 0.5, kBelowEach = 0.92;
 }  // namespace
 
 ValueRange defaultRange(const Volume& volume, int channel) {
-  const Histogram& h = volume.channels()[std::size_t(channel)].histogram;
+  const Channel& c = volume.channels()[std::size_t(channel)];
+  if (c.look.window) return *c.look.window;
+  const Histogram& h = c.histogram;
   double lo = h.quantile(volume.channels().size() == 1 ? kBelowOnly : kBelowEach), hi = h.quantile(0.9995);
   if (!(lo < hi)) lo = h.minimum, hi = h.maximum;  // nearly all voxels have one value
   if (lo < hi) return {lo, hi};
@@ -33,6 +35,11 @@ std::array<std::uint8_t, 3> defaultColor(int index) {
       {0x3d, 0xe0, 0x8a}, {0xff, 0x7a, 0xc6}, {0x4a, 0x7d, 0xff}, {0xff, 0x9d, 0x2e},
       {0xb4, 0xf0, 0x4a}, {0x2f, 0xe0, 0xd0}, {0xff, 0xb3, 0xa0}, {0xe8, 0xe8, 0xf0}};
   return kColors[std::size_t(index) % std::size(kColors)];
+}
+
+std::array<std::uint8_t, 3> defaultColor(const Volume& volume, int channel) {
+  const auto& stated = volume.channels()[std::size_t(channel)].look.color;
+  return stated ? *stated : defaultColor(channel);
 }
 
 double defaultDensity(const Volume& volume, int channel) {

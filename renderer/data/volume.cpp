@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer/data/volume.h"
 
+#include <sys/mman.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -24,24 +26,6 @@ bool isFinite(const glm::dmat4& m) {
     for (int row = 0; row < 4; ++row)
       if (!std::isfinite(m[column][row])) return false;
   return true;
-}
-
-void checkGrid(const Grid& grid) {
-  const std::string found = "found " + std::to_string(grid.dims.x) + "x" + std::to_string(grid.dims.y) + "x" +
-                            std::to_string(grid.dims.z);
-  if (grid.dims.x < 1 || grid.dims.y < 1 || grid.dims.z < 1)
-    throw Error(ErrorCode::badInput, "volume: every dimension must be at least 1, " + found);
-  if (grid.dims.x > kMaxVolumeSide || grid.dims.y > kMaxVolumeSide || grid.dims.z > kMaxVolumeSide)
-    throw Error(ErrorCode::tooLarge, "volume: expected at most " + std::to_string(kMaxVolumeSide) +
-                                         " voxels along an axis, " + found);
-  if (!isFinite(grid.worldFromVoxel))
-    throw Error(ErrorCode::badInput,
-                "volume: the affine from voxels to world has a value that is not finite");
-  // Singular relative to the lengths of its columns, so that a scale of 1e-9 is as good as 1.
-  const glm::dvec3 spacing = grid.spacing();
-  const double product = spacing.x * spacing.y * spacing.z;
-  if (!(product > 0) || !(std::abs(glm::determinant(glm::dmat3(grid.worldFromVoxel))) > 1e-6 * product))
-    throw Error(ErrorCode::badInput, "volume: the affine from voxels to world is singular");
 }
 
 /// Kernels interpolate in float. What float represents badly is moved, exactly, from the voxels to slope and
@@ -77,22 +61,33 @@ void normalise(VoxelBuffer& buffer, Channel& channel) {
   }
 }
 
-/// Interleaves the channels of the buffers; each is freed as soon as it is copied.
-VoxelBuffer interleave(std::span<VoxelBuffer* const> planes) {
+void checkStop(const std::stop_token& stop) {
+  if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "loading was cancelled");
+}
+
+/// Interleaves the channels of the buffers. Their memory is given back piece by piece, so that little more is
+/// needed than for the result.
+VoxelBuffer interleave(std::span<VoxelBuffer* const> planes, const std::stop_token& stop) {
   if (planes.size() == 1) return std::move(*planes[0]);
+  constexpr std::size_t kPiece = 1 << 21;
   const std::size_t stride = planes.size(), count = planes[0]->count();
   VoxelBuffer mixed(planes[0]->type(), count * stride);
   visitScalarType(mixed.type(), [&](auto zero) {
     using T = decltype(zero);
-    for (std::size_t lane = 0; lane < stride; ++lane) {
-      const auto from = planes[lane]->as<T>();
-      const auto to = mixed.as<T>();
-      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 1 << 16), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) to[i * stride + lane] = from[i];
+    const auto to = mixed.as<T>();
+    for (std::size_t first = 0; first < count; first += kPiece) {
+      checkStop(stop);
+      const std::size_t last = std::min(first + kPiece, count);
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(first, last, 1 << 14), [&](const auto& range) {
+        for (std::size_t lane = 0; lane < stride; ++lane) {
+          const auto from = planes[lane]->as<T>();
+          for (std::size_t i = range.begin(); i < range.end(); ++i) to[i * stride + lane] = from[i];
+        }
       });
-      *planes[lane] = VoxelBuffer();
+      for (VoxelBuffer* plane : planes) plane->release(first, last);
     }
   });
+  for (VoxelBuffer* plane : planes) *plane = VoxelBuffer();
   return mixed;
 }
 
@@ -122,6 +117,24 @@ double Grid::diagonal() const {
   return longest;
 }
 
+void checkGrid(const Grid& grid) {
+  const std::string found = "found " + std::to_string(grid.dims.x) + "x" + std::to_string(grid.dims.y) + "x" +
+                            std::to_string(grid.dims.z);
+  if (grid.dims.x < 1 || grid.dims.y < 1 || grid.dims.z < 1)
+    throw Error(ErrorCode::badInput, "volume: every dimension must be at least 1, " + found);
+  if (grid.dims.x > kMaxVolumeSide || grid.dims.y > kMaxVolumeSide || grid.dims.z > kMaxVolumeSide)
+    throw Error(ErrorCode::tooLarge, "volume: expected at most " + std::to_string(kMaxVolumeSide) +
+                                         " voxels along an axis, " + found);
+  if (!isFinite(grid.worldFromVoxel))
+    throw Error(ErrorCode::badInput,
+                "volume: the affine from voxels to world has a value that is not finite");
+  // Singular relative to the lengths of its columns, so that a scale of 1e-9 is as good as 1.
+  const glm::dvec3 spacing = grid.spacing();
+  const double product = spacing.x * spacing.y * spacing.z;
+  if (!(product > 0) || !(std::abs(glm::determinant(glm::dmat3(grid.worldFromVoxel))) > 1e-6 * product))
+    throw Error(ErrorCode::badInput, "volume: the affine from voxels to world is singular");
+}
+
 bool sameGrid(const Grid& a, const Grid& b) {
   if (a.dims != b.dims) return false;
   const glm::dmat4 bFromA = glm::inverse(b.worldFromVoxel) * a.worldFromVoxel;
@@ -143,7 +156,23 @@ VoxelBuffer::VoxelBuffer(ScalarType type, std::size_t count) : type_(type), coun
   }
 }
 
-Volume::Volume(Grid grid, std::vector<ChannelSource> sources) : grid_(grid) {
+VoxelBuffer VoxelBuffer::reinterpretedAs(ScalarType type) && {
+  VoxelBuffer result(std::move(*this));
+  result.type_ = type;
+  return result;
+}
+
+void VoxelBuffer::release(std::size_t first, std::size_t last) {
+  static const auto pageBytes = std::uintptr_t(::sysconf(_SC_PAGE_SIZE));
+  const auto start = reinterpret_cast<std::uintptr_t>(bytes_.get());
+  const std::size_t size = scolopax::sizeBytes(type_);
+  // The first page may also hold what is before the voxels. Neighbouring pieces share a page, which stays.
+  const std::uintptr_t begin = (start + first * size + pageBytes - 1) / pageBytes * pageBytes,
+                       end = (start + last * size) / pageBytes * pageBytes;
+  if (begin < end) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_DONTNEED);
+}
+
+Volume::Volume(Grid grid, std::vector<ChannelSource> sources, const std::stop_token& stop) : grid_(grid) {
   checkGrid(grid_);
   if (sources.empty() || sources.size() > std::size_t(kMaxChannels))
     throw Error(ErrorCode::badInput, "volume: expected 1 to " + std::to_string(kMaxChannels) +
@@ -168,6 +197,8 @@ Volume::Volume(Grid grid, std::vector<ChannelSource> sources) : grid_(grid) {
       throw Error(ErrorCode::badInput,
                   "volume: channel '" + channel.name + "' needs values below 1e301, found slope " +
                       shortText(channel.slope) + " and intercept " + shortText(channel.intercept));
+    channel.look = source.look;
+    checkStop(stop);
     normalise(source.voxels, channel);
     channel.histogram = measureHistogram(source.voxels, channel.slope, channel.intercept);
     channels_.push_back(std::move(channel));
@@ -181,7 +212,7 @@ Volume::Volume(Grid grid, std::vector<ChannelSource> sources) : grid_(grid) {
         members.push_back(i);
       }
     if (planes.empty()) continue;
-    buffers_.push_back(interleave(planes));
+    buffers_.push_back(interleave(planes, stop));
     for (std::size_t lane = 0; lane < members.size(); ++lane)
       channels_[members[lane]].voxels = VoxelView(buffers_.back(), lane, members.size());
   }

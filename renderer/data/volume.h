@@ -2,12 +2,16 @@
 // A multi-channel volume in memory. Comes from io/ or generate/; macrocells, kernels and the
 // reference read it. Immutable once built: sessions share it as shared_ptr<const Volume>.
 #pragma once
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -39,6 +43,10 @@ struct Grid {
   double diagonal() const;
 };
 
+/// Throws Error(badInput) if the grid is empty, singular or not finite, Error(tooLarge) if it is longer than
+/// kMaxVolumeSide.
+void checkGrid(const Grid& grid);
+
 /// Same dims, and affines that agree within 1e-4 voxel over the whole box.
 bool sameGrid(const Grid& a, const Grid& b);
 
@@ -66,10 +74,26 @@ class VoxelBuffer {
     return {reinterpret_cast<const T*>(bytes_.get()), count_};
   }
 
+  /// The same bytes as voxels of another type of the same size.
+  VoxelBuffer reinterpretedAs(ScalarType type) &&;
+  /// Gives the memory of the voxels [first, last) back to the system, in whole pages. Their values are lost.
+  void release(std::size_t first, std::size_t last);
+
  private:
   ScalarType type_ = ScalarType::u8;
   std::size_t count_ = 0;
   std::unique_ptr<std::byte[]> bytes_;
+};
+
+struct ValueRange {
+  double lo, hi;  ///< data units, lo < hi
+};
+
+/// How a file says that a channel is to be shown.
+struct StatedLook {
+  std::optional<std::array<std::uint8_t, 3>> color;  ///< sRGB
+  std::optional<ValueRange> window;
+  bool labels = false;  ///< the values are labels, not quantities
 };
 
 /// The voxels of one channel as type T; voxel i lies i * stride elements after the first.
@@ -119,6 +143,7 @@ struct ChannelSource {
   VoxelBuffer voxels;
   double slope = 1.0;
   double intercept = 0.0;
+  StatedLook look;
 };
 
 /// One channel of a volume, with what was measured once when it was loaded.
@@ -129,14 +154,16 @@ struct Channel {
   double slope = 1.0;  ///< data value = slope * stored + intercept; slope != 0
   double intercept = 0.0;
   Histogram histogram;  ///< over data values, finite voxels only
+  StatedLook look;
 };
 
 class Volume {
  public:
   /// Measures every channel. Throws Error(badInput) if a channel's size is not the grid's, its slope is 0,
   /// its slope or intercept is not finite or too large, there is no channel or more than kMaxChannels, or the
-  /// grid is empty, singular or not finite.
-  Volume(Grid grid, std::vector<ChannelSource> channels);
+  /// grid is empty, singular or not finite. Throws Error(cancelled) once `stop` is requested. Needs little
+  /// memory beside the voxels.
+  Volume(Grid grid, std::vector<ChannelSource> channels, const std::stop_token& stop = {});
   const Grid& grid() const { return grid_; }
   std::span<const Channel> channels() const { return channels_; }
 

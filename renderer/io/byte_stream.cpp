@@ -156,6 +156,12 @@ void ByteStream::read(std::span<std::byte> bytes) {
 }
 
 void ByteStream::skip(std::uint64_t count) {
+  const bool within =
+      state_->position <= state_->largestSize && count <= state_->largestSize - state_->position;
+  if (!state_->file && within && ::lseek(state_->fd, off_t(count), SEEK_CUR) >= 0) {
+    state_->position += count;
+    return;
+  }
   std::array<std::byte, 1 << 16> scratch;
   while (count > 0) {
     const auto piece = std::size_t(std::min<std::uint64_t>(count, scratch.size()));

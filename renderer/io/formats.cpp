@@ -1,129 +1,138 @@
 // SPDX-License-Identifier: Apache-2.0
-// The list of formats, and the way from files to data sets.
-#include <unistd.h>
+#include "renderer/io/formats.h"
 
-#include <algorithm>
-#include <array>
-#include <optional>
+#include <cmath>
 
 #include "renderer/core/error.h"
 #include "renderer/io/byte_stream.h"
-#include "renderer/io/format.h"
 #include "renderer/io/text.h"
 
 namespace scolopax::io {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::array kFormats = {
-    Format{"NIfTI", ".nii, .nii.gz, .hdr + .img", matchesNifti, loadNifti},
-    Format{"NRRD", ".nrrd, .nhdr", matchesNrrd, loadNrrd},
-    Format{"TIFF", ".tif, .tiff", matchesTiff, loadTiff},
-    Format{"raw", "name_XxYxZ_type.raw, .dat, .ivf", matchesRaw, loadRaw},
+// A reader without its library is not even named, so that it need not exist.
+constexpr Format kFormats[] = {
+#define X(NAME, shown, endings, missing) \
+  {shown, endings, missing, match##NAME, std::string_view(missing).empty() ? open##NAME : nullptr},
+    SCOLOPAX_FORMATS(X)
+#undef X
 };
 
-/// Lower-case letters, digits and single dashes; "volume" when nothing is left.
-std::string slugOf(const std::string& text) {
-  std::string slug;
-  for (const char c : lowerCase(text)) {
-    if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'))
-      slug += c;
-    else if (!slug.empty() && slug.back() != '-')
-      slug += '-';
-  }
-  while (slug.ends_with('-')) slug.pop_back();
-  return slug.empty() ? "volume" : slug;
+constexpr std::size_t kStartBytes = 4096;
+
+std::string firstBytes(const fs::path& path, ByteStream::Encoding encoding) {
+  ByteStream stream(path, encoding);
+  std::string bytes(kStartBytes, '\0');
+  bytes.resize(stream.readSome(std::as_writable_bytes(std::span(bytes))));
+  return bytes;
 }
 
-bool isHeader(const fs::path& path) {
-  return std::ranges::any_of(std::array{".hdr", ".hdr.gz", ".nhdr", ".dat", ".ivf"},
-                             [&](const char* ending) { return hasEnding(path, ending); });
-}
-
-bool isAmong(const std::vector<fs::path>& files, const fs::path& path) {
+FileStart startOf(const fs::path& path) {
+  FileStart start{path};
   std::error_code ignored;
-  return std::ranges::any_of(files,
-                             [&](const fs::path& file) { return fs::equivalent(file, path, ignored); });
+  start.folder = fs::is_directory(path, ignored);
+  if (start.folder) return start;
+  start.bytes = firstBytes(path, ByteStream::Encoding::plain);
+  start.unpacked = start.bytes;
+  if (!start.bytes.starts_with("\x1F\x8B")) return start;
+  try {
+    start.unpacked = firstBytes(path, ByteStream::Encoding::detect);
+  } catch (const Error&) {  // not gzip, or damaged: the reader will tell
+  }
+  return start;
 }
 
-/// Files on one grid, while they are gathered.
-struct Group {
-  Grid grid;
-  std::vector<ChannelSource> channels;
-  std::vector<fs::path> files;
-};
+std::string knownFormats() {
+  std::string known;
+  for (const Format& format : kFormats)
+    known +=
+        (known.empty() ? "" : "; ") + std::string(format.name) + " (" + std::string(format.endings) + ")";
+  return known;
+}
+
+const Format& formatOf(const fs::path& path) {
+  const FileStart start = startOf(path);
+  const Format* byName = nullptr;
+  for (const Format& format : kFormats) {
+    const Match match = format.match(start);
+    if (match == Match::content) return format;
+    if (match == Match::name && !byName) byName = &format;
+  }
+  if (byName) return *byName;
+  throw Error(ErrorCode::unsupported, shown(path) + ": expected " +
+                                          (start.folder ? "a file, or a folder of " : "") + "one of " +
+                                          knownFormats());
+}
+
+/// Cleans names, gives names to channels without one, and checks what a reader must have checked.
+void complete(VolumeFile& file) {
+  const std::string name = shown(file.path);
+  if (file.volumes.empty()) throw Error(ErrorCode::badInput, name + ": expected a volume, found none");
+  for (VolumeInfo& volume : file.volumes) {
+    const std::string where = name + (volume.path.empty() ? "" : ":" + cleanText(volume.path));
+    if (volume.levels.empty() || volume.channels.empty() || volume.times.count == 0)
+      throw Error(ErrorCode::badInput, where + ": expected levels, channels and times, found none");
+    for (const Grid& grid : volume.levels) {
+      try {
+        checkGrid(grid);
+      } catch (const Error& error) {  // whose message does not name the file
+        throw Error(error.code(), where + ": " + error.what());
+      }
+    }
+    volume.path = cleanText(volume.path);
+    while (volume.path.starts_with('/')) volume.path.erase(0, 1);
+    while (volume.path.ends_with('/')) volume.path.pop_back();
+    volume.worldUnit = cleanText(volume.worldUnit);
+    volume.times.unit = cleanText(volume.times.unit);
+    const std::string base = volume.path.empty() ? stemOf(file.path) : volume.path;
+    for (std::size_t i = 0; i < volume.channels.size(); ++i) {
+      ChannelInfo& channel = volume.channels[i];
+      channel.name = cleanText(channel.name);
+      channel.unit = cleanText(channel.unit);
+      if (channel.name.empty())
+        channel.name = volume.channels.size() == 1 ? base : base + " " + std::to_string(i);
+      const auto& window = channel.look.window;
+      if (window && !(std::isfinite(window->lo) && std::isfinite(window->hi) && window->lo < window->hi))
+        channel.look.window.reset();
+    }
+  }
+}
 
 }  // namespace
 
+bool FileStart::hasEnding(std::string_view ending) const { return io::hasEnding(path, ending); }
+
+bool FileStart::holds(std::string_view magic, std::size_t offset) const {
+  const auto at = [&](const std::string& text) {
+    return text.size() >= offset + magic.size() &&
+           std::string_view(text).substr(offset, magic.size()) == magic;
+  };
+  return at(bytes) || at(unpacked);
+}
+
+bool FileStart::contains(std::string_view entry) const {
+  std::error_code ignored;
+  return folder && fs::exists(path / entry, ignored);
+}
+
 std::span<const Format> formats() { return kFormats; }
 
-LoadedFile loadFile(const fs::path& path, std::uint64_t memoryLimitBytes, const Warn& warn) {
-  requireRegularFile(path);
-  const auto format = std::ranges::find_if(kFormats, [&](const Format& f) { return f.matches(path); });
-  if (format != kFormats.end()) return format->load(path, memoryLimitBytes, warn);
-  std::string known;
-  for (const Format& f : kFormats) {
-    known += (known.empty() ? "" : "; ") + std::string(f.name) + " (" + std::string(f.extensions) + ")";
-  }
-  throw Error(ErrorCode::unsupported, shown(path) + ": expected one of " + known);
+std::shared_ptr<const VolumeFile> openFile(const Format& format, const fs::path& path,
+                                           const OpenOptions& options) {
+  if (!format.missing.empty())
+    throw Error(ErrorCode::unsupported, shown(path) + ": " + std::string(format.name) +
+                                            " needs the library of " + std::string(format.missing) +
+                                            ", without which this program was built");
+  OpenOptions always = options;
+  if (!always.warn) always.warn = [](const std::string&) {};
+  auto file = std::make_shared<VolumeFile>(format.open(path, always));
+  complete(*file);
+  return file;
 }
 
-std::vector<LoadedDataset> loadDatasets(std::span<const fs::path> paths, std::uint64_t memoryLimitBytes,
-                                        const Warn& warn) {
-  // Headers first: they tell which of the other files belong to them.
-  std::vector<LoadedFile> files(paths.size());
-  std::vector<fs::path> dataFiles;
-  std::uint64_t left = memoryLimitBytes;
-  for (const bool headers : {true, false}) {
-    for (std::size_t i = 0; i < paths.size(); ++i) {
-      if (isHeader(paths[i]) != headers || isAmong(dataFiles, paths[i])) continue;
-      files[i] = loadFile(paths[i], left, warn);
-      if (!files[i].dataFile.empty()) dataFiles.push_back(files[i].dataFile);
-      for (const ChannelSource& channel : files[i].channels)
-        left -= std::min<std::uint64_t>(left, channel.voxels.sizeBytes());
-    }
-  }
-
-  std::vector<Group> groups;
-  for (std::size_t i = 0; i < paths.size(); ++i) {
-    const fs::path& path = paths[i];
-    LoadedFile& loaded = files[i];
-    if (loaded.channels.empty()) continue;
-    auto group = std::ranges::find_if(groups, [&](const Group& g) { return sameGrid(g.grid, loaded.grid); });
-    if (group == groups.end()) group = groups.insert(groups.end(), Group{loaded.grid, {}, {}});
-    const std::size_t channels = group->channels.size() + loaded.channels.size();
-    if (channels > std::size_t(kMaxChannels)) {
-      throw Error(ErrorCode::unsupported, shown(path) + ": expected at most " + std::to_string(kMaxChannels) +
-                                              " channels on one grid, found " + std::to_string(channels));
-    }
-    std::ranges::move(loaded.channels, std::back_inserter(group->channels));
-    group->files.push_back(path);
-  }
-
-  std::vector<LoadedDataset> datasets;
-  for (Group& group : groups) {
-    const std::string slug = slugOf(stemOf(group.files.front()));
-    const auto taken = [&](const std::string& id) {
-      return std::ranges::any_of(datasets, [&](const LoadedDataset& other) { return other.id == id; });
-    };
-    std::string id = slug;
-    for (int suffix = 2; taken(id); ++suffix) id = slug + "-" + std::to_string(suffix);
-    std::string title = cleanText(group.files.front().filename().string());
-    if (group.files.size() > 1) title += " +" + std::to_string(group.files.size() - 1);
-    try {
-      auto volume = std::make_shared<const Volume>(group.grid, std::move(group.channels));
-      datasets.push_back({std::move(id), std::move(title), std::move(group.files), std::move(volume)});
-    } catch (const Error& error) {  // whose message does not name the file
-      throw Error(error.code(), shown(group.files.front()) + ": " + error.what());
-    }
-  }
-  return datasets;
-}
-
-std::uint64_t defaultMemoryLimitBytes() {
-  const long pages = ::sysconf(_SC_PHYS_PAGES), pageBytes = ::sysconf(_SC_PAGE_SIZE);
-  if (pages <= 0 || pageBytes <= 0) return std::uint64_t(1) << 32;
-  return std::uint64_t(pages) * std::uint64_t(pageBytes) / 2;
+std::shared_ptr<const VolumeFile> openFile(const fs::path& path, const OpenOptions& options) {
+  return openFile(formatOf(path), path, options);
 }
 
 }  // namespace scolopax::io

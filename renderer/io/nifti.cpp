@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // NIfTI-1 and NIfTI-2 (nifti.nimh.nih.gov), single files and .hdr + .img pairs, packed or not. Parsed by
 // hand, because libnifti2 does not check every size before it allocates memory.
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -9,24 +10,25 @@
 
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
-#include "renderer/io/convert.h"
-#include "renderer/io/format.h"
+#include "renderer/io/formats.h"
 #include "renderer/io/text.h"
+#include "renderer/io/voxel_stream.h"
 
 namespace scolopax::io {
 namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kNifti1Bytes = 348, kNifti2Bytes = 540;
+constexpr std::int64_t kMostNiftiChannels = 4096;  ///< of which users may choose
 
 /// The header fields that are used, in the wider types of version 2.
 struct NiftiHeader {
   std::string file;  ///< for messages
   bool bigEndian = false, pair = false;
-  int datatype = 0, bitpix = 0, qformCode = 0, sformCode = 0, units = 0;
+  int datatype = 0, bitpix = 0, qformCode = 0, sformCode = 0, units = 0, intent = 0;
   std::array<std::int64_t, 8> dim{};
   std::array<double, 8> pixdim{};
-  double slope = 0, intercept = 0;
+  double slope = 0, intercept = 0, timeOffset = 0;
   std::uint64_t dataOffset = 0;
   std::array<double, 6> quaternion{};  ///< b, c, d, and the offset x, y, z
   std::array<double, 12> rows{};       ///< sform: three rows of four
@@ -78,6 +80,8 @@ void readVersion1(NiftiHeader& header, const HeaderBytes& bytes) {
   header.slope = bytes.at<float>(112);
   header.intercept = bytes.at<float>(116);
   header.units = bytes.at<std::uint8_t>(123);
+  header.intent = bytes.at<std::int16_t>(68);
+  header.timeOffset = bytes.at<float>(136);
   header.qformCode = bytes.at<std::int16_t>(252);
   header.sformCode = bytes.at<std::int16_t>(254);
   bytes.copy<float>(256, header.quaternion);
@@ -97,6 +101,8 @@ void readVersion2(NiftiHeader& header, const HeaderBytes& bytes) {
   bytes.copy<double>(352, header.quaternion);
   bytes.copy<double>(400, header.rows);
   header.units = bytes.at<std::int32_t>(500);
+  header.intent = bytes.at<std::int32_t>(504);
+  header.timeOffset = bytes.at<double>(216);
 }
 
 NiftiHeader readHeader(ByteStream& stream) {
@@ -182,16 +188,54 @@ VoxelType voxelType(const NiftiHeader& header) {
   return voxel;
 }
 
-/// The layout of the first time step, with the 5th dimension as channels; later time steps are skipped.
-VoxelLayout voxelLayout(const NiftiHeader& header, const Warn& warn) {
+/// The unit of the fourth axis by NIfTI's codes; "" if it has none.
+std::string timeUnit(const NiftiHeader& header) {
+  switch (header.units & 0x38) {
+    case 8:
+      return "s";
+    case 16:
+      return "ms";
+    case 24:
+      return "us";
+    case 32:
+      return "Hz";
+    case 40:
+      return "ppm";
+    case 48:
+      return "rad/s";
+    default:
+      return "";
+  }
+}
+
+/// Whether the fourth axis, of `size`, is channels. docs/files.md states the rule.
+bool isChannelAxis(const NiftiHeader& header, std::int64_t size, FourthAxis fourthAxis) {
+  if (fourthAxis != FourthAxis::automatic) return fourthAxis == FourthAxis::channel;
+  // Matrices, vectors (displacements too), RGB and RGBA; time series.
+  constexpr std::array kVectors{1004, 1005, 1006, 1007, 2003, 2004};
+  if (std::ranges::find(kVectors, header.intent) != kVectors.end()) return true;
+  constexpr int kTimeSeries = 2001;
+  const bool isFloat = header.datatype == 16 || header.datatype == 64;
+  return header.intent != kTimeSeries && size == 3 && (isFloat || timeUnit(header).empty());
+}
+
+/// The layout of one time, and how many times there are.
+struct NiftiLayout {
+  VoxelLayout voxels;
+  std::size_t times = 1;
+  std::uint64_t timeBytes = 0;  ///< from one time to the next
+};
+
+NiftiLayout niftiLayout(const NiftiHeader& header, FourthAxis fourthAxis) {
   const std::int64_t used = header.dim[0];
   if (used < 1 || used > 7) throw badField(header, "dim[0]", "1 to 7", std::to_string(used));
   const auto dim = [&](int i) { return i <= used ? header.dim[std::size_t(i)] : 1; };
   const VoxelType voxel = voxelType(header);
-  VoxelLayout layout;
-  layout.type = voxel.type;
-  layout.bigEndian = header.bigEndian;
-  layout.dims = checkedDims(header.file + ": dim", dim(1), dim(2), dim(3));
+  NiftiLayout layout;
+  VoxelLayout& voxels = layout.voxels;
+  voxels.type = voxel.type;
+  voxels.bigEndian = header.bigEndian;
+  voxels.dims = checkedDims(header.file + ": dim", dim(1), dim(2), dim(3));
   for (int i = 4; i <= 7; ++i) {
     if (dim(i) < 0)
       throw badField(header, "dim[" + std::to_string(i) + "]", "0 or more", std::to_string(dim(i)));
@@ -200,30 +244,30 @@ VoxelLayout voxelLayout(const NiftiHeader& header, const Warn& warn) {
                                               "]: expected 1, found " + std::to_string(dim(i)));
     }
   }
-  const std::int64_t times = std::max<std::int64_t>(dim(4), 1),
-                     vectorLength = std::max<std::int64_t>(dim(5), 1);
-  const std::int64_t channels = vectorLength > 1 ? vectorLength : voxel.samples;
+  std::int64_t times = std::max<std::int64_t>(dim(4), 1), vectorLength = std::max<std::int64_t>(dim(5), 1);
+  const char* vectorField = "dim[5]";
+  if (vectorLength == 1 && times > 1 && isChannelAxis(header, times, fourthAxis)) {
+    std::swap(times, vectorLength);
+    vectorField = "dim[4]";
+  }
   if (vectorLength > 1 && voxel.samples > 1) {
-    throw Error(ErrorCode::unsupported,
-                header.file + ": dim[5]: expected 1 for RGB voxels, found " + std::to_string(vectorLength));
+    throw Error(ErrorCode::unsupported, header.file + ": " + vectorField +
+                                            ": expected 1 for RGB voxels, found " +
+                                            std::to_string(vectorLength));
   }
-  if (channels > kMaxChannels) {
-    throw Error(ErrorCode::unsupported, header.file + ": dim[5]: expected at most " +
-                                            std::to_string(kMaxChannels) + " channels, found " +
-                                            std::to_string(channels));
+  if (vectorLength > kMostNiftiChannels) {
+    throw Error(ErrorCode::unsupported, header.file + ": " + vectorField + ": expected at most " +
+                                            std::to_string(kMostNiftiChannels) + " channels, found " +
+                                            std::to_string(vectorLength));
   }
-  layout.channels = int(channels);
-  layout.interleaved = voxel.samples > 1;
-  if (times > 1) {
-    // Without a vector dimension, also for RGB, the first time step is the first volume and needs no gaps.
-    layout.gapBytes = vectorLength > 1 ? saturatingProduct(layout.voxelCount() * sizeBytes(layout.type),
-                                                           std::uint64_t(times - 1))
-                                       : 0;
-    if (warn) {
-      warn(header.file + ": dim[4]: the first of " + std::to_string(times) + " time steps is loaded, " +
-           std::to_string(times - 1) + " are left out");
-    }
-  }
+  voxels.samples = std::size_t(vectorLength > 1 ? vectorLength : voxel.samples);
+  voxels.interleaved = voxel.samples > 1;
+  layout.times = std::size_t(times);
+  const std::uint64_t volumeBytes =
+      saturatingProduct(voxels.voxelCount(), sizeBytes(voxels.type) * std::uint64_t(voxel.samples));
+  layout.timeBytes = volumeBytes;
+  // Times vary faster than components.
+  if (vectorLength > 1) voxels.gapBytes = saturatingProduct(volumeBytes, std::uint64_t(times - 1));
   return layout;
 }
 
@@ -311,53 +355,78 @@ fs::path sibling(const fs::path& path, const char* ending) {
                                        shown(base.replace_extension(ending)));
 }
 
-}  // namespace
-
-bool matchesNifti(const fs::path& path) {
-  for (const char* ending : {".nii", ".nii.gz", ".hdr", ".hdr.gz", ".img", ".img.gz"}) {
-    if (hasEnding(path, ending)) return true;
-  }
-  return false;
-}
-
-LoadedFile loadNifti(const fs::path& path, std::uint64_t memoryLimitBytes, const Warn& warn) {
-  requireRegularFile(path);
-  const bool isImage = hasEnding(path, ".img") || hasEnding(path, ".img.gz");
-  const fs::path headerPath = isImage ? sibling(path, ".hdr") : path;
-  ByteStream headerStream(headerPath, ByteStream::Encoding::detect);
-  const NiftiHeader header = readHeader(headerStream);
-  const VoxelLayout layout = voxelLayout(header, warn);
-
-  LoadedFile loaded;
-  loaded.grid = {layout.dims, worldFromVoxel(header, warn)};
-  if (header.pair) {
-    if (!isImage) loaded.dataFile = sibling(path, ".img");
-    ByteStream stream(isImage ? path : loaded.dataFile, ByteStream::Encoding::detect);
-    loaded.channels = readChannels(stream, header.dataOffset, layout, memoryLimitBytes, warn);
-  } else {
-    loaded.channels = readChannels(headerStream, header.dataOffset, layout, memoryLimitBytes, warn);
-  }
-
-  const std::string stem = stemOf(path);
+std::vector<ChannelInfo> niftiChannels(const NiftiHeader& header, const VoxelLayout& layout,
+                                       const std::string& stem) {
   if (layout.interleaved) {
-    if (layout.channels == 4) {
-      loaded.channels.pop_back();
-      if (warn) warn(header.file + ": RGBA voxels: alpha is left out");
-    }
-    constexpr std::array kColors{" red", " green", " blue"};
-    for (std::size_t i = 0; i < 3; ++i) loaded.channels[i].name = stem + kColors[i];
-    return loaded;
+    return {{.name = stem + " red", .type = layout.type},
+            {.name = stem + " green", .type = layout.type},
+            {.name = stem + " blue", .type = layout.type}};
   }
-  // Slope 0 means no scaling.
-  const bool scaled = std::isfinite(header.slope) && header.slope != 0;
-  for (std::size_t i = 0; i < loaded.channels.size(); ++i) {
-    ChannelSource& channel = loaded.channels[i];
-    channel.name = loaded.channels.size() == 1 ? stem : stem + " " + std::to_string(i);
-    if (!scaled) continue;
+  ChannelInfo channel{.type = layout.type};
+  if (std::isfinite(header.slope) && header.slope != 0) {  // 0 means no scaling
     channel.slope = header.slope;
     channel.intercept = std::isfinite(header.intercept) ? header.intercept : 0.0;
   }
-  return loaded;
+  constexpr int kLabels = 1002;
+  channel.look.labels = header.intent == kLabels;
+  return std::vector(layout.samples, channel);
+}
+
+Times niftiTimes(const NiftiHeader& header, std::size_t count) {
+  Times times{.count = count};
+  const double step = header.pixdim[4];
+  constexpr std::size_t kMostValues = 1 << 20;
+  if (count == 1 || count > kMostValues || !(std::isfinite(step) && step > 0)) return times;
+  const double offset = std::isfinite(header.timeOffset) ? header.timeOffset : 0;
+  for (std::size_t i = 0; i < count; ++i) times.values.push_back(offset + double(i) * step);
+  times.unit = timeUnit(header);
+  return times;
+}
+
+bool isImageOfPair(const fs::path& path) { return hasEnding(path, ".img") || hasEnding(path, ".img.gz"); }
+
+}  // namespace
+
+Match matchNifti(const FileStart& start) {
+  const bool magic = start.holds(std::string_view("n+1\0", 4), 344) ||
+                     start.holds(std::string_view("ni1\0", 4), 344) ||
+                     start.holds(std::string_view("n+2\0\r\n\032\n", 8), 4) ||
+                     start.holds(std::string_view("ni2\0\r\n\032\n", 8), 4);
+  if (magic) return Match::content;
+  for (const char* ending : {".nii", ".nii.gz", ".hdr", ".hdr.gz", ".img", ".img.gz"})
+    if (!start.folder && start.hasEnding(ending)) return Match::name;
+  return Match::no;
+}
+
+VolumeFile openNifti(const fs::path& path, const OpenOptions& options) {
+  requireRegularFile(path);
+  const bool isImage = isImageOfPair(path);
+  ByteStream headerStream(isImage ? sibling(path, ".hdr") : path, ByteStream::Encoding::detect);
+  const NiftiHeader header = readHeader(headerStream);
+  const NiftiLayout layout = niftiLayout(header, options.fourthAxis);
+  const fs::path data = header.pair && !isImage ? sibling(path, ".img") : path;
+
+  VolumeFile file{path};
+  if (data != path) file.dataFiles = {data};
+  const Grid grid{layout.voxels.dims, worldFromVoxel(header, options.warn)};
+  file.volumes = {{.levels = {grid},
+                   .times = niftiTimes(header, layout.times),
+                   .channels = niftiChannels(header, layout.voxels, stemOf(path)),
+                   .worldUnit = (header.units & 7) != 0 ? "mm" : ""}};
+  if (layout.voxels.samples == 4 && layout.voxels.interleaved)
+    options.warn(header.file + ": RGBA voxels: alpha is left out");
+  const auto offsetOf = [header, layout](std::size_t time) {
+    return saturatingSum(header.dataOffset, saturatingProduct(layout.timeBytes, time));
+  };
+  checkFileHolds(ByteStream(data, ByteStream::Encoding::detect), layout.voxels, offsetOf(layout.times - 1));
+  file.read = [data, layout, offsetOf, name = header.file](const VolumeInfo& volume, const Part& part,
+                                                           Loading& loading) {
+    ByteStream stream(data, ByteStream::Encoding::detect);
+    auto writers = makeWriters(name, volume, part, loading);
+    readSamples(stream, offsetOf(part.time), layout.voxels, part.channels, writers);
+    return takeAll(writers);
+  };
+  return file;
 }
 
 }  // namespace scolopax::io

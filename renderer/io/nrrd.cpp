@@ -8,10 +8,10 @@
 #include <optional>
 
 #include "renderer/core/error.h"
-#include "renderer/io/convert.h"
-#include "renderer/io/format.h"
+#include "renderer/io/formats.h"
 #include "renderer/io/nrrd_header.h"
 #include "renderer/io/text.h"
+#include "renderer/io/voxel_stream.h"
 
 namespace scolopax::io {
 namespace fs = std::filesystem;
@@ -73,7 +73,9 @@ struct Axis {
   std::int64_t size = 1;
   bool spatial = true;
   std::string kind;  ///< lower case; "" if the header gives none
+  std::string unit;  ///< "" if the header gives none
   double spacing = 1;
+  bool hasSpacing = false;
   std::optional<glm::dvec3> direction;
 };
 
@@ -114,6 +116,23 @@ std::vector<std::string> splitVectors(std::string_view text) {
   return parts;
 }
 
+/// The words in quotes of a field such as units: "mm" "mm" "s".
+std::vector<std::string> quotedWords(std::string_view text) {
+  std::vector<std::string> words;
+  for (std::size_t at = text.find('"'); at != std::string_view::npos; at = text.find('"', at)) {
+    const std::size_t end = text.find('"', at + 1);
+    if (end == std::string_view::npos) break;
+    words.emplace_back(text.substr(at + 1, end - at - 1));
+    at = end + 1;
+  }
+  return words;
+}
+
+bool isTimeUnit(const std::string& unit) {
+  static constexpr std::array kTimes{"s", "sec", "second", "seconds", "ms", "us", "min", "h"};
+  return std::ranges::find(kTimes, lowerCase(unit)) != kTimes.end();
+}
+
 std::vector<Axis> readAxes(const NrrdHeader& header, const Warn& warn) {
   const auto dimension = parseInteger(header.require("dimension"));
   if (!dimension || *dimension < 1 || *dimension > kMostAxes) {
@@ -143,11 +162,16 @@ std::vector<Axis> readAxes(const NrrdHeader& header, const Warn& warn) {
     perAxis("spacings", *spacings, splitWords(*spacings), [&](Axis& axis, std::string_view word) {
       const auto spacing = parseNumber(word);
       if (!spacing) throw header.bad("spacings", "numbers", *spacings);
-      if (std::isfinite(*spacing) && *spacing != 0)
+      axis.hasSpacing = std::isfinite(*spacing) && *spacing != 0;
+      if (axis.hasSpacing)
         axis.spacing = *spacing;
-      else if (axis.spatial && !std::isnan(*spacing) && warn)
+      else if (axis.spatial && !std::isnan(*spacing))
         warn(header.file + ": spacings: 0 or infinite, taken as 1");
     });
+  }
+  if (const auto units = header.find("units")) {
+    const auto words = quotedWords(*units);
+    for (std::size_t i = 0; i < std::min(words.size(), axes.size()); ++i) axes[i].unit = words[i];
   }
   if (const auto directions = header.find("space directions")) {
     perAxis("space directions", *directions, splitVectors(*directions),
@@ -174,14 +198,73 @@ glm::dvec3 rasSigns(const NrrdHeader& header) {
   throw header.unsupported("space", "a space of three dimensions", *space);
 }
 
-/// Dims, channels and grid from the axes: one to three spatial ones and at most one other, first or last.
+/// Marks one of four axes that the header leaves unmarked as not spatial: the last one, or the first if that
+/// has a length of 3, as vectors have, and the last has not.
+void markFourthAxis(std::vector<Axis>& axes) {
+  const bool unmarked =
+      axes.size() == 4 && std::ranges::all_of(axes, [](const Axis& axis) { return axis.spatial; });
+  if (!unmarked) return;
+  const bool first = axes.front().size == 3 && axes.back().size != 3;
+  (first ? axes.front() : axes.back()).spatial = false;
+}
+
+/// Whether the axis that is not spatial is channels. docs/files.md states the rule.
+bool isChannelAxis(const Axis& axis, FourthAxis fourthAxis) {
+  if (fourthAxis != FourthAxis::automatic) return fourthAxis == FourthAxis::channel;
+  static constexpr std::array kUnmarked{"", "domain", "space", "none", "???"};
+  if (std::ranges::find(kUnmarked, axis.kind) == kUnmarked.end()) return axis.kind != "time";
+  return !isTimeUnit(axis.unit) && axis.size == 3;
+}
+
+/// How the axes make up the volume: one to three spatial ones and at most one other, first or last.
 struct Arrangement {
-  VoxelLayout layout;
+  VoxelLayout layout;  ///< the samples are channels, or the times if there are no channels
   Grid grid;
+  bool samplesAreTimes = false;
+  double timeStep = 0;  ///< 0 if the header does not tell
+  std::string timeUnit;
 };
 
-Arrangement arrange(const NrrdHeader& header, const Warn& warn) {
-  const std::vector<Axis> axes = readAxes(header, warn);
+/// Sets samples, and what they are, from the axis that is not spatial.
+void arrangeOther(const NrrdHeader& header, const std::vector<Axis>& axes, const Axis& other,
+                  FourthAxis fourthAxis, Arrangement& result) {
+  constexpr std::int64_t kMostNrrdChannels = 4096, kMostTimes = 1 << 24;
+  const bool interleaved = &other == &axes.front() && axes.size() > 1;
+  result.samplesAreTimes = !isChannelAxis(other, fourthAxis);
+  const std::int64_t most = interleaved || !result.samplesAreTimes ? kMostNrrdChannels : kMostTimes;
+  if (other.size > most)
+    throw header.unsupported("sizes",
+                             "at most " + std::to_string(most) + " along an axis that is not spatial",
+                             std::to_string(other.size));
+  result.layout.samples = std::size_t(other.size);
+  result.layout.interleaved = interleaved;
+  if (!result.samplesAreTimes) return;
+  result.timeStep = other.hasSpacing ? other.spacing : 0;
+  result.timeUnit = other.unit;
+}
+
+/// The affine from voxels to world, RAS.
+glm::dmat4 worldFromVoxel(const NrrdHeader& header, const std::vector<const Axis*>& spatial,
+                          const Warn& warn) {
+  const glm::dvec3 signs = rasSigns(header);
+  glm::dmat4 m(1.0);
+  for (int i = 0; i < int(spatial.size()); ++i) {
+    const Axis& axis = *spatial[std::size_t(i)];
+    glm::dvec3 step(0);
+    step[i] = axis.spacing;
+    m[i] = glm::dvec4(signs * axis.direction.value_or(step), 0);
+  }
+  if (const auto origin = header.find("space origin")) {
+    m[3] = glm::dvec4(signs * parseVector(header, "space origin", *origin), 1);
+  } else if (header.find("axis mins")) {
+    warn(header.file + ": axis mins: is not used, the origin is 0");
+  }
+  return m;
+}
+
+Arrangement arrange(const NrrdHeader& header, const OpenOptions& options) {
+  std::vector<Axis> axes = readAxes(header, options.warn);
+  markFourthAxis(axes);
   Arrangement result;
   std::vector<const Axis*> spatial;
   const Axis* other = nullptr;
@@ -204,37 +287,9 @@ Arrangement arrange(const NrrdHeader& header, const Warn& warn) {
   }
   std::array<std::int64_t, 3> dims{1, 1, 1};
   for (std::size_t i = 0; i < spatial.size(); ++i) dims[i] = spatial[i]->size;
-  VoxelLayout& layout = result.layout;
-  layout.dims = checkedDims(header.file + ": sizes", dims[0], dims[1], dims[2]);
-  if (other && other->kind == "time") {
-    if (other != &axes.back()) throw header.unsupported("kinds", "time as the last axis", other->kind);
-    if (other->size > 1 && warn) {
-      warn(header.file + ": kinds: the first of " + std::to_string(other->size) + " time steps is loaded, " +
-           std::to_string(other->size - 1) + " are left out");
-    }
-  } else if (other) {
-    if (other->size > kMaxChannels) {
-      throw header.unsupported("sizes", "at most " + std::to_string(kMaxChannels) + " channels",
-                               std::to_string(other->size));
-    }
-    layout.channels = int(other->size);
-    layout.interleaved = other == &axes.front() && axes.size() > 1;
-  }
-
-  const glm::dvec3 signs = rasSigns(header);
-  glm::dmat4& m = result.grid.worldFromVoxel;
-  for (int i = 0; i < int(spatial.size()); ++i) {
-    const Axis& axis = *spatial[std::size_t(i)];
-    glm::dvec3 step(0);
-    step[i] = axis.spacing;
-    m[i] = glm::dvec4(signs * axis.direction.value_or(step), 0);
-  }
-  if (const auto origin = header.find("space origin")) {
-    m[3] = glm::dvec4(signs * parseVector(header, "space origin", *origin), 1);
-  } else if (header.find("axis mins") && warn) {
-    warn(header.file + ": axis mins: is not used, the origin is 0");
-  }
-  result.grid.dims = layout.dims;
+  result.layout.dims = checkedDims(header.file + ": sizes", dims[0], dims[1], dims[2]);
+  if (other) arrangeOther(header, axes, *other, options.fourthAxis, result);
+  result.grid = {result.layout.dims, worldFromVoxel(header, spatial, options.warn)};
   return result;
 }
 
@@ -280,76 +335,123 @@ double pairNumber(const NrrdHeader& header, const std::string& key, double other
   return *value;
 }
 
-/// Sets names, units and scales from the key/value pairs that writeNrrd writes.
-void describeChannels(const NrrdHeader& header, const std::string& stem,
-                      std::vector<ChannelSource>& channels) {
+/// Names, units and scales from the key/value pairs that writeNrrd writes.
+std::vector<ChannelInfo> nrrdChannels(const NrrdHeader& header, StoredType type, std::size_t count,
+                                      const std::string& stem) {
   const auto textOf = [&](const std::string& key) {
     const auto pair = header.pairs.find(key);
-    return pair == header.pairs.end() ? std::string() : cleanText(pair->second);
+    return pair == header.pairs.end() ? std::string() : pair->second;
   };
   const auto kind = lowerCase(header.find("kinds").value_or(""));
-  const bool rgb = channels.size() >= 3 && kind.find("rgb") != std::string::npos;
+  const bool rgb = count >= 3 && kind.find("rgb") != std::string::npos;
   static constexpr std::array kColors{"red", "green", "blue", "alpha"};
-  for (std::size_t i = 0; i < channels.size(); ++i) {
+  std::vector<ChannelInfo> channels(count);
+  for (std::size_t i = 0; i < count; ++i) {
     const std::string key = "channel " + std::to_string(i) + " ";
-    ChannelSource& channel = channels[i];
+    ChannelInfo& channel = channels[i];
+    channel.type = type;
     channel.name = textOf(key + "name");
     channel.unit = textOf(key + "unit");
-    if (channel.unit.empty()) channel.unit = cleanText(header.find("sample units").value_or(""));
-    if (channel.name.empty()) {
-      channel.name =
-          channels.size() == 1 ? stem : stem + " " + (rgb && i < 4 ? kColors[i] : std::to_string(i));
-    }
+    if (channel.unit.empty()) channel.unit = std::string(header.find("sample units").value_or(""));
+    if (channel.name.empty() && rgb && i < 4) channel.name = stem + " " + kColors[i];
     channel.slope = pairNumber(header, key + "slope", 1);
     if (channel.slope == 0) throw header.bad(key + "slope", "a number other than 0", "0");
     channel.intercept = pairNumber(header, key + "intercept", 0);
   }
+  return channels;
 }
 
-}  // namespace
+Times nrrdTimes(const Arrangement& arrangement) {
+  if (!arrangement.samplesAreTimes) return {};
+  Times times{.count = arrangement.layout.samples, .unit = arrangement.timeUnit};
+  constexpr std::size_t kMostValues = 1 << 20;
+  if (arrangement.timeStep > 0 && times.count <= kMostValues)
+    for (std::size_t i = 0; i < times.count; ++i) times.values.push_back(double(i) * arrangement.timeStep);
+  return times;
+}
 
-bool matchesNrrd(const fs::path& path) { return hasEnding(path, ".nrrd") || hasEnding(path, ".nhdr"); }
+/// The unit of space, if it is one for all axes.
+std::string worldUnit(const NrrdHeader& header) {
+  const auto units = quotedWords(header.find("space units").value_or(""));
+  const bool one =
+      !units.empty() && std::ranges::all_of(units, [&](const auto& unit) { return unit == units[0]; });
+  return one ? units[0] : "";
+}
 
-LoadedFile loadNrrd(const fs::path& path, std::uint64_t memoryLimitBytes, const Warn& warn) {
-  const NrrdHeader header(path);
-  auto [layout, grid] = arrange(header, warn);
-  layout.type = storedType(header);
-  if (sizeBytes(layout.type) > 1) {
-    const std::string order = lowerCase(header.require("endian"));
-    layout.bigEndian = order == "big";
-    if (order != "big" && order != "little") throw header.bad("endian", "little or big", order);
+/// Where the voxels are.
+struct NrrdData {
+  fs::path path;
+  bool packed = false;
+  std::uint64_t start = 0, offset = 0;  ///< of the stream in the file, and of the voxels in the stream
+
+  ByteStream stream() const {
+    return {path, packed ? ByteStream::Encoding::gzip : ByteStream::Encoding::plain, start};
   }
-  const std::string encoding = lowerCase(header.require("encoding"));
-  const bool packed = encoding == "gzip" || encoding == "gz";
-  if (!packed && encoding != "raw") throw header.unsupported("encoding", "raw or gzip", encoding);
+};
 
-  fs::path data = path;
-  std::uint64_t start = 0;
+NrrdData findData(const NrrdHeader& header, const fs::path& path, const VoxelLayout& layout) {
+  const std::string encoding = lowerCase(header.require("encoding"));
+  NrrdData data{path, encoding == "gzip" || encoding == "gz"};
+  if (!data.packed && encoding != "raw") throw header.unsupported("encoding", "raw or gzip", encoding);
   if (const auto name = header.find("data file")) {
     refuseManyFiles(header, *name);
-    data = resolveDataFile(path, "data file", *name);
+    data.path = resolveDataFile(path, "data file", *name);
   } else if (header.attachedOffset) {
-    start = *header.attachedOffset;
+    data.start = *header.attachedOffset;
   } else {
     throw Error(ErrorCode::badInput,
                 header.file + ": header: expected an empty line and data behind it, or a data file");
   }
-  start = offsetBehindLines(header, data, start, skipField(header, "line skip", 0));
-
+  data.start = offsetBehindLines(header, data.path, data.start, skipField(header, "line skip", 0));
   const std::int64_t byteSkip = skipField(header, "byte skip", -1);
-  ByteStream stream(data, packed ? ByteStream::Encoding::gzip : ByteStream::Encoding::plain, start);
-  std::uint64_t offset = std::uint64_t(std::max<std::int64_t>(byteSkip, 0));
+  data.offset = std::uint64_t(std::max<std::int64_t>(byteSkip, 0));
+  const ByteStream stream = data.stream();
   if (byteSkip == -1) {  // the voxels are the file's last bytes
-    if (packed) throw header.bad("byte skip", "0 or more for gzip data", "-1");
+    if (data.packed) throw header.bad("byte skip", "0 or more for gzip data", "-1");
     checkFileHolds(stream, layout, 0);
-    offset = stream.largestSize() - layout.sizeBytes();
+    data.offset = stream.largestSize() - layout.sizeBytes();
   }
-  LoadedFile loaded;
-  if (data != path) loaded.dataFile = data;
-  loaded.grid = grid;
-  loaded.channels = readChannels(stream, offset, layout, memoryLimitBytes, warn);
-  describeChannels(header, stemOf(path), loaded.channels);
-  return loaded;
+  checkFileHolds(stream, layout, data.offset);
+  return data;
+}
+
+bool isBigEndianNrrd(const NrrdHeader& header, StoredType type) {
+  if (sizeBytes(type) == 1) return false;
+  const std::string order = lowerCase(header.require("endian"));
+  if (order != "big" && order != "little") throw header.bad("endian", "little or big", order);
+  return order == "big";
+}
+
+}  // namespace
+
+Match matchNrrd(const FileStart& start) {
+  if (start.bytes.starts_with("NRRD000")) return Match::content;
+  const bool named = start.hasEnding(".nrrd") || start.hasEnding(".nhdr");
+  return named && !start.folder ? Match::name : Match::no;
+}
+
+VolumeFile openNrrd(const fs::path& path, const OpenOptions& options) {
+  const NrrdHeader header(path);
+  Arrangement arrangement = arrange(header, options);
+  VoxelLayout& layout = arrangement.layout;
+  layout.type = storedType(header);
+  layout.bigEndian = isBigEndianNrrd(header, layout.type);
+  const NrrdData data = findData(header, path, layout);
+  VolumeFile file{path};
+  if (data.path != path) file.dataFiles = {data.path};
+  const std::size_t channels = arrangement.samplesAreTimes ? 1 : layout.samples;
+  file.volumes = {{.levels = {arrangement.grid},
+                   .times = nrrdTimes(arrangement),
+                   .channels = nrrdChannels(header, layout.type, channels, stemOf(path)),
+                   .worldUnit = worldUnit(header)}};
+  file.read = [data, layout, areTimes = arrangement.samplesAreTimes, name = header.file](
+                  const VolumeInfo& volume, const Part& part, Loading& loading) {
+    ByteStream stream = data.stream();
+    auto writers = makeWriters(name, volume, part, loading);
+    readSamples(stream, data.offset, layout, areTimes ? std::vector{part.time} : part.channels, writers);
+    return takeAll(writers);
+  };
+  return file;
 }
 
 }  // namespace scolopax::io

@@ -4,7 +4,7 @@
 #include <sstream>
 
 #include "renderer/core/error.h"
-#include "renderer/io/format.h"
+#include "renderer/io/nrrd_write.h"
 #include "renderer/io/output_file.h"
 #include "renderer/io/text.h"
 

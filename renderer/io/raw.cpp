@@ -9,9 +9,9 @@
 #include <regex>
 
 #include "renderer/core/error.h"
-#include "renderer/io/convert.h"
-#include "renderer/io/format.h"
+#include "renderer/io/formats.h"
 #include "renderer/io/text.h"
+#include "renderer/io/voxel_stream.h"
 
 namespace scolopax::io {
 namespace fs = std::filesystem;
@@ -199,57 +199,95 @@ RawDescription fromIvf(const fs::path& path) {
   return raw;
 }
 
-RawDescription fromName(const fs::path& path) {
-  requireRegularFile(path);
+/// Dims and type in a name such as name_4x3x2_uint8.raw; none if it has another form.
+struct NamedVoxels {
+  std::string x, y, z;
+  StoredType type;
+};
+
+std::optional<NamedVoxels> parseName(const fs::path& path) {
   static const std::regex kPattern(R"(^.*_(\d+)x(\d+)x(\d+)_([a-z]+\d+)(\.[^_]*)?\.raw(\.gz)?$)");
   const std::string name = path.filename().string();
   std::smatch match;
-  const auto type =
-      std::regex_match(name, match, kPattern) ? storedTypeFromName(match[4].str()) : std::nullopt;
-  if (!type) {
+  if (!std::regex_match(name, match, kPattern)) return std::nullopt;
+  const auto type = storedTypeFromName(match[4].str());
+  if (!type) return std::nullopt;
+  return NamedVoxels{match[1].str(), match[2].str(), match[3].str(), *type};
+}
+
+RawDescription fromName(const fs::path& path) {
+  requireRegularFile(path);
+  const auto named = parseName(path);
+  if (!named) {
     throw badField(path, "file name",
                    "name_XxYxZ_type.raw with a type from int8 to float64, or a .nhdr, .dat or .ivf header to "
                    "open instead",
-                   name);
+                   path.filename().string());
   }
   RawDescription raw;
   raw.data = path;
-  raw.layout.type = *type;
-  raw.layout.dims = sidecarDims(path, "file name", match[1].str(), match[2].str(), match[3].str());
+  raw.layout.type = named->type;
+  raw.layout.dims = sidecarDims(path, "file name", named->x, named->y, named->z);
   return raw;
+}
+
+bool isPacked(const RawDescription& raw) { return hasEnding(raw.data, ".gz"); }
+
+ByteStream streamOf(const RawDescription& raw) {
+  return ByteStream(raw.data, isPacked(raw) ? ByteStream::Encoding::gzip : ByteStream::Encoding::plain);
+}
+
+std::uint64_t expectedBytes(const RawDescription& raw) {
+  return saturatingSum(raw.byteOffset, raw.layout.sizeBytes());
+}
+
+void checkFileSize(const std::string& file, const RawDescription& raw) {
+  const ByteStream stream = streamOf(raw);
+  if (isPacked(raw)) return checkFileHolds(stream, raw.layout, raw.byteOffset);
+  const std::uint64_t expected = expectedBytes(raw), found = stream.largestSize();
+  if (expected == found || (raw.mayHoldMore && expected < found)) return;
+  throw Error(ErrorCode::badInput, file + ": " + raw.layout.description() + ": expected a data file of " +
+                                       std::to_string(expected) + " bytes, found " + std::to_string(found));
+}
+
+std::vector<VoxelBuffer> readRaw(const std::string& file, const RawDescription& raw, const VolumeInfo& volume,
+                                 const Part& part, Loading& loading) {
+  ByteStream stream = streamOf(raw);
+  auto writers = makeWriters(file, volume, part, loading);
+  readSamples(stream, raw.byteOffset, raw.layout, {0}, writers);
+  if (!raw.mayHoldMore && !stream.atEnd()) {
+    throw Error(ErrorCode::badInput, file + ": " + raw.layout.description() + ": expected data of " +
+                                         std::to_string(expectedBytes(raw)) + " bytes, found more");
+  }
+  return takeAll(writers);
 }
 
 }  // namespace
 
-bool matchesRaw(const fs::path& path) {
-  return hasEnding(path, ".raw") || hasEnding(path, ".raw.gz") || hasEnding(path, ".dat") ||
-         hasEnding(path, ".ivf");
+Match matchRaw(const FileStart& start) {
+  if (start.folder) return Match::no;
+  // Such a name is the header, whatever the voxels look like.
+  if (parseName(start.path)) return Match::content;
+  if (start.holds("<InviwoTreeData")) return Match::content;
+  const bool named = start.hasEnding(".raw") || start.hasEnding(".raw.gz") || start.hasEnding(".dat") ||
+                     start.hasEnding(".ivf");
+  return named ? Match::name : Match::no;
 }
 
-LoadedFile loadRaw(const fs::path& path, std::uint64_t memoryLimitBytes, const Warn& warn) {
-  const RawDescription raw = hasEnding(path, ".dat")   ? fromDat(path, warn)
+VolumeFile openRaw(const fs::path& path, const OpenOptions& options) {
+  const RawDescription raw = hasEnding(path, ".dat")   ? fromDat(path, options.warn)
                              : hasEnding(path, ".ivf") ? fromIvf(path)
                                                        : fromName(path);
-  const bool packed = hasEnding(raw.data, ".gz");
-  ByteStream stream(raw.data, packed ? ByteStream::Encoding::gzip : ByteStream::Encoding::plain);
   const std::string file = shown(path);
-  const std::uint64_t expected = saturatingSum(raw.byteOffset, raw.layout.sizeBytes());
-  if (!packed && expected != stream.largestSize() && !(raw.mayHoldMore && expected < stream.largestSize())) {
-    throw Error(ErrorCode::badInput, file + ": " + raw.layout.description() + ": expected a data file of " +
-                                         std::to_string(expected) + " bytes, found " +
-                                         std::to_string(stream.largestSize()));
-  }
-  LoadedFile loaded;
-  if (raw.data != path) loaded.dataFile = raw.data;
-  loaded.channels = readChannels(stream, raw.byteOffset, raw.layout, memoryLimitBytes, warn);
-  if (!raw.mayHoldMore && !stream.atEnd()) {
-    throw Error(ErrorCode::badInput, file + ": " + raw.layout.description() + ": expected data of " +
-                                         std::to_string(expected) + " bytes, found more");
-  }
-  loaded.channels[0].name = stemOf(path);
-  loaded.grid.dims = raw.layout.dims;
-  loaded.grid.worldFromVoxel = glm::scale(glm::dmat4(1.0), raw.spacing);
-  return loaded;
+  checkFileSize(file, raw);
+  VolumeFile result{path};
+  if (raw.data != path) result.dataFiles = {raw.data};
+  const Grid grid{raw.layout.dims, glm::scale(glm::dmat4(1.0), raw.spacing)};
+  result.volumes = {VolumeInfo{.levels = {grid}, .channels = {ChannelInfo{.type = raw.layout.type}}}};
+  result.read = [file, raw](const VolumeInfo& volume, const Part& part, Loading& loading) {
+    return readRaw(file, raw, volume, part, loading);
+  };
+  return result;
 }
 
 }  // namespace scolopax::io

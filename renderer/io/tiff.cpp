@@ -4,16 +4,17 @@
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <map>
 #include <optional>
 
 #include "renderer/core/error.h"
-#include "renderer/io/convert.h"
-#include "renderer/io/format.h"
+#include "renderer/io/formats.h"
 #include "renderer/io/text.h"
 #include "renderer/io/tiff_pages.h"
+#include "renderer/io/voxel_stream.h"
 
 namespace scolopax::io {
 namespace fs = std::filesystem;
@@ -23,7 +24,9 @@ namespace {
 struct Stack {
   std::int64_t channels = 1, slices = 1, times = 1;
   glm::dvec3 spacing{1};
-  std::int64_t pages() const { return channels * slices; }  ///< number to read: the first time step
+  std::string unit;         ///< of the spacing; "" if unknown
+  double timeInterval = 0;  ///< seconds; 0 if unknown
+  std::int64_t pages() const { return channels * slices * times; }
 };
 
 /// Opens one page with OpenImageIO, for its numbers as they are stored.
@@ -86,6 +89,13 @@ std::optional<std::map<std::string, std::string>> imageJFields(std::string_view 
   return fields;
 }
 
+/// ImageJ's name of a unit of length, as it is shown; "pixel" is none.
+std::string lengthUnit(const std::string& name) {
+  if (name == "micron" || name == "microns" || name == "\\u00B5m" || name == "\xC2\xB5m" || name == "um")
+    return "um";
+  return name == "pixel" || name == "pixels" ? "" : name;
+}
+
 Stack describeStack(const std::string& file, const OIIO::ImageSpec& spec, std::int64_t pageCount) {
   const std::string description = spec.get_string_attribute("ImageDescription");
   if (description.find("<OME") != std::string::npos) {
@@ -129,6 +139,9 @@ Stack describeStack(const std::string& file, const OIIO::ImageSpec& spec, std::i
   if (const auto spacing = fields->find("spacing"); spacing != fields->end()) {
     stack.spacing.z = length(std::abs(parseNumber(spacing->second).value_or(0)));
   }
+  if (const auto unit = fields->find("unit"); unit != fields->end()) stack.unit = lengthUnit(unit->second);
+  if (const auto interval = fields->find("finterval"); interval != fields->end())
+    stack.timeInterval = parseNumber(interval->second).value_or(0);
   return stack;
 }
 
@@ -182,6 +195,7 @@ class PageReader {
 
   void read(std::size_t index, std::vector<std::byte>& page) {
     if (behind_) {
+      behind_->skip(index * page.size() - behind_->position());
       behind_->read(page);
       if (pages_.bigEndian()) {
         const std::size_t size = sizeBytes(type_);
@@ -215,29 +229,29 @@ class PageReader {
   std::optional<ByteStream> behind_;
 };
 
-/// Layout of all samples of a stack.
+/// Layout of all samples of a stack at one time.
 VoxelLayout layoutOf(const std::string& file, const OIIO::ImageSpec& first, const Stack& stack) {
+  constexpr std::int64_t kMostTiffChannels = 4096;
   VoxelLayout layout;
   layout.type = storedType(file, first);
   layout.dims =
       checkedDims(file + ": ImageWidth, ImageLength, pages", first.width, first.height, stack.slices);
   const std::int64_t samples = first.nchannels;
-  if (samples < 1 || samples > kMaxChannels || stack.channels > kMaxChannels / samples) {
-    throw Error(ErrorCode::unsupported, file + ": expected at most " + std::to_string(kMaxChannels) +
+  if (samples < 1 || samples > kMostTiffChannels || stack.channels > kMostTiffChannels / samples) {
+    throw Error(ErrorCode::unsupported, file + ": expected at most " + std::to_string(kMostTiffChannels) +
                                             " channels, found " + std::to_string(stack.channels) + " of " +
                                             std::to_string(samples) + " samples");
   }
-  layout.channels = int(stack.channels * samples);
-  layout.interleaved = true;  // all channels are read before any is converted
+  layout.samples = std::size_t(stack.channels * samples);
   return layout;
 }
 
 void checkFileSize(const std::string& file, const TiffPages& pages, const OIIO::ImageSpec& first,
-                   const VoxelLayout& layout) {
+                   const VoxelLayout& layout, const Stack& stack) {
   const std::uint64_t holds = saturatingProduct(pages.fileSize(), largestRatio(first));
-  if (layout.sizeBytes() > holds) {
-    throw Error(ErrorCode::badInput, file + ": " + layout.description() + " needs " +
-                                         std::to_string(layout.sizeBytes()) +
+  const std::uint64_t needed = saturatingProduct(layout.sizeBytes(), std::uint64_t(stack.times));
+  if (needed > holds) {
+    throw Error(ErrorCode::badInput, file + ": " + layout.description() + " needs " + std::to_string(needed) +
                                          " bytes, the file holds at most " + std::to_string(holds));
   }
 }
@@ -254,83 +268,116 @@ bool isContiguous(const std::string& file, const TiffPages& pages, const OIIO::I
   return contiguous;
 }
 
-/// Reads a stack into a buffer for every channel of the layout.
-std::vector<VoxelBuffer> readSamples(PageReader& reader, const OIIO::ImageSpec& first, const Stack& stack,
-                                     const VoxelLayout& layout) {
-  const std::size_t elementBytes = sizeBytes(layout.type),
-                    pixels = std::size_t(first.width) * std::size_t(first.height),
-                    samples = std::size_t(first.nchannels);
-  std::vector<VoxelBuffer> stored;
-  stored.reserve(std::size_t(layout.channels));
-  for (int c = 0; c < layout.channels; ++c) {
-    stored.push_back(makeStoredBuffer(layout.type, std::size_t(layout.voxelCount())));
-  }
-  std::vector<std::byte> page(pixels * samples * elementBytes);
-  for (std::size_t index = 0; index < std::size_t(stack.pages()); ++index) {
-    reader.read(index, page);
-    const std::size_t z = index / std::size_t(stack.channels), c = index % std::size_t(stack.channels);
-    for (std::size_t s = 0; s < samples; ++s) {
-      std::byte* to = stored[c * samples + s].data() + z * pixels * elementBytes;
-      for (std::size_t i = 0; i < pixels; ++i) {
-        std::memcpy(to + i * elementBytes, &page[(i * samples + s) * elementBytes], elementBytes);
-      }
-    }
-  }
-  return stored;
+/// What the headers of a stack say.
+struct OpenStack {
+  std::string file;  ///< for messages
+  OIIO::ImageSpec first;
+  Stack stack;
+  VoxelLayout layout;
+  bool contiguous = false;
+};
+
+OpenStack openStack(const fs::path& path, TiffPages& pages) {
+  OpenStack open{shown(path), openPage(pages, 0)->spec(), {}, {}};
+  open.stack = describeStack(open.file, open.first, std::int64_t(pages.pageCount()));
+  open.layout = layoutOf(open.file, open.first, open.stack);
+  checkFileSize(open.file, pages, open.first, open.layout, open.stack);
+  open.contiguous = isContiguous(open.file, pages, open.first, open.stack);
+  return open;
 }
 
-/// Names the samples and converts their type. Leaves out alpha.
-std::vector<ChannelSource> channelsOf(const fs::path& path, const OIIO::ImageSpec& first, const Stack& stack,
-                                      const VoxelLayout& layout, std::vector<VoxelBuffer> stored,
-                                      const Warn& warn) {
-  const std::string stem = stemOf(path);
-  const bool rgb = stack.channels == 1 && first.nchannels >= 3 && first.channelnames[0] == "R";
+/// The samples that are channels: all but alpha.
+std::vector<std::size_t> channelSamples(const OpenStack& open) {
+  std::vector<std::size_t> samples;
+  for (int i = 0; i < int(open.layout.samples); ++i)
+    if (open.first.alpha_channel < 0 || i % open.first.nchannels != open.first.alpha_channel)
+      samples.push_back(std::size_t(i));
+  return samples;
+}
+
+std::vector<ChannelInfo> tiffChannels(const OpenStack& open, const std::string& stem) {
+  const bool rgb = open.stack.channels == 1 && open.first.nchannels >= 3 && open.first.channelnames[0] == "R";
   static constexpr std::array kColors{"red", "green", "blue"};
-  std::vector<ChannelSource> channels;
-  for (int c = 0; c < layout.channels; ++c) {
-    if (first.alpha_channel >= 0 && c % first.nchannels == first.alpha_channel) continue;
-    ChannelSource channel;
-    channel.voxels =
-        toKeptType(layout.type, std::move(stored[std::size_t(c)]), shown(path), c == 0 ? warn : Warn());
-    channel.name = layout.channels == 1
-                       ? stem
-                       : stem + " " + (rgb && c < 3 ? kColors[std::size_t(c)] : std::to_string(c));
-    channels.push_back(std::move(channel));
+  std::vector<ChannelInfo> channels;
+  for (const std::size_t sample : channelSamples(open)) {
+    ChannelInfo channel{.type = open.layout.type};
+    if (open.layout.samples > 1)
+      channel.name = stem + " " + (rgb && sample < 3 ? kColors[sample] : std::to_string(sample));
+    channels.push_back(channel);
   }
   return channels;
 }
 
+Times tiffTimes(const Stack& stack) {
+  Times times{.count = std::size_t(stack.times)};
+  if (!(stack.timeInterval > 0) || !std::isfinite(stack.timeInterval) || times.count == 1) return times;
+  for (std::size_t i = 0; i < times.count; ++i) times.values.push_back(double(i) * stack.timeInterval);
+  times.unit = "s";
+  return times;
+}
+
+/// Reads the pages of one time that the part's channels need.
+std::vector<VoxelBuffer> readTiff(const fs::path& path, const VolumeInfo& volume, const Part& part,
+                                  Loading& loading) {
+  TiffPages pages(path);
+  const OpenStack open = openStack(path, pages);
+  const std::vector<std::size_t> channels = channelSamples(open);
+  if (open.layout.dims != volume.levels[0].dims || open.layout.type != volume.channels[0].type ||
+      channels.size() != volume.channels.size() || std::size_t(open.stack.times) != volume.times.count)
+    throw Error(ErrorCode::badInput, open.file + ": expected the same pages as before, found others");
+
+  PageReader reader(path, pages, open.first, open.layout.type, open.contiguous);
+  auto writers = makeWriters(open.file, volume, part, loading);
+  const std::size_t numberBytes = sizeBytes(open.layout.type), samples = std::size_t(open.first.nchannels),
+                    pixels = std::size_t(open.first.width) * std::size_t(open.first.height),
+                    perSlice = std::size_t(open.stack.channels), slices = std::size_t(open.stack.slices);
+  loading.checkMemory(open.file + ": a page", pixels * samples * numberBytes);
+  std::vector<std::byte> page(pixels * samples * numberBytes);
+  for (std::size_t slice = 0; slice < slices; ++slice) {
+    for (std::size_t c = 0; c < perSlice; ++c) {
+      const auto isOnPage = [&](std::size_t channel) { return channels[channel] / samples == c; };
+      if (std::ranges::none_of(part.channels, isOnPage)) continue;
+      reader.read((part.time * slices + slice) * perSlice + c, page);
+      for (std::size_t i = 0; i < part.channels.size(); ++i) {
+        if (!isOnPage(part.channels[i])) continue;
+        writers[i].writeStrided(slice * pixels, pixels,
+                                page.data() + channels[part.channels[i]] % samples * numberBytes,
+                                std::ptrdiff_t(samples * numberBytes));
+      }
+    }
+  }
+  return takeAll(writers);
+}
+
 }  // namespace
 
-bool matchesTiff(const fs::path& path) { return hasEnding(path, ".tif") || hasEnding(path, ".tiff"); }
+Match matchTiff(const FileStart& start) {
+  using namespace std::string_view_literals;
+  for (const std::string_view magic : {"II*\0"sv, "MM\0*"sv, "II+\0"sv, "MM\0+"sv})
+    if (start.bytes.starts_with(magic)) return Match::content;
+  const bool named = start.hasEnding(".tif") || start.hasEnding(".tiff");
+  return named && !start.folder ? Match::name : Match::no;
+}
 
-LoadedFile loadTiff(const fs::path& path, std::uint64_t memoryLimitBytes, const Warn& warn) {
-  const std::string file = shown(path);
-  const auto say = [&](const std::string& text) {
-    if (warn) warn(file + ": " + text);
-  };
+VolumeFile openTiff(const fs::path& path, const OpenOptions& options) {
   TiffPages pages(path);
-  const OIIO::ImageSpec first = openPage(pages, 0)->spec();
-  const Stack stack = describeStack(file, first, std::int64_t(pages.pageCount()));
-  const VoxelLayout layout = layoutOf(file, first, stack);
-  checkMemory(file, layout, memoryLimitBytes);
-  checkFileSize(file, pages, first, layout);
-  const bool contiguous = isContiguous(file, pages, first, stack);
-  if (stack.times > 1) {
-    say("frames: the first of " + std::to_string(stack.times) + " time steps is loaded, " +
-        std::to_string(stack.times - 1) + " are left out");
-  }
-  if (pages.hasPalette(0)) say("the indices are loaded, the palette is left out");
-
-  PageReader reader(path, pages, first, layout.type, contiguous);
-  LoadedFile loaded;
-  loaded.grid.dims = layout.dims;
-  for (int axis = 0; axis < 3; ++axis) loaded.grid.worldFromVoxel[axis][axis] = stack.spacing[axis];
-  loaded.channels = channelsOf(path, first, stack, layout, readSamples(reader, first, stack, layout), warn);
-  if (loaded.channels.empty())
-    throw Error(ErrorCode::unsupported, file + ": expected a channel beside alpha, found none");
-  if (int(loaded.channels.size()) < layout.channels) say("alpha is left out");
-  return loaded;
+  const OpenStack open = openStack(path, pages);
+  Grid grid{open.layout.dims};
+  for (int axis = 0; axis < 3; ++axis) grid.worldFromVoxel[axis][axis] = open.stack.spacing[axis];
+  VolumeFile file{path};
+  file.volumes = {{.levels = {grid},
+                   .times = tiffTimes(open.stack),
+                   .channels = tiffChannels(open, stemOf(path)),
+                   .worldUnit = open.stack.unit}};
+  const std::size_t channels = file.volumes[0].channels.size();
+  if (channels == 0)
+    throw Error(ErrorCode::unsupported, open.file + ": expected a channel beside alpha, found none");
+  if (channels < open.layout.samples) options.warn(open.file + ": alpha is left out");
+  if (pages.hasPalette(0)) options.warn(open.file + ": the indices are loaded, the palette is left out");
+  file.read = [path](const VolumeInfo& volume, const Part& part, Loading& loading) {
+    return readTiff(path, volume, part, loading);
+  };
+  return file;
 }
 
 }  // namespace scolopax::io

@@ -6,7 +6,8 @@
 
 #include "renderer/core/error.h"
 #include "renderer/generate/orbitals.h"
-#include "renderer/io/format.h"
+#include "renderer/io/loading.h"
+#include "renderer/io/nrrd_write.h"
 #include "renderer/io/output_file.h"
 
 namespace scolopax {

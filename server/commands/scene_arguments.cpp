@@ -10,6 +10,7 @@
 
 #include "protocol/json_text.h"
 #include "renderer/core/error.h"
+#include "server/commands/data_options.h"
 #include "server/config.h"
 #include "server/dataset_store.h"
 
@@ -50,8 +51,10 @@ json patchOf(const std::string& assignment) {
 void addSceneArguments(CLI::App& command, SceneArguments& arguments) {
   command.add_option("SCENE", arguments.scene,
                      "Scene file (JSON, see PROTOCOL.md); by default, all values are chosen automatically");
-  command.add_option("--data", arguments.data, "Volume files; files with the same grid form one data set")
-      ->required();
+  command.add_option("--data", arguments.data, kDataDoc)->required();
+  checkFourthAxis(command.add_option("--fourth-axis", arguments.fourthAxis, kFourthAxisDoc))
+      ->capture_default_str();
+  command.add_option("--time", arguments.time, "Which time of a time series, from 0")->capture_default_str();
   command
       .add_option(
           "--set", arguments.assignments,
@@ -64,8 +67,10 @@ std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& 
   for (const std::string& assignment : arguments.assignments) patches.push_back(patchOf(assignment));
   const json scene = readScene(arguments.scene);
   const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
-  const auto store = std::make_shared<server::DatasetStore>(
-      io::loadDatasets(arguments.data, io::defaultMemoryLimitBytes(), warn));
+  const auto opened =
+      io::openDatasets(arguments.data, {.fourthAxis = fourthAxisOf(arguments.fourthAxis), .warn = warn});
+  const auto store =
+      std::make_shared<server::DatasetStore>(io::loadDatasets(opened, arguments.time, {.warn = warn}));
   const server::SceneResolver resolver(store, {.maxPixels = server::Config().maxPixels});
   auto resolved = resolver.replace(scene);
   for (const json& patch : patches) resolved = resolver.patch(*resolved, patch);
@@ -79,7 +84,7 @@ void checkOutputs(const std::vector<std::filesystem::path>& outputs, const Scene
     return std::filesystem::weakly_canonical(path, ignored);
   };
   std::vector<std::filesystem::path> taken;
-  for (const auto& path : arguments.data) taken.push_back(canonical(path));
+  for (const auto& name : arguments.data) taken.push_back(canonical(io::splitName(name).path));
   if (!arguments.scene.empty()) taken.push_back(canonical(arguments.scene));
   for (const auto& path : outputs) {
     if (std::find(taken.begin(), taken.end(), canonical(path)) != taken.end())

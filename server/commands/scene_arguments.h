@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The arguments that define the scene to render: SCENE, --data and --set.
+// The arguments that define the scene to render: SCENE, --data, --time and --set.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <filesystem>
@@ -14,10 +14,13 @@ namespace scolopax {
 struct SceneArguments {
   std::string scene;  ///< a file; "" is {}
   std::vector<std::filesystem::path> data;
+  std::string fourthAxis = "auto";
+  std::size_t time = 0;
   std::vector<std::string> assignments;  ///< "channels.0.density=0.1"
 };
 
-/// Adds SCENE, --data and --set, which fill `arguments`. `arguments` must live as long as the command.
+/// Adds SCENE, --data, --fourth-axis, --time and --set, which fill `arguments`. `arguments` must live as long
+/// as the command.
 void addSceneArguments(CLI::App& command, SceneArguments& arguments);
 
 /// Loads the data, reads the scene and applies the assignments in order. Throws Error or ProtocolError.

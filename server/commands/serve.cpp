@@ -24,6 +24,7 @@
 #include "server/application.h"
 #include "server/auth.h"
 #include "server/command_config.h"
+#include "server/commands/data_options.h"
 #include "server/commands/render_device.h"
 #include "server/commands/validators.h"
 #include "server/limits.h"
@@ -38,6 +39,7 @@ struct ServeOptions {
   server::Config config;
   std::vector<std::filesystem::path> paths;
   std::filesystem::path dataRoot;
+  std::string fourthAxis = "auto";
   std::string tokenFile;
   std::string configFile;
   std::string device = "auto", whenDeviceFails = "cpu";
@@ -107,8 +109,9 @@ void serve(ServeOptions options) {
   if (!isLoopback(config.host) && config.certificateFile.empty())
     log->warn("{} can be reached from other machines, and the traffic is not encrypted", config.host);
 
-  auto datasets = io::loadDatasets(server::pathsBelowRoot(options.paths, options.dataRoot),
-                                   io::defaultMemoryLimitBytes(), warn);
+  const auto opened = io::openDatasets(server::pathsBelowRoot(options.paths, options.dataRoot),
+                                       {.fourthAxis = fourthAxisOf(options.fourthAxis), .warn = warn});
+  auto datasets = io::loadDatasets(opened, 0, {.warn = warn});
   for (const auto& dataset : datasets) {
     const auto& dims = dataset.volume->grid().dims;
     log->info("data set {}: {} x {} x {}, {} channels", dataset.id, dims.x, dims.y, dims.z,
@@ -153,9 +156,8 @@ void addServerOptions(CLI::App& command, ServeOptions& options) {
   const auto add = [&command](const std::string& name, auto& value, const std::string& doc) {
     return addOption(command, name, value, doc);
   };
-  command.add_option(
-      "PATH", options.paths,
-      "Volume files, at least one. Files with the same grid become the channels of one data set");
+  command.add_option("PATH", options.paths, kDataDoc);
+  checkFourthAxis(add("fourth-axis", options.fourthAxis, kFourthAxisDoc));
   add("host", config.host, "Address to listen on; 0.0.0.0: all addresses of this machine")
       ->type_name("ADDRESS");
   add("port", config.port, "Port to listen on; 0: any free one")->type_name("PORT");

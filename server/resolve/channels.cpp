@@ -35,10 +35,10 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
       wire.range = {range.lo, range.hi};
     }
     if (!wire.color && !wire.colormap) {
-      if (channels.size() == 1)
+      if (channels.size() == 1 && !channels[i].look.color)
         wire.colormap = std::string(kDefaultColormap);
       else
-        wire.color = hexOf(defaultColor(int(i)));
+        wire.color = hexOf(defaultColor(volume, int(i)));
     }
     if (!wire.density) wire.density = defaultDensity(volume, int(i));
     look.visible = wire.visible;

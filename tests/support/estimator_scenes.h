@@ -8,7 +8,7 @@
 #include <string>
 
 #include "renderer/generate/orbitals.h"
-#include "renderer/io/format.h"
+#include "renderer/io/datasets.h"
 #include "tests/support/figure_3.h"
 
 namespace scolopax::test {

@@ -6,7 +6,7 @@
 
 #include "renderer/data/defaults.h"
 #include "renderer/generate/orbitals.h"
-#include "renderer/io/format.h"
+#include "renderer/io/datasets.h"
 #include "tests/support/statistics.h"
 #include "tests/support/volumes.h"
 

@@ -11,7 +11,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/engine/pilot.h"
-#include "renderer/io/format.h"
+#include "renderer/io/datasets.h"
 #include "renderer/metrics/metrics.h"
 #include "renderer/reference/render.h"
 #include "renderer/renderer.h"

@@ -15,7 +15,9 @@
 #include <vector>
 
 #include "renderer/core/error.h"
-#include "renderer/io/format.h"
+#include "renderer/io/datasets.h"
+#include "renderer/io/formats.h"
+#include "renderer/io/nrrd_write.h"
 
 namespace scolopax::io {
 
@@ -90,6 +92,21 @@ inline std::pair<double, double> rangeOf(const ChannelSource& channel) {
   const auto values = valuesOf(channel);
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
   return {*low, *high};
+}
+
+/// The first volume of a file, at its finest level.
+struct LoadedFile {
+  Grid grid;
+  std::vector<ChannelSource> channels;
+  Times times = {};
+  std::string worldUnit = {};
+};
+
+inline LoadedFile loadFile(const std::filesystem::path& path, std::uint64_t limit, const Warn& warn,
+                           std::size_t time = 0, FourthAxis fourthAxis = FourthAxis::automatic) {
+  const auto file = openFile(path, {.fourthAxis = fourthAxis, .warn = warn});
+  LoadedPart part = load(*file, {.time = time}, {.memoryLimitBytes = limit, .warn = warn});
+  return {part.grid, std::move(part.channels), file->volumes[0].times, file->volumes[0].worldUnit};
 }
 
 /// The message, of one line, of the Error that `call` throws; "" if it throws nothing. Any other exception

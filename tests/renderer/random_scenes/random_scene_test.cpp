@@ -11,7 +11,7 @@
 #include <set>
 
 #include "protocol/schema.h"
-#include "renderer/io/format.h"
+#include "renderer/io/datasets.h"
 #include "server/scene_resolver.h"
 
 namespace scolopax::random_scenes {

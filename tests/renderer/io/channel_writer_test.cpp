@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer/io/convert.h"
-
 #include <gmock/gmock.h>
 
 #include "renderer/io/text.h"
@@ -11,15 +9,14 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Values of type T converted by toKeptType, with its messages.
+/// Values of type T converted by a ChannelWriter, with its messages.
 template <class T>
 std::pair<VoxelBuffer, std::string> converted(StoredType type, const std::vector<T>& values) {
-  VoxelBuffer stored = makeStoredBuffer(type, values.size());
-  std::memcpy(stored.data(), values.data(), values.size() * sizeof(T));
   std::string said;
-  VoxelBuffer result =
-      toKeptType(type, std::move(stored), "f", [&](const std::string& text) { said += text; });
-  return {std::move(result), said};
+  Loading loading({.warn = [&](const std::string& text) { said += text; }}, 0);
+  ChannelWriter writer("f", type, {int(values.size()), 1, 1}, loading);
+  writer.write(0, std::as_bytes(std::span(values)));
+  return {writer.take(), said};
 }
 
 TEST(ConvertVoxels, HalvesAreExactForEveryBitPattern) {

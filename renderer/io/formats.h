@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// The list of formats: one line and one file each. A format is found by what a file contains, then by its
+// name. docs/adding-a-reader.md tells what a new one needs.
+#pragma once
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "renderer/io/volume_file.h"
+
+/// Every format, in the order in which they are tried: NAME of its functions matchNAME and openNAME, the name
+/// shown, its endings for --help and errors, and what it needs: the Debian package of its library, or "" if
+/// the build has all that it needs. tests/CMakeLists.txt makes a fuzz target of every line.
+// clang-format off
+#define SCOLOPAX_FORMATS(X)                                                                         \
+  X(Raw, "raw", "name_XxYxZ_type.raw, .dat, .ivf", "")                                               \
+  X(Nifti, "NIfTI", ".nii, .nii.gz, .hdr + .img", "")                                                \
+  X(Nrrd, "NRRD", ".nrrd, .nhdr", "")                                                                \
+  X(Tiff, "TIFF", ".tif, .tiff", "")
+// clang-format on
+
+namespace scolopax::io {
+
+/// The beginning of a file, or a folder.
+struct FileStart {
+  std::filesystem::path path;
+  bool folder = false;
+  std::string bytes = {};     ///< the first 4096, or all there are; none for a folder
+  std::string unpacked = {};  ///< the same of what a gzip file contains; of another file, `bytes`
+
+  /// Whether the name, in lower case, ends so: ".nii.gz".
+  bool hasEnding(std::string_view ending) const;
+  /// Whether it is a file, unpacked or not, with these bytes at `offset`.
+  bool holds(std::string_view magic, std::size_t offset = 0) const;
+  /// Whether it is a folder that holds an entry of this name.
+  bool contains(std::string_view entry) const;
+};
+
+/// How well a file matches a format. What it contains takes precedence over its name.
+enum class Match { no, name, content };
+
+struct Format {
+  std::string_view name;     ///< "NIfTI"
+  std::string_view endings;  ///< for --help: ".nii, .nii.gz, .hdr + .img"
+  std::string_view missing;  ///< the Debian package of a library that this build lacks; "" if none is missing
+  /// Looks at little more than the start of the file, without an error.
+  Match (*match)(const FileStart& start);
+  /// Reads the headers, and no voxels. Throws Error with one line: file, field, expected, found. Checks sizes
+  /// before memory is taken, and that the file can hold the voxels where that is known. nullptr if a library
+  /// is missing.
+  VolumeFile (*open)(const std::filesystem::path& path, const OpenOptions& options);
+};
+
+#define X(NAME, shown, endings, missing)     \
+  Match match##NAME(const FileStart& start); \
+  VolumeFile open##NAME(const std::filesystem::path& path, const OpenOptions& options);
+SCOLOPAX_FORMATS(X)
+#undef X
+
+std::span<const Format> formats();
+
+/// Opens a file or folder with the format that matches it best. Never waits for a pipe. Names are clean text
+/// in what it returns. Throws Error: unsupported, naming the known formats, if none matches, and naming the
+/// library if that is missing; badInput unless it is a regular file or a folder of a format, or if it holds
+/// no volume; and what the reader throws.
+std::shared_ptr<const VolumeFile> openFile(const std::filesystem::path& path,
+                                           const OpenOptions& options = {});
+/// The same with a given format.
+std::shared_ptr<const VolumeFile> openFile(const Format& format, const std::filesystem::path& path,
+                                           const OpenOptions& options = {});
+
+}  // namespace scolopax::io
