@@ -136,15 +136,17 @@ struct Table<Channel> {
       field("visible", &Channel::visible, "Whether the channel is drawn."),
       field("range", &Channel::range,
             "[lo, hi]: the data values at positions 0 and 1 of the curves; values outside are clamped. lo > "
-            "hi reverses the curves, lo = hi is a step. null is chosen from the histogram.",
+            "hi reverses the curves, lo = hi is a step. null is the window that the file states, or else "
+            "chosen from the histogram.",
             {.unit = "data units"}),
       field("interpolation", &Channel::interpolation,
             "How values between voxel centres are computed from the voxels.",
             {.names = &Lists::interpolations}),
-      field("color", &Channel::color,
-            "One colour for all values; cannot be set together with colormap. If both are null, the server "
-            "chooses.",
-            {.color = true}),
+      field(
+          "color", &Channel::color,
+          "One colour for all values; cannot be set together with colormap. If both are null, it is what the "
+          "file states, or else what the server chooses.",
+          {.color = true}),
       field("colormap", &Channel::colormap,
             "Colour over the range: a name, or control points [position, color], interpolated in linear RGB.",
             {.maxItems = kMaxControlPoints, .names = &Lists::colormaps}),

@@ -40,38 +40,6 @@ std::string fullName(const VolumeInfo& volume, const ChannelInfo& channel) {
   return volume.path.empty() ? channel.name : volume.path + "/" + channel.name;
 }
 
-/// The parts that `inner` selects: a volume by its path, or those in a group, or channels by their names.
-std::vector<Part> select(const VolumeFile& file, const std::string& inner) {
-  std::vector<Part> parts;
-  std::string wanted = inner;
-  while (wanted.starts_with('/')) wanted.erase(0, 1);
-  while (wanted.ends_with('/')) wanted.pop_back();
-  const auto addVolumes = [&](auto&& chosen) {
-    for (std::size_t i = 0; i < file.volumes.size(); ++i)
-      if (chosen(file.volumes[i].path)) parts.push_back({.volume = i});
-  };
-  addVolumes([&](const std::string& path) { return wanted.empty() || path == wanted; });
-  if (parts.empty()) addVolumes([&](const std::string& path) { return path.starts_with(wanted + "/"); });
-  if (!parts.empty()) return parts;
-  std::vector<std::string> known;
-  for (std::size_t i = 0; i < file.volumes.size(); ++i) {
-    const VolumeInfo& volume = file.volumes[i];
-    Part part{.volume = i};
-    for (std::size_t c = 0; c < volume.channels.size(); ++c) {
-      const std::string full = fullName(volume, volume.channels[c]);
-      if (wanted == full || wanted == volume.channels[c].name) part.channels.push_back(c);
-      if (!volume.path.empty() && (known.empty() || known.back() != volume.path))
-        known.push_back(volume.path);
-      if (volume.path.empty()) known.push_back(full);
-    }
-    if (!part.channels.empty()) parts.push_back(part);
-  }
-  if (parts.empty())
-    throw Error(ErrorCode::notFound, shown(file.path) + ": expected one of " + listed(known) +
-                                         " after the colon, found " + inQuotes(inner));
-  return parts;
-}
-
 /// One of the names that a user gave, opened.
 struct Opened {
   DataName name;
@@ -193,11 +161,42 @@ DataName splitName(const fs::path& name) {
   return {name};
 }
 
+std::vector<Part> partsOf(const VolumeFile& file, const std::string& inner) {
+  std::vector<Part> parts;
+  std::string wanted = inner;
+  while (wanted.starts_with('/')) wanted.erase(0, 1);
+  while (wanted.ends_with('/')) wanted.pop_back();
+  const auto addVolumes = [&](auto&& chosen) {
+    for (std::size_t i = 0; i < file.volumes.size(); ++i)
+      if (chosen(file.volumes[i].path)) parts.push_back({.volume = i});
+  };
+  addVolumes([&](const std::string& path) { return wanted.empty() || path == wanted; });
+  if (parts.empty()) addVolumes([&](const std::string& path) { return path.starts_with(wanted + "/"); });
+  if (!parts.empty()) return parts;
+  std::vector<std::string> known;
+  for (std::size_t i = 0; i < file.volumes.size(); ++i) {
+    const VolumeInfo& volume = file.volumes[i];
+    Part part{.volume = i};
+    for (std::size_t c = 0; c < volume.channels.size(); ++c) {
+      const std::string full = fullName(volume, volume.channels[c]);
+      if (wanted == full || wanted == volume.channels[c].name) part.channels.push_back(c);
+      if (!volume.path.empty() && (known.empty() || known.back() != volume.path))
+        known.push_back(volume.path);
+      if (volume.path.empty()) known.push_back(full);
+    }
+    if (!part.channels.empty()) parts.push_back(part);
+  }
+  if (parts.empty())
+    throw Error(ErrorCode::notFound, shown(file.path) + ": expected one of " + listed(known) +
+                                         " after the colon, found " + inQuotes(inner));
+  return parts;
+}
+
 std::vector<Dataset> openDatasets(std::span<const fs::path> names, const OpenOptions& options) {
   std::vector<Dataset> datasets;
   std::vector<std::string> inners;  // what was asked of the first file of each
   for (const Opened& opened : openAll(names, options)) {
-    for (const Part& part : select(*opened.file, opened.name.inner)) {
+    for (const Part& part : partsOf(*opened.file, opened.name.inner)) {
       const VolumeInfo& volume = opened.file->volumes[part.volume];
       auto dataset = std::ranges::find_if(datasets, [&](const Dataset& d) { return agree(d, volume); });
       if (dataset == datasets.end()) {

@@ -23,6 +23,10 @@ struct DataName {
 /// split, nor is one of which no part exists.
 DataName splitName(const std::filesystem::path& name);
 
+/// What `inner` selects of a file: the volume with this path, or all below it, or channels of this name; ""
+/// selects all. Throws Error(notFound), telling what there is.
+std::vector<Part> partsOf(const VolumeFile& file, const std::string& inner);
+
 /// A data set whose headers have been read and whose voxels have not.
 struct Dataset {
   std::string id = {};     ///< slug of the first file's stem, made unique among the data sets by a suffix

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 
+#include <thread>
+
 #include "renderer/io/text.h"
 #include "tests/renderer/io/io_test_support.h"
 
@@ -70,6 +72,87 @@ TEST(ConvertVoxels, SixtyFourBitsSayWhatRoundingCost) {
       converted<std::int64_t>(StoredType::i64, {(std::int64_t(1) << 53) + 1});
   EXPECT_THAT(integerText,
               HasSubstr("int64 voxels are kept as float32 (largest relative rounding error 1.1e-16)"));
+}
+
+TEST(ChannelWriter, TakesBoxesInAnyOrderOfAxesAndLeavesOutWhatIsBesideTheVolume) {
+  const glm::ivec3 dims(5, 4, 3), chunk(2, 3, 2);
+  for (const int flip : {1, -1}) {
+    Loading loading({}, 0);
+    ChannelWriter writer("f", StoredType::i16, dims, loading);
+    for (int z = -1; z < dims.z; z += chunk.z)
+      for (int y = 0; y < dims.y; y += chunk.y)
+        for (int x = 0; x < dims.x; x += chunk.x) {
+          // z fastest, then x, then y, big-endian; with flip -1 from the last voxel to the first.
+          std::vector<std::int16_t> stored(12);
+          for (int k = 0; k < 2; ++k)
+            for (int j = 0; j < 3; ++j)
+              for (int i = 0; i < 2; ++i) {
+                const int at = k + 2 * i + 4 * j;
+                stored[std::size_t(flip > 0 ? at : 11 - at)] =
+                    std::int16_t(__builtin_bswap16(std::uint16_t((x + i) + 10 * (y + j) + 100 * (z + k))));
+              }
+          const auto* bytes = reinterpret_cast<const std::byte*>(stored.data());
+          writer.writeBox({x, y, z}, chunk, flip > 0 ? bytes : bytes + 22, {flip * 4, flip * 8, flip * 2},
+                          true);
+        }
+    const VoxelBuffer voxels = writer.take();
+    std::size_t at = 0;
+    for (int z = 0; z < dims.z; ++z)
+      for (int y = 0; y < dims.y; ++y)
+        for (int x = 0; x < dims.x; ++x) ASSERT_EQ(voxels.as<std::int16_t>()[at++], x + 10 * y + 100 * z);
+  }
+}
+
+TEST(ChannelWriter, MayBeWrittenBySeveralThreadsWhileTheTypeChanges) {
+  constexpr int kThreads = 4, kRows = 64, kWidth = 1000;
+  Loading loading({}, 0);
+  ChannelWriter writer("f", StoredType::i32, {kWidth, kThreads * kRows, 1}, loading);
+  std::vector<std::thread> threads;
+  for (int t = 0; t < kThreads; ++t)
+    threads.emplace_back([&, t] {
+      for (int r = 0; r < kRows; ++r) {
+        const int row = r * kThreads + t;
+        // Rows up to 31 fit i16, up to 63 u16.
+        std::vector<std::int32_t> values(kWidth);
+        for (int i = 0; i < kWidth; ++i) values[std::size_t(i)] = row * 1000 + i;
+        writer.write(std::size_t(row) * kWidth, std::as_bytes(std::span(values)));
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+  const VoxelBuffer voxels = writer.take();
+  ASSERT_EQ(voxels.type(), ScalarType::f32);
+  for (std::size_t i = 0; i < voxels.count(); ++i) ASSERT_EQ(voxels.as<float>()[i], float(i));
+}
+
+TEST(ChannelWriter, DemandsAllVoxelsUnlessTheyWereFilled) {
+  Loading loading({}, 0);
+  const std::vector<std::int32_t> two{7, 8};
+  ChannelWriter partial("f", StoredType::i32, {3, 1, 1}, loading);
+  partial.write(1, std::as_bytes(std::span(two)));
+  EXPECT_THAT(errorOf([&] { partial.take(); }), HasSubstr("f: expected 3 voxels, found 2"));
+  EXPECT_THAT(errorOf([&] { partial.write(2, std::as_bytes(std::span(two))); }), HasSubstr("found 2 + 2"));
+  ChannelWriter filled("f", StoredType::i32, {3, 1, 1}, loading);
+  filled.fill(-40000);
+  filled.write(1, std::as_bytes(std::span(two)));
+  const VoxelBuffer voxels = filled.take();
+  ASSERT_EQ(voxels.type(), ScalarType::f32);
+  EXPECT_THAT(voxels.as<float>(), testing::ElementsAre(-40000, 7, 8));
+}
+
+TEST(ChannelWriter, LimitsAFillValueToTheType) {
+  Loading loading({}, 0);
+  const auto filled = [&](StoredType type, double value) {
+    ChannelWriter writer("f", type, {1, 1, 1}, loading);
+    writer.fill(value);
+    const VoxelBuffer voxels = writer.take();
+    return visitScalarType(voxels.type(), [&](auto zero) { return double(voxels.as<decltype(zero)>()[0]); });
+  };
+  EXPECT_EQ(filled(StoredType::u8, 300), 255);
+  EXPECT_EQ(filled(StoredType::u8, NAN), 0);
+  EXPECT_EQ(filled(StoredType::i16, -1e300), -32768);
+  EXPECT_EQ(filled(StoredType::u32, 1e300), 4294967296.0);
+  EXPECT_TRUE(std::isnan(filled(StoredType::f32, NAN)));
+  EXPECT_EQ(filled(StoredType::f16, 0.5), 0.5);
 }
 
 TEST(ConvertVoxels, SizesSaturateInsteadOfWrapping) {

@@ -287,6 +287,38 @@ TEST(NiftiFiles, TheFifthDimensionIsChannelsAtEveryTime) {
       HasSubstr("dim[6]: expected 1, found 2"));
 }
 
+TEST(NiftiFiles, AFourthAxisIsTimesOrChannels) {
+  const TempDir folder;
+  const auto kindOf = [&](Header1 header, FourthAxis fourthAxis = FourthAxis::automatic) {
+    const auto path = writeBytes(folder / "a.nii", header.bytes + std::string(96, 'x'));
+    const VolumeInfo volume = openFile(path, {.fourthAxis = fourthAxis})->volumes[0];
+    return std::to_string(volume.times.count) + " times, " + std::to_string(volume.channels.size()) +
+           " channels";
+  };
+  const auto of = [](std::int16_t size) { return Header1().dim({4, 2, 2, 1, size}); };
+  constexpr int kUnits = 123, kIntent = 68;
+  EXPECT_EQ(kindOf(of(2)), "2 times, 1 channels");
+  EXPECT_EQ(kindOf(of(3)), "1 times, 3 channels");
+  EXPECT_EQ(kindOf(of(3).set<std::uint8_t>(kUnits, 2 + 8)), "3 times, 1 channels") << "integers every second";
+  EXPECT_EQ(kindOf(of(3).type(16, 32).set<std::uint8_t>(kUnits, 2 + 8)), "1 times, 3 channels") << "floats";
+  EXPECT_EQ(kindOf(of(3).type(16, 32).set<std::int16_t>(kIntent, 2001)), "3 times, 1 channels")
+      << "time series";
+  EXPECT_EQ(kindOf(of(2).set<std::int16_t>(kIntent, 1007)), "1 times, 2 channels") << "vectors";
+  EXPECT_EQ(kindOf(of(2), FourthAxis::channel), "1 times, 2 channels");
+  EXPECT_EQ(kindOf(of(3), FourthAxis::time), "3 times, 1 channels");
+  EXPECT_EQ(kindOf(Header1().dim({5, 2, 1, 1, 3, 2}), FourthAxis::time), "3 times, 2 channels");
+}
+
+TEST(NiftiFiles, TimesHaveValuesIfTheirStepIsGiven) {
+  const TempDir folder;
+  Header1 header = Header1().dim({4, 2, 1, 1, 4}).pixdim({1, 2, 2, 2, 0.5f});
+  header.set<std::uint8_t>(123, 2 + 16).set<float>(136, 10);
+  const LoadedFile file = loadNifti(folder, header.bytes + bytesOf(ramp(8)));
+  EXPECT_EQ(file.times.values, (std::vector<double>{10, 10.5, 11, 11.5}));
+  EXPECT_EQ(file.times.unit, "ms");
+  EXPECT_EQ(file.worldUnit, "mm");
+}
+
 TEST(NiftiFiles, RgbaVoxelsAreThreeChannels) {
   const TempDir folder;
   const std::string bytes =

@@ -192,6 +192,43 @@ TEST(NrrdFiles, AnAxisThatIsNotSpatialBecomesChannels) {
               HasSubstr("kinds: expected real voxels"));
 }
 
+TEST(NrrdFiles, AFourthAxisIsTimesOrChannels) {
+  const TempDir folder;
+  const auto kindOf = [&](const std::string& fields, FourthAxis fourthAxis = FourthAxis::automatic) {
+    const auto path = writeBytes(folder / "a.nrrd",
+                                 "NRRD0005\ntype: uint16\nendian: little\nencoding: raw\ndimension: "
+                                 "4\n" +
+                                     fields + "\n" + kRamp);
+    const VolumeInfo volume = openFile(path, {.fourthAxis = fourthAxis})->volumes[0];
+    return std::to_string(volume.times.count) + " times, " + std::to_string(volume.channels.size()) +
+           " channels";
+  };
+  EXPECT_EQ(kindOf("sizes: 3 2 1 2\nkinds: domain domain domain time\n"), "2 times, 1 channels");
+  EXPECT_EQ(kindOf("sizes: 2 2 1 3\nkinds: domain domain domain time\n"), "3 times, 1 channels");
+  EXPECT_EQ(kindOf("sizes: 3 2 1 2\nkinds: domain domain domain list\n"), "1 times, 2 channels");
+  EXPECT_EQ(kindOf("sizes: 3 2 1 2\nkinds: domain domain domain list\n", FourthAxis::time),
+            "2 times, 1 channels");
+  EXPECT_EQ(kindOf("sizes: 3 2 1 2\nkinds: domain domain domain time\n", FourthAxis::channel),
+            "1 times, 2 channels");
+  EXPECT_EQ(kindOf("sizes: 3 2 1 2\n"), "2 times, 1 channels") << "unmarked";
+  EXPECT_EQ(kindOf("sizes: 2 2 1 3\n"), "1 times, 3 channels") << "unmarked, of 3";
+  EXPECT_EQ(kindOf("sizes: 3 2 2 1\n"), "1 times, 3 channels") << "unmarked, the first of 3";
+  EXPECT_EQ(kindOf("sizes: 2 2 1 3\nunits: \"mm\" \"mm\" \"mm\" \"s\"\n"), "3 times, 1 channels");
+  EXPECT_EQ(kindOf("sizes: 3 2 1 2\nspace directions: (1,0,0) (0,1,0) (0,0,1) none\n"),
+            "2 times, 1 channels");
+  EXPECT_EQ(kindOf("sizes: 2 2 1 3\nspace directions: (1,0,0) (0,1,0) (0,0,1) none\n"),
+            "1 times, 3 channels");
+
+  const auto last = [&](const char* fields) {
+    kindOf(fields);
+    return valuesOf(loadFile(folder / "a.nrrd", kTestLimit, {}, 1).channels[0]);
+  };
+  EXPECT_EQ(last("sizes: 3 2 1 2\nkinds: domain domain domain time\n"),
+            (std::vector<double>{6, 7, 8, 9, 10, 11}));
+  EXPECT_EQ(last("sizes: 2 3 2 1\nkinds: time domain domain domain\n"),
+            (std::vector<double>{1, 3, 5, 7, 9, 11}));
+}
+
 TEST(NrrdFiles, EverySpaceIsBroughtToRas) {
   const TempDir folder;
   const std::string directions = "space directions: (1,2,3) (-4,5,6) (7,8,-9)\nspace origin: (10,20,30)\n";
