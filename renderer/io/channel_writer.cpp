@@ -253,6 +253,7 @@ VoxelBuffer ChannelWriter::take() {
 
 std::vector<VoxelBuffer> takeAll(std::vector<ChannelWriter>& writers) {
   std::vector<VoxelBuffer> all;
+  all.reserve(writers.size());
   for (ChannelWriter& writer : writers) all.push_back(writer.take());
   return all;
 }

@@ -152,8 +152,9 @@ std::uint64_t sumOverSources(const Dataset& dataset, std::size_t level,
 
 DataName splitName(const fs::path& name) {
   std::error_code ignored;
-  const std::string text = name.string();
-  if (fs::exists(name, ignored)) return {name};
+  std::string text = name.string();
+  while (text.size() > 1 && text.ends_with('/')) text.pop_back();  // a folder's name is that before the slash
+  if (fs::exists(text, ignored)) return {text};
   for (std::size_t colon = text.find(':'); colon != std::string::npos; colon = text.find(':', colon + 1)) {
     const fs::path path = text.substr(0, colon);
     if (fs::exists(path, ignored)) return {path, text.substr(colon + 1)};

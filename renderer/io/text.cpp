@@ -94,7 +94,9 @@ bool hasEnding(const std::filesystem::path& path, std::string_view ending) {
 std::string stemOf(const std::filesystem::path& path) {
   std::filesystem::path name = path.filename();
   if (hasEnding(name, ".gz")) name = name.stem();
-  return cleanText(name.stem().string());
+  name = name.stem();
+  if (hasEnding(name, ".ome")) name = name.stem();
+  return cleanText(name.string());
 }
 
 }  // namespace scolopax::io

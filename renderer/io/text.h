@@ -30,7 +30,7 @@ std::string shown(const std::filesystem::path& path);
 
 /// Whether the file's name, in lower case, ends with `ending` (".nii.gz").
 bool hasEnding(const std::filesystem::path& path, std::string_view ending);
-/// The file's name without the ending (".nii.gz", ".nrrd", ".raw"), clean: the default name of a channel.
+/// The file's name without the ending (".nii.gz", ".nrrd", ".ome.tif"), clean: the default name of a channel.
 std::string stemOf(const std::filesystem::path& path);
 
 }  // namespace scolopax::io

@@ -29,6 +29,26 @@ TEST(DatasetStore, DescribesGridAndChannels) {
   EXPECT_EQ(description["channels"][1]["maximum"], 230.0);
 }
 
+TEST(DatasetStore, DescribesWhatTheFilesStateAndNothingThatTheyDoNot) {
+  std::vector<ChannelSource> channels(2);
+  for (auto& channel : channels) channel.voxels = VoxelBuffer(ScalarType::u8, 1);
+  channels[0].look = {.color = {{0, 128, 255}}, .window = ValueRange{-1, 2.5}, .labels = true};
+  const Dataset dataset{"d",
+                        "d",
+                        {},
+                        std::make_shared<const Volume>(Grid{}, std::move(channels)),
+                        {.count = 2, .values = {0, 0.5}, .unit = "s"},
+                        "um"};
+  const json description = describeJson(dataset);
+  EXPECT_EQ(description["worldUnit"], "um");
+  EXPECT_EQ(description["times"], json({{"count", 2}, {"values", {0, 0.5}}, {"unit", "s"}}));
+  EXPECT_EQ(description["channels"][0]["color"], "#0080ff");
+  EXPECT_EQ(description["channels"][0]["window"], json({-1.0, 2.5}));
+  EXPECT_EQ(description["channels"][0]["labels"], true);
+  for (const char* absent : {"color", "window", "labels"})
+    EXPECT_FALSE(description["channels"][1].contains(absent)) << absent;
+}
+
 TEST(DatasetStore, FindsById) {
   const auto store = testing::smallStore();
   EXPECT_EQ(store->find("other")->id, "other");
@@ -133,7 +153,11 @@ TEST(DatasetStore, KeepsPathsBelowTheRoot) {
   std::filesystem::create_symlink("/etc", root / "link");
   EXPECT_EQ(pathsBelowRoot({"inside/a.nrrd"}, root).front(),
             std::filesystem::canonical(root) / "inside/a.nrrd");
+  EXPECT_EQ(pathsBelowRoot({"inside/a.nrrd:/../../b"}, root).front(),
+            std::filesystem::canonical(root).string() + "/inside/a.nrrd:/../../b")
+      << "only the file's path is a path";
   EXPECT_THROW(pathsBelowRoot({"../a.nrrd"}, root), Error);
+  EXPECT_THROW(pathsBelowRoot({"link/passwd:b"}, root), Error);
   EXPECT_THROW(pathsBelowRoot({"/etc/passwd"}, root), Error);
   EXPECT_THROW(pathsBelowRoot({"link/passwd"}, root), Error);
   EXPECT_THROW(pathsBelowRoot({"a"}, root / "missing"), Error);

@@ -264,6 +264,31 @@ TEST(SceneResolver, FramesAnotherDatasetByItself) {
   EXPECT_EQ(other->render.camera, resolve.replace({{"dataset", "other"}})->render.camera);
 }
 
+TEST(SceneResolver, TakesColoursAndWindowsThatTheFileStatesAsDefaults) {
+  const auto resolverOf = [](std::size_t count) {
+    std::vector<ChannelSource> channels(count);
+    for (ChannelSource& channel : channels) {
+      channel.voxels = VoxelBuffer(ScalarType::u8, 1);
+      channel.voxels.as<std::uint8_t>()[0] = 7;
+    }
+    channels[0].look = {.color = {{0, 128, 255}}, .window = ValueRange{-1, 2.5}};
+    std::vector<Dataset> datasets;
+    datasets.push_back({"d", "d", {}, std::make_shared<const Volume>(Grid{}, std::move(channels))});
+    return SceneResolver(std::make_shared<const DatasetStore>(std::move(datasets)), {1'000'000});
+  };
+  for (const std::size_t count : {1u, 2u}) {
+    const auto scene = resolverOf(count).replace(json::object());
+    EXPECT_EQ(scene->resolved.channels[0].color, "#0080ff");
+    EXPECT_EQ(scene->render.channels[0].rangeLo, -1);
+    EXPECT_EQ(scene->render.channels[0].rangeHi, 2.5);
+    const auto edited =
+        resolverOf(count).replace({{"channels", {{{"color", "#ff0000"}, {"range", {0, 9}}}}}});
+    EXPECT_EQ(edited->resolved.channels[0].color, "#ff0000");
+    EXPECT_EQ(edited->render.channels[0].rangeHi, 9);
+  }
+  EXPECT_EQ(resolverOf(2).replace(json::object())->resolved.channels[1].color, "#35c9ff");
+}
+
 /// Values 0, 1, 4, 9 and 16 in a row, two world units apart: their gradients are 1, 2, 4, 6 and 7 per voxel,
 /// and the steepest 3.5 per world unit; and a data set without a gradient.
 SceneResolver resolverOfSquares() {

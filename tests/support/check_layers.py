@@ -30,6 +30,7 @@ LIBRARIES = [
     (r"httplib\.h", ["server/net/"]),
     (r"OpenImageIO/", ["renderer/io/", "renderer/data/colormap.cpp"]),
     (r"nifti|teem/", ["renderer/io/"]),
+    (r"(hdf5|netcdf|blosc|zstd|lz4|zip)\.h|openvdb/|gdcm|curl/", ["renderer/io/"]),
     (r"turbojpeg\.h", ["server/encoder.cpp"]),
     (r"tbb/|oneapi/", ["renderer/", "cuda/"]),
 ]

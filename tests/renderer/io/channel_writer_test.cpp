@@ -187,6 +187,7 @@ TEST(TextOfFiles, NumbersAreWholeOrNothing) {
 TEST(TextOfFiles, StemsLoseTheEndingAndItsPacking) {
   EXPECT_EQ(stemOf("/data/T1.nii.gz"), "T1");
   EXPECT_EQ(stemOf("a.b.nrrd"), "a.b");
+  EXPECT_EQ(stemOf("a.b.ome.tif"), "a.b");
   EXPECT_EQ(stemOf("a_2x2x2_uint8.raw.GZ"), "a_2x2x2_uint8");
 }
 

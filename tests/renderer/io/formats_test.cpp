@@ -141,6 +141,7 @@ TEST(NamesInsideFiles, FollowAColonUnlessThePathExistsAsItStands) {
   EXPECT_EQ(split(folder / "a:c:d"), std::pair(plain, std::string("c:d")));
   EXPECT_EQ(split(folder / "a:b:c"), std::pair(plain, std::string("b:c")));
   EXPECT_EQ(split(folder / "z:c"), std::pair(folder / "z:c", std::string()));
+  EXPECT_EQ(split(folder.path() / ""), std::pair(folder.path(), std::string())) << "without the slash";
 }
 
 /// A NRRD of `channels` channels of one voxel, that begin with 0, 1, 2, ...
