@@ -169,7 +169,7 @@ void VoxelBuffer::release(std::size_t first, std::size_t last) {
   // The first page may also hold what is before the voxels. Neighbouring pieces share a page, which stays.
   const std::uintptr_t begin = (start + first * size + pageBytes - 1) / pageBytes * pageBytes,
                        end = (start + last * size) / pageBytes * pageBytes;
-  if (begin < end) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_DONTNEED);
+  if (begin < end) ::madvise(bytes_.get() + (begin - start), end - begin, MADV_DONTNEED);
 }
 
 Volume::Volume(Grid grid, std::vector<ChannelSource> sources, const std::stop_token& stop) : grid_(grid) {
