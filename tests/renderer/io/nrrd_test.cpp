@@ -210,7 +210,7 @@ TEST(NrrdFiles, AFourthAxisIsTimesOrChannels) {
             "2 times, 1 channels");
   EXPECT_EQ(kindOf("sizes: 3 2 1 2\nkinds: domain domain domain time\n", FourthAxis::channel),
             "1 times, 2 channels");
-  EXPECT_EQ(kindOf("sizes: 3 2 1 2\n"), "2 times, 1 channels") << "unmarked";
+  EXPECT_EQ(kindOf("sizes: 2 3 1 2\n"), "2 times, 1 channels") << "unmarked";
   EXPECT_EQ(kindOf("sizes: 2 2 1 3\n"), "1 times, 3 channels") << "unmarked, of 3";
   EXPECT_EQ(kindOf("sizes: 3 2 2 1\n"), "1 times, 3 channels") << "unmarked, the first of 3";
   EXPECT_EQ(kindOf("sizes: 2 2 1 3\nunits: \"mm\" \"mm\" \"mm\" \"s\"\n"), "3 times, 1 channels");
