@@ -26,10 +26,11 @@ class Launcher;
 /// AOVs if they are recorded. The corrections of Method::automatic take more where memory is left.
 std::size_t filmPixelBytes(std::size_t channels, bool aovs);
 
-/// Counts over all samples since the film was reset. Trackers give the same counts on every machine. For
+/// Counts over all samples since the film was reset, and over the corrections of Method::automatic: all that
+/// the picture took, except the choice of the method. Trackers give the same counts on every machine. For
 /// quadrature, `fetches` and `cellSteps` depend on how many rays the processor marches at once.
 struct RenderStats {
-  std::uint64_t rays = 0;
+  std::uint64_t rays = 0;           ///< of the samples; those of corrections are not counted
   std::uint64_t fetches = 0;        ///< trilinear samples of one channel
   std::uint64_t cellSteps = 0;      ///< macrocells visited
   std::uint64_t randomBlocks = 0;   ///< random blocks drawn, of up to four numbers each
@@ -90,12 +91,13 @@ class Renderer {
   /// Whether estimatedError() would have to measure the bias, which is slow. Once measured, the bias is kept
   /// until the film is reset.
   virtual bool errorTakesLong() const = 0;
-  /// Starts counting the cost of samples. Takes a little time and 16 bytes per pixel. Call before setScene().
+  /// Starts counting costs. Takes a little time and, for each pixel, 16 bytes, with corrections 32. Call
+  /// before setScene().
   virtual void countCosts() = 0;
   /// All zero unless costs are counted.
   virtual RenderStats stats() const = 0;
-  /// Starts recording the values that aov() returns, and counting costs. Takes time, and memory for each
-  /// pixel and channel. Resets the film.
+  /// Starts recording the values that aov() returns, and counting the costs of samples, but not those of
+  /// corrections. Takes time, and memory for each pixel and channel. Resets the film.
   virtual void recordAovs() = 0;
   /// All values are NaN unless AOVs are recorded.
   virtual AovValues aov(Aov which) const = 0;

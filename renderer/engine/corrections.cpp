@@ -57,13 +57,13 @@ void Corrections::markRows(const Film& film) {
 }
 
 bool Corrections::render(Launcher& launcher, const RenderPlan& plan, Film& film,
-                         const std::function<bool()>& addLevel, const std::atomic<bool>& cancel,
-                         std::chrono::steady_clock::time_point deadline) {
+                         const std::function<bool()>& addLevel, kernel::SampleCost* cost,
+                         const std::atomic<bool>& cancel, std::chrono::steady_clock::time_point deadline) {
   if (stage_ == Stage::notBegun) beginRows(film, addLevel);
   if (stage_ == Stage::complete) return true;
   Pass pass{&plan,       plan.scene().method,
             plan.view(), sampleNumber(plan.scene().sampling, film.corrections(level_)),
-            nullptr,     nullptr,
+            nullptr,     cost,
             nullptr,     done_.data(),
             &cancel,     deadline};
   // Independent of the samples of the film and of the other levels.

@@ -21,9 +21,10 @@ class Corrections {
 
   /// Renders what is due with the next sample of the film. Returns false if `cancel` became true or the
   /// deadline passed; the next call resumes. `addLevel` adds a level to the film; if it returns false, the
-  /// level begins later. Runs in the caller's thread arena, like Launcher::launch.
+  /// level begins later. `cost` is as in Pass. Runs in the caller's thread arena, like Launcher::launch.
   bool render(Launcher& launcher, const RenderPlan& plan, Film& film, const std::function<bool()>& addLevel,
-              const std::atomic<bool>& cancel, std::chrono::steady_clock::time_point deadline);
+              kernel::SampleCost* cost, const std::atomic<bool>& cancel,
+              std::chrono::steady_clock::time_point deadline);
   /// Adds what render() has completed to the film. Call together with Film::add().
   void add(Film& film);
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The engine: makes render plans, owns the film, has a launcher render passes, and keeps errors, costs and
 // AOVs.
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -18,6 +16,7 @@
 #include "renderer/data/sampling.h"
 #include "renderer/data/scene_checks.h"
 #include "renderer/engine/corrections.h"
+#include "renderer/engine/costs.h"
 #include "renderer/engine/picking.h"
 #include "renderer/engine/pilot.h"
 #include "renderer/engine/step_bias.h"
@@ -90,7 +89,7 @@ class Engine final : public Renderer {
               plan_->view(),
               sampleNumber(plan_->scene().sampling, film_.samples()),
               film_.pass(),
-              counting_ ? cost_.data() : nullptr,
+              costs_.pass(),
               recording_ ? first_.pass() : nullptr,
               done_.data(),
               &cancel,
@@ -98,9 +97,9 @@ class Engine final : public Renderer {
     if (automaticChosen_ && hasStep(automatic_.method)) setResolution(pass.scene, automatic_.resolution);
     bool complete = false;
     launcher_->run([&] {
-      complete = launcher_->launch(pass) &&
-                 corrections_.render(
-                     *launcher_, *plan_, film_, [&] { return addLevel(); }, cancel, pass.deadline);
+      complete = launcher_->launch(pass) && corrections_.render(
+                                                *launcher_, *plan_, film_, [&] { return addLevel(); },
+                                                correctionCosts_.pass(), cancel, pass.deadline);
     });
     return complete;
   }
@@ -110,7 +109,8 @@ class Engine final : public Renderer {
       corrections_.add(film_);
       noise_.reset();
       if (recording_) first_.add(plan_->visibleChannels());
-      if (counting_) addCosts();
+      costs_.add(recording_ ? fetches_.data() : nullptr);
+      correctionCosts_.add();
       std::fill(done_.begin(), done_.end(), std::uint8_t(0));
     });
   }
@@ -134,10 +134,10 @@ class Engine final : public Renderer {
   }
 
   void countCosts() override {
-    counting_ = true;
+    counting_ = countingCorrections_ = true;
     resetRecords();
   }
-  RenderStats stats() const override { return stats_; }
+  RenderStats stats() const override { return withWork(costs_.sums(), correctionCosts_.sums()); }
 
   void recordAovs() override {
     counting_ = recording_ = true;
@@ -213,8 +213,9 @@ class Engine final : public Renderer {
 
   /// Bytes of a film of this size, with all records of its pixels.
   std::size_t filmBytes(std::size_t pixels, const Scene& scene) const {
-    const std::size_t counted = counting_ && !recording_ ? sizeof(kernel::SampleCost) : 0;
-    return pixels * (filmPixelBytes(scene.channels.size(), recording_) + counted);
+    const std::size_t counted = counting_ && !recording_ ? Costs::kPixelBytes : 0;
+    const std::size_t ofCorrections = countingCorrections_ ? Costs::kPixelBytes : 0;
+    return pixels * (filmPixelBytes(scene.channels.size(), recording_) + counted + ofCorrections);
   }
 
   /// Adds a level of corrections to the film, if there is memory for it.
@@ -234,12 +235,12 @@ class Engine final : public Renderer {
 
   void resetRecords() {
     const std::size_t pixels = film_.pixelCount();
-    stats_ = {};
     noise_.reset();
     corrections_.reset(automaticChosen_ ? automatic_.levels : std::vector<Level>());
     try {
       done_.assign(pixels, 0);
-      if (counting_) cost_.assign(pixels, {});
+      costs_.reset(counting_ ? pixels : 0);
+      correctionCosts_.reset(countingCorrections_ && !corrections_.levels().empty() ? pixels : 0);
       if (!recording_ || pixels == 0) return;
       fetches_.assign(pixels, 0);
       first_.reset(pixels, plan_->scene().channels.size());
@@ -248,31 +249,6 @@ class Engine final : public Renderer {
                                            std::to_string(film_.width()) + "x" +
                                            std::to_string(film_.height()) + " pixels");
     }
-  }
-
-  /// Moves the costs of a pass into sums that do not overflow.
-  void addCosts() {
-    const auto add = [&](const auto& range, RenderStats sum) {
-      sum.rays += range.size();
-      for (std::size_t i = range.begin(); i < range.end(); ++i) {
-        sum.fetches += cost_[i].fetches;
-        sum.cellSteps += cost_[i].cellSteps;
-        sum.randomBlocks += cost_[i].randomBlocks;
-        sum.truncatedRays += cost_[i].truncated;
-        if (recording_) fetches_[i] += cost_[i].fetches;
-        cost_[i] = {};
-      }
-      return sum;
-    };
-    const auto join = [](RenderStats a, const RenderStats& b) {
-      a.rays += b.rays;
-      a.fetches += b.fetches;
-      a.cellSteps += b.cellSteps;
-      a.randomBlocks += b.randomBlocks;
-      a.truncatedRays += b.truncatedRays;
-      return a;
-    };
-    stats_ = join(stats_, tbb::parallel_reduce(pixelRange(cost_.size()), RenderStats(), add, join));
   }
 
   /// Those of a film of kLargePicture pixels without records.
@@ -285,9 +261,8 @@ class Engine final : public Renderer {
   std::shared_ptr<const RenderPlan> plan_;  // null until there is a scene
   Film film_;
   std::vector<std::uint8_t> done_;  // pixels that the current pass has rendered
-  bool counting_ = false, recording_ = false;
-  std::vector<kernel::SampleCost> cost_;  // of the current pass, one per pixel while counting
-  RenderStats stats_;
+  bool counting_ = false, countingCorrections_ = false, recording_ = false;
+  Costs costs_, correctionCosts_;       // of the film's samples and of their corrections
   std::vector<std::uint64_t> fetches_;  // one per pixel while recording
   FirstCollisions first_;
   static constexpr std::uint32_t kSamplesWorthBias = 16;
@@ -302,7 +277,7 @@ class Engine final : public Renderer {
 
 std::size_t filmPixelBytes(std::size_t channels, bool aovs) {
   const std::size_t records =
-      aovs ? sizeof(kernel::SampleCost) + sizeof(std::uint64_t) + FirstCollisions::pixelBytes(channels) : 0;
+      aovs ? Costs::kPixelBytes + sizeof(std::uint64_t) + FirstCollisions::pixelBytes(channels) : 0;
   return Film::kPixelBytes + sizeof(std::uint8_t) + records;
 }
 
