@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <string>
 
 #include "renderer/core/error.h"
 
@@ -59,49 +61,82 @@ double uniform(std::uint64_t key, std::uint64_t counter) {
   return double(mixed(key + counter) >> 11) * 0x1p-53;
 }
 
+/// The picture's size.
+glm::ivec2 sizeOf(const Scene& scene, const ReferenceOptions& options) {
+  if (options.samplesPerAxis < 1 || scene.width < 1 || scene.height < 1)
+    throw Error(ErrorCode::badInput, "reference: samples per axis, width and height must be at least 1");
+  const int every = options.every;
+  if (every < 1 || every % 2 == 0 || scene.width % every != 0 || scene.height % every != 0)
+    throw Error(ErrorCode::badInput, "reference: every: expected an odd divisor of the width " +
+                                         std::to_string(scene.width) + " and the height " +
+                                         std::to_string(scene.height) + ", found " + std::to_string(every));
+  if (options.tolerance && !(*options.tolerance > 0 && *options.tolerance < 1))
+    throw Error(ErrorCode::badInput, "reference: the tolerance must be above 0 and below 1");
+  return {scene.width / every, scene.height / every};
+}
+
+Integrator integratorOf(const Volume& volume, const Scene& scene, const ReferenceOptions& options) {
+  return options.tolerance ? Integrator(volume, scene, *options.tolerance) : Integrator(volume, scene);
+}
+
+/// One pixel with the box filter.
+struct BoxPixel {
+  glm::vec4 mean, standardError;
+  double rayError = 0;  ///< the largest of its rays
+};
+
+/// `left`, `top`: its corner. Its rays have the numbers from `firstRay` on.
+BoxPixel boxPixel(const View& view, const Integrator& integrator, double left, double top, int n,
+                  std::uint64_t key, std::uint64_t firstRay) {
+  // Two independent points per stratum: the variance of their mean is a quarter of the squared difference.
+  BoxPixel result;
+  glm::dvec4 sum(0), variance(0);
+  for (int stratum = 0; stratum < n * n; ++stratum) {
+    const int column = stratum % n, line = stratum / n;
+    glm::dvec4 rgba[2];
+    for (std::uint64_t which = 0; which < 2; ++which) {
+      const std::uint64_t ray = firstRay + std::uint64_t(stratum) * 2 + which;
+      const RayResult found = view.look(integrator, left + (column + uniform(key, 2 * ray)) / n,
+                                        top + (line + uniform(key, 2 * ray + 1)) / n);
+      rgba[which] = found.rgba;
+      result.rayError = std::max(result.rayError, found.error);
+    }
+    sum += 0.5 * (rgba[0] + rgba[1]);
+    variance += 0.25 * (rgba[0] - rgba[1]) * (rgba[0] - rgba[1]);
+  }
+  result.mean = glm::vec4(sum / double(n * n));
+  result.standardError = glm::vec4(glm::sqrt(variance) / double(n * n));
+  return result;
+}
+
 }  // namespace
 
-ReferenceImage renderReference(const Volume& volume, const Scene& scene, int samplesPerAxis,
-                               std::uint64_t seed) {
-  if (samplesPerAxis < 1 || scene.width < 1 || scene.height < 1)
-    throw Error(ErrorCode::badInput, "reference: samples per axis, width and height must be at least 1");
-  const Integrator integrator(volume, scene);
+ReferenceImage renderReference(const Volume& volume, const Scene& scene, const ReferenceOptions& options) {
+  const glm::ivec2 size = sizeOf(scene, options);
+  const Integrator integrator = integratorOf(volume, scene, options);
   const View view(scene.camera, scene.width, scene.height);
-  const std::size_t count = std::size_t(scene.width) * std::size_t(scene.height);
-  const int n = samplesPerAxis;
+  const std::size_t count = std::size_t(size.x) * std::size_t(size.y);
+  const int n = options.samplesPerAxis;
   ReferenceImage result;
-  result.image = {scene.width, scene.height, std::vector<glm::vec4>(count)};
+  result.image = {size.x, size.y, std::vector<glm::vec4>(count)};
   result.standardError.assign(count, glm::vec4(0));
   std::vector<double> rayErrors(count);
-  const std::uint64_t key = mixed(seed + 1);
+  const std::uint64_t key = mixed(options.seed + 1);
 
   tbb::parallel_for(std::size_t(0), count, [&](std::size_t pixel) {
-    const double left = double(pixel % std::size_t(scene.width));
-    const std::size_t row = pixel / std::size_t(scene.width);
-    const double top = double(row);
+    const std::size_t row = pixel / std::size_t(size.x), column = pixel % std::size_t(size.x);
+    const double left = double(column) * options.every + options.every / 2;
+    const double top = double(row) * options.every + options.every / 2;
     if (scene.filter == PixelFilter::point) {
       const RayResult ray = view.look(integrator, left + 0.5, top + 0.5);
       result.image.pixels[pixel] = glm::vec4(ray.rgba);
       rayErrors[pixel] = ray.error;
       return;
     }
-    // Two independent points per stratum: the variance of their mean is a quarter of the squared difference.
-    glm::dvec4 sum(0), variance(0);
-    for (int stratum = 0; stratum < n * n; ++stratum) {
-      const int column = stratum % n, line = stratum / n;
-      glm::dvec4 rgba[2];
-      for (std::uint64_t which = 0; which < 2; ++which) {
-        const std::uint64_t ray = (pixel * std::uint64_t(n * n) + std::uint64_t(stratum)) * 2 + which;
-        const RayResult found = view.look(integrator, left + (column + uniform(key, 2 * ray)) / n,
-                                          top + (line + uniform(key, 2 * ray + 1)) / n);
-        rgba[which] = found.rgba;
-        rayErrors[pixel] = std::max(rayErrors[pixel], found.error);
-      }
-      sum += 0.5 * (rgba[0] + rgba[1]);
-      variance += 0.25 * (rgba[0] - rgba[1]) * (rgba[0] - rgba[1]);
-    }
-    result.image.pixels[pixel] = glm::vec4(sum / double(n * n));
-    result.standardError[pixel] = glm::vec4(glm::sqrt(variance) / double(n * n));
+    const BoxPixel box = boxPixel(view, integrator, left, top, n, key, pixel * std::uint64_t(n * n) * 2);
+    result.image.pixels[pixel] = box.mean;
+    result.standardError[pixel] = box.standardError;
+    rayErrors[pixel] = box.rayError;
   });
   result.maximumRayError = *std::max_element(rayErrors.begin(), rayErrors.end());
   return result;

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <glm/vec4.hpp>
+#include <optional>
 #include <vector>
 
 #include "renderer/data/image.h"
@@ -17,10 +18,24 @@ struct ReferenceImage {
   double maximumRayError = 0;  ///< largest RayResult::error of all rays
 };
 
+/// How a reference picture is rendered.
+struct ReferenceOptions {
+  int samplesPerAxis = 1;
+  std::uint64_t seed = 0;
+  std::optional<double> tolerance =
+      std::nullopt;  ///< of the Integrator, in (0, 1); by default the Integrator's own
+  /// Renders only every so many pixels along x and along y: those in the middles of blocks of every x every
+  /// pixels, as a picture that much smaller. Odd, and a divisor of the scene's width and height.
+  int every = 1;
+};
+
 /// Box filter: every pixel is divided into samplesPerAxis^2 strata, and two rays go through random points of
 /// each; their differences give the standard error. Point filter: one ray through the pixel's centre. Throws
-/// Error(badInput) for an invalid scene or camera, or samplesPerAxis < 1.
-ReferenceImage renderReference(const Volume& volume, const Scene& scene, int samplesPerAxis,
-                               std::uint64_t seed = 0);
+/// Error(badInput) for an invalid scene, camera or option.
+ReferenceImage renderReference(const Volume& volume, const Scene& scene, const ReferenceOptions& options);
+inline ReferenceImage renderReference(const Volume& volume, const Scene& scene, int samplesPerAxis,
+                                      std::uint64_t seed = 0) {
+  return renderReference(volume, scene, ReferenceOptions{samplesPerAxis, seed, {}, 1});
+}
 
 }  // namespace scolopax::reference

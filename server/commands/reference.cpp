@@ -11,14 +11,15 @@
 #include "renderer/io/output_file.h"
 #include "renderer/reference/render.h"
 #include "server/commands/scene_arguments.h"
+#include "server/commands/validators.h"
 
 namespace scolopax {
 namespace {
 
-struct ReferenceOptions {
+struct ReferenceArguments {
   SceneArguments scene;
   std::filesystem::path out;
-  int samplesPerAxis = 4;
+  reference::ReferenceOptions options;
 };
 
 double rootMeanSquare(const std::vector<glm::vec4>& values) {
@@ -27,14 +28,15 @@ double rootMeanSquare(const std::vector<glm::vec4>& values) {
   return std::sqrt(sum / (4 * double(values.size())));
 }
 
-void renderTruth(const ReferenceOptions& options) {
-  io::checkImageName(options.out);
-  io::checkWritable(options.out);
-  checkOutputs({options.out}, options.scene);
-  const auto resolved = resolveScene(options.scene);
-  const auto truth = reference::renderReference(*resolved->dataset->volume, resolved->render,
-                                                options.samplesPerAxis, resolved->render.seed);
-  io::writeImage(options.out, truth.image, resolved->render.background);
+void renderTruth(const ReferenceArguments& arguments) {
+  io::checkImageName(arguments.out);
+  io::checkWritable(arguments.out);
+  checkOutputs({arguments.out}, arguments.scene);
+  const auto resolved = resolveScene(arguments.scene);
+  reference::ReferenceOptions options = arguments.options;
+  options.seed = resolved->render.seed;
+  const auto truth = reference::renderReference(*resolved->dataset->volume, resolved->render, options);
+  io::writeImage(arguments.out, truth.image, resolved->render.background);
   fmt::print("largest error of a ray {:.2e}\nnoise of the picture {:.2e} (RMS)\n", truth.maximumRayError,
              rootMeanSquare(truth.standardError));
 }
@@ -44,7 +46,8 @@ void renderTruth(const ReferenceOptions& options) {
 CLI::App* addReferenceCommand(CLI::App& root) {
   CLI::App* command =
       root.add_subcommand("reference", "Render a scene in double precision: slow, the reference for errors");
-  const auto o = std::make_shared<ReferenceOptions>();
+  const auto o = std::make_shared<ReferenceArguments>();
+  o->options.samplesPerAxis = 4;
   addSceneArguments(*command, o->scene);
   command
       ->add_option("-o,--output", o->out,
@@ -52,10 +55,24 @@ CLI::App* addReferenceCommand(CLI::App& root) {
       ->required();
   command
       ->add_option(
-          "--samples-per-axis", o->samplesPerAxis,
+          "--samples-per-axis", o->options.samplesPerAxis,
           "Strata per pixel along x and along y, with two rays in each; with image.filter=point one ray goes "
           "through the\npixel's centre, and there is no noise")
       ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  command
+      ->add_option("--tolerance", o->options.tolerance,
+                   "Error of a piece of a ray, as a share of the alpha that it adds. Less takes longer, most "
+                   "with shadows.\n"
+                   "Default: " +
+                       fmt::format("{:g}, with shading or shadows {:g}", reference::Integrator::kTolerance,
+                                   reference::Integrator::kToleranceLit))
+      ->check(numberUpTo(0.1, false));
+  command
+      ->add_option("--every", o->options.every,
+                   "Render only every so many pixels along x and along y, into a picture that much smaller: "
+                   "an odd divisor of both")
+      ->check(CLI::Range(1, 65535))
       ->capture_default_str();
   command->footer(
       "Prints the largest estimated error of a ray, and the noise that remains from sampling the pixels' "

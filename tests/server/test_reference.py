@@ -40,6 +40,26 @@ class Reference(CommandTest):
         self.assertLess(0.7 * expected, self.rmse("a.exr", "b.exr"))
         self.assertGreater(1.4 * expected, self.rmse("a.exr", "b.exr"))
 
+    def test_has_the_tolerance_that_it_is_given(self):
+        point = ["--set", "image.filter=point"]
+        errors = []
+        for tolerance in ((), ("--tolerance", "1e-6")):
+            told = self.picture("reference", "truth.exr", *point, *tolerance)
+            errors.append(float(told.split("largest error of a ray ")[1].split()[0]))
+        self.assertLess(errors[1], 0.1 * errors[0])
+        for bad in ("0", "-1", "nan", "1"):
+            self.assertEqual(self.run_command("reference", "--data", *self.data, "-o", self.path("t.exr"), "--tolerance",
+                                              bad).returncode, 2, bad)
+
+    def test_renders_every_third_pixel_alone(self):
+        size = ["--set", "image.width=27", "--set", "image.height=21", "--set", "image.filter=point"]
+        self.picture("reference", "few.exr", *size, "--every", "3")
+        self.picture("reference", "small.exr", "--set", "image.width=9", "--set", "image.height=7", *size[4:])
+        self.assertLess(self.rmse("few.exr", "small.exr"), 1e-6)  # the same rays
+        done = self.run_command("reference", "--data", *self.data, *SMALL, "-o", self.path("t.exr"), "--every", "3")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("an odd divisor of the width 24 and the height 20, found 3", done.stderr)
+
     def test_refuses_what_it_cannot_write(self):
         for out in (self.data[0], self.path("truth.bmp"), self.path("no/truth.exr")):
             done = self.run_command("reference", "--data", *self.data, "-o", out)

@@ -136,6 +136,65 @@ TEST(RenderReference, TheSameSeedIsTheSamePicture) {
   EXPECT_NE(a.image.pixels, renderReference(view.volume, view.scene, 2, 8).image.pixels);
 }
 
+TEST(RenderReference, EveryThirdPixelIsThatOfTheWholePicture) {
+  CubeView view;
+  view.scene.width = view.scene.height = 9;
+  view.scene.filter = PixelFilter::point;
+  view.scene.camera = perspective({3, 4, 5}, {0.5, 0, 0}, {0, 0, 1}, 60);
+  const ReferenceImage whole = renderReference(view.volume, view.scene, 1);
+  const ReferenceImage few = renderReference(view.volume, view.scene, {.every = 3});
+  ASSERT_EQ(few.image.width, 3);
+  ASSERT_EQ(few.image.height, 3);
+  for (int y = 0; y < 3; ++y)
+    for (int x = 0; x < 3; ++x)
+      EXPECT_EQ(few.image.pixels[std::size_t(x + 3 * y)], view.pixel(whole, 3 * x + 1, 3 * y + 1))
+          << x << ' ' << y;
+  // With the box filter, pixels keep their area: that with the edge at 0.3 has 0.3 of the alpha.
+  view.scene.filter = PixelFilter::box;
+  view.scene.camera = {
+      .eye = {0.8, 0, 10}, .target = {0.8, 0, 0}, .up = {0, 1, 0}, .orthoHeight = 9.0};  // edge at pixel 1.7
+  const ReferenceImage box = renderReference(view.volume, view.scene, {.samplesPerAxis = 16, .every = 3});
+  EXPECT_NEAR(box.image.pixels[3].a, 0.3 * (1 - std::exp(-0.4 * 4)), 0.01);
+}
+
+TEST(RenderReference, ASmallerToleranceIsSmallerAnErrorInLight) {
+  // A ball in the light and shadow of a lump beside it.
+  const Volume volume =
+      makeVolume(gridOf(glm::ivec3(6), glm::dvec3(1), glm::dvec3(-2.5)), {[](int i, int j, int k) {
+                   return std::max(0, 9 - (i - 2) * (i - 2) - (j - 3) * (j - 3) - (k - 2) * (k - 2)) +
+                          (i == 5 && j > 3 ? 9 : 0);
+                 }});
+  Scene scene = makeScene({ramp(0, 9, 0.8)});
+  scene.camera = perspective({2, 3, 12}, {0, 0, 0}, {0, 1, 0}, 35);
+  scene.width = scene.height = 8;
+  scene.filter = PixelFilter::point;
+  scene.shading = scene.shadows = true;
+  scene.lights.resize(1);
+  scene.lights[0].type = LightType::directional;
+  scene.lights[0].vector = {-1, -0.4, -0.3};
+  const ReferenceImage best = renderReference(volume, scene, {.tolerance = 1e-7});
+  double before = 1;
+  for (const double tolerance : {1e-4, 1e-5, 1e-6}) {
+    const ReferenceImage found = renderReference(volume, scene, {.tolerance = tolerance});
+    double largest = 0;
+    for (std::size_t i = 0; i < best.image.pixels.size(); ++i)
+      for (int c = 0; c < 4; ++c)
+        largest =
+            std::max(largest, std::abs(double(found.image.pixels[i][c]) - double(best.image.pixels[i][c])));
+    EXPECT_LT(largest, found.maximumRayError + best.maximumRayError + 1e-7) << tolerance;
+    EXPECT_LT(found.maximumRayError, 0.3 * before) << tolerance;
+    before = found.maximumRayError;
+  }
+}
+
+TEST(RenderReference, RefusesOptionsThatMakeNoSense) {
+  const CubeView view;  // 8x8
+  for (const int every : {0, -1, 2, 3})
+    EXPECT_THROW(renderReference(view.volume, view.scene, {.every = every}), Error) << every;
+  for (const double tolerance : {0.0, -1.0, 1.0, std::nan("")})
+    EXPECT_THROW(renderReference(view.volume, view.scene, {.tolerance = tolerance}), Error) << tolerance;
+}
+
 TEST(RenderReference, RefusesWhatCannotBeSeen) {
   CubeView view;
   EXPECT_THROW(renderReference(view.volume, view.scene, 0), Error);
