@@ -2,9 +2,13 @@
 #include "renderer/cpu/instruction_set.h"
 
 #include <cstdlib>
-#include <string_view>
 
 namespace scolopax {
+
+std::string_view nameOf(InstructionSet set) {
+  constexpr std::string_view names[] = {"baseline", "avx2", "avx512"};
+  return names[int(set)];
+}
 
 bool available(InstructionSet set) {
   switch (set) {

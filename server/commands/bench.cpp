@@ -7,21 +7,18 @@
 #include <malloc.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <filesystem>
-#include <map>
 #include <memory>
 
 #include "protocol/scene_json.h"
 #include "renderer/core/error.h"
+#include "renderer/cpu/instruction_set.h"
 #include "renderer/data/scene_checks.h"
 #include "renderer/data/shared_macrocells.h"
 #include "renderer/io/image_file.h"
 #include "renderer/io/output_file.h"
-#include "renderer/metrics/flip.h"
-#include "renderer/metrics/metrics.h"
 #include "renderer/reference/render.h"
+#include "server/commands/bench_measure.h"
 #include "server/commands/bench_points.h"
 #include "server/commands/render_device.h"
 #include "server/commands/scene_arguments.h"
@@ -32,9 +29,9 @@ namespace scolopax {
 namespace {
 
 using bench::Point;
+using bench::Renderers;
 using bench::Setting;
 using nlohmann::ordered_json;
-using Clock = std::chrono::steady_clock;
 
 struct BenchOptions {
   SceneArguments scene;
@@ -46,15 +43,10 @@ struct BenchOptions {
   std::string device = "cpu";
   int repetitions = 3;
   double longest = 10;
+  std::optional<double> automaticLongest, until;
   std::filesystem::path truth, json;
   bool timesOnly = false;
 };
-
-const std::atomic<bool> kNeverCancel = false;
-
-double secondsSince(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 /// In ascending order, without duplicates.
 template <class Number>
@@ -81,78 +73,11 @@ std::vector<Setting> settingsOf(const BenchOptions& options) {
   return settings;
 }
 
-Scene sceneOf(Scene scene, const Setting& setting) {
-  scene.method = setting.method;
-  scene.macrocell = setting.macrocell;
-  if (hasStep(setting.method)) scene.step = setting.step;
-  return scene;
-}
-
-/// One renderer for every number of threads.
-using Renderers = std::map<int, std::unique_ptr<Renderer>>;
-
 Renderers renderersFor(const std::shared_ptr<const Volume>& volume, const BenchOptions& options) {
   Renderers renderers;
   for (const int threads : options.threads)
     renderers[threads] = rendererFactory(options.device, threads).make(volume);
   return renderers;
-}
-
-/// The settings with every number of samples that stays within the longest time, as predicted by one sample,
-/// which also warms up the renderer. The smallest number is always kept. Separate renderers count costs,
-/// since counting is slow.
-std::vector<Point> pointsOf(const BenchOptions& options, const Renderers& renderers,
-                            const Renderers& counting, const Scene& scene) {
-  std::vector<Point> points;
-  const std::vector<std::uint32_t> samples = ordered(options.samples);
-  int leftOut = 0;
-  for (const Setting& setting : settingsOf(options)) {
-    Point point{setting, {}, {}, {}, 0, {}, 0, 0};
-    Renderer& counter = *counting.at(setting.threads);
-    counter.setScene(sceneOf(scene, setting));
-    counter.renderSample(kNeverCancel);
-    point.counts = counter.stats();
-    Renderer& renderer = *renderers.at(setting.threads);
-    point.rebuildMs = renderer.setScene(sceneOf(scene, setting)).rebuildMs;
-    const auto begin = Clock::now();
-    renderer.renderSample(kNeverCancel);
-    const double one = secondsSince(begin);
-    for (const std::uint32_t count : samples) {
-      if (count > samples.front() && count * one > options.longest) {
-        ++leftOut;
-        continue;
-      }
-      point.samples = count;
-      points.push_back(point);
-    }
-  }
-  if (leftOut > 0)
-    fmt::print(stderr, "scolopax: skipped {} points that would take longer than {:g} s\n", leftOut,
-               options.longest);
-  return points;
-}
-
-/// The pixels whose centres are also pixel centres of a picture `factor` (odd) times smaller.
-Image thinned(const Image& image, int factor) {
-  Image small{image.width / factor, image.height / factor, {}};
-  for (int y = factor / 2; y < image.height; y += factor)
-    for (int x = factor / 2; x < image.width; x += factor)
-      small.pixels.push_back(image.pixels[std::size_t(y) * std::size_t(image.width) + std::size_t(x)]);
-  return small;
-}
-
-void measure(Point& point, Renderer& renderer, const Scene& scene, const std::optional<Image>& truth) {
-  renderer.setScene(sceneOf(scene, point));
-  const auto begin = Clock::now();
-  point.samplesTimed = 0;
-  for (; renderer.samples() < point.samples; ++point.samplesTimed) renderer.renderSample(kNeverCancel);
-  point.seconds.push_back(secondsSince(begin));
-  if (!truth) return;
-  const Image image = thinned(renderer.image(), scene.width / truth->width);
-  point.squaredErrors.push_back(std::pow(compareImages(image, *truth).rmse, 2));
-  if (point.seconds.size() == 1) point.flip = flipDifference(image, *truth).mean;
-  point.sum.resize(image.pixels.size(), glm::dvec4(0));
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) point.sum[i] += glm::dvec4(image.pixels[i]);
 }
 
 /// Bytes allocated in the whole program.
@@ -227,20 +152,17 @@ void run(BenchOptions options) {
   for (const int macrocell : options.macrocells) held.push_back(sharedMacrocells(volume, macrocell));
   const Renderers renderers = renderersFor(volume, options), counting = renderersFor(volume, options);
   for (const auto& [threads, renderer] : counting) renderer->countCosts();
-  std::vector<Point> points = pointsOf(options, renderers, counting, scene);
-  // Every picture has its own seed, so that no picture continues the samples of the previous one.
-  scene.seed = resolved->render.seed;
-  for (int repetition = 0; repetition < options.repetitions; ++repetition)
-    for (Point& point : points) {
-      ++scene.seed;
-      measure(point, *renderers.at(point.threads), scene, truth);
-    }
+  const std::vector<Point> points =
+      bench::measure({settingsOf(options), ordered(options.samples), options.repetitions, options.longest,
+                      options.automaticLongest.value_or(options.longest), options.until},
+                     renderers, counting, scene, truth);
 
   ordered_json result = bench::report(points, truth, std::size_t(scene.width) * std::size_t(scene.height));
   result["memory"] = memory;
   result["scene"] = ordered_json::parse(protocol::toJson(resolved->resolved).dump());
   result["picked"] = nameOf(resolved->render.method);
   result["repetitions"] = options.repetitions;
+  result["instructions"] = nameOf(fastestInstructionSet());
   if (options.json.empty())
     bench::print(result);
   else
@@ -281,18 +203,33 @@ CLI::App* addBenchCommand(CLI::App& root) {
                    "Skip sample counts that would take more seconds than this, except the smallest")
       ->check(numberUpTo(1e9, false))
       ->capture_default_str();
+  command
+      ->add_option(
+          "--auto-longest", o->automaticLongest,
+          "The same for auto, whose time to an error is measured and not extrapolated; default: --longest")
+      ->check(numberUpTo(1e9, false));
   auto* truth =
       command->add_option("--truth", o->truth,
                           "Reference picture for the errors, made by scolopax reference with "
                           "image.filter=point. It may be smaller by an odd factor;\nthen only the pixels at "
                           "the centres of its pixels count. By default, the reference is rendered");
+  auto* until = command
+                    ->add_option("--until", o->until,
+                                 "Double the samples until the RMSE is at most this, or more samples cannot "
+                                 "help, or one of the limits above is reached")
+                    ->check(numberUpTo(1e9, false));
   command->add_flag("--times-only", o->timesOnly, "Times and counts only, no reference and no errors")
-      ->excludes(truth);
+      ->excludes(truth)
+      ->excludes(until);
   command->add_option("--json", o->json, "Write the numbers to this file instead of printing a table");
   command->footer(
       "Samples go through the pixels' centres, where the reference has no noise. Methods without a step are\n"
       "unbiased; their 1 / (MSE x seconds) is compared with that of sync-dda at the same number of samples\n"
-      "(to sync). The bias is the error that remains when the pictures of all repetitions are averaged.");
+      "(to sync). The bias is the error that remains when the pictures of all repetitions are averaged. "
+      "setScene\n"
+      "is the time before the first sample, in which auto chooses; times to an error include it. Fetches, "
+      "cells\n"
+      "and randoms are per ray, and include those of auto's corrections.");
   command->callback([o] { run(*o); });
   return command;
 }

@@ -15,37 +15,56 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr double kTargets[] = {1e-2, 1e-3};  // RMSE
+Reached reachedWith(const Point& point, double samples) {
+  return {point.setSceneTime() + point.time() * samples / point.samples, samples, point.step};
+}
 
-/// Whether an error remains after any number of samples. `auto` may choose a biased method.
-bool isBiased(Method method) { return hasStep(method) || method == Method::automatic; }
+/// The samples that a biased point needs, if it shows them.
+std::optional<double> samplesAboveBias(double wanted, const Point& point, const Image& truth) {
+  const double bias = squaredBias(point, truth);
+  double samples = point.samples;
+  if (bias < 0.5 * wanted)
+    samples = std::max(1.0, std::ceil(samples * std::max(0.0, point.mse() - bias) / (wanted - bias)));
+  else if (point.mse() > wanted)
+    return std::nullopt;
+  if (samples > kMaxReach * point.samples) return std::nullopt;
+  return samples;
+}
 
-struct Reached {
-  double seconds, samples, step;
-};
-
-/// The fastest way to the target among one method's points, if any reaches it.
-std::optional<Reached> reach(double target, const std::vector<const Point*>& points,
-                             const std::optional<Image>& truth) {
-  std::optional<Reached> best;
-  const double wanted = target * target;
+std::optional<Reached> interpolated(double wanted, std::span<const Point* const> points) {
+  const Point* before = nullptr;
   for (const Point* point : points) {
-    double samples = point->samples;
-    if (!isBiased(point->method)) {
-      samples = std::max(1.0, samples * point->mse() / wanted);
-      best.reset();  // the last point has the most samples
-    } else {
-      const double bias = squaredBias(*point, *truth);
-      if (bias < 0.5 * wanted)
-        samples = std::max(1.0, std::ceil(samples * std::max(0.0, point->mse() - bias) / (wanted - bias)));
-      else if (point->mse() > wanted)
-        continue;
-      if (samples > kMaxReach * point->samples) continue;
+    if (point->mse() > wanted) {
+      before = point;
+      continue;
     }
-    const double seconds = point->time() * samples / point->samples;
-    if (!best || seconds < best->seconds) best = {seconds, samples, point->step};
+    if (!before) return reachedWith(*point, point->samples);
+    const double w =
+        point->mse() > 0 ? std::log(before->mse() / wanted) / std::log(before->mse() / point->mse()) : 1;
+    const auto between = [&](double a, double b) { return a * std::pow(b / a, w); };
+    return Reached{point->setSceneTime() + between(before->time(), point->time()),
+                   between(before->samples, point->samples), 0};
   }
-  return best;
+  return std::nullopt;
+}
+
+ordered_json choiceOf(const Point& point) {
+  ordered_json corrections = ordered_json::array();
+  for (const Choice::Correction& level : point.choice.corrections)
+    corrections.push_back({{"step", level.step}, {"passes", level.passes}});
+  return {{"method", nameOf(point.choice.method)},
+          {"step", hasStep(point.choice.method) ? ordered_json(point.choice.step) : ordered_json()},
+          {"corrections", corrections}};
+}
+
+/// What the renderer says of its error, and by how many times that differs from the true one: medians.
+void addEstimates(ordered_json& row, const Point& point) {
+  if (point.estimates.empty()) return;
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < point.estimates.size(); ++i)
+    ratios.push_back(point.estimates[i] / std::sqrt(point.squaredErrors[i]));
+  row["estimatedError"] = median(point.estimates);
+  row["estimateToError"] = median(ratios);
 }
 
 ordered_json rowOf(const Point& point, const std::optional<Image>& truth, std::size_t pixels) {
@@ -57,32 +76,43 @@ ordered_json rowOf(const Point& point, const std::optional<Image>& truth, std::s
                       {"macrocell", point.macrocell},
                       {"threads", point.threads},
                       {"seconds", point.time()},
+                      {"setSceneSeconds", point.setSceneTime()},
                       {"samplesTimed", point.samplesTimed},
                       {"nsPerRay", 1e9 * point.time() / rays},
                       {"rebuildMs", point.rebuildMs},
+                      {"samplesCounted", point.samplesCounted},
                       {"fetchesPerRay", double(point.counts.fetches) / counted},
                       {"cellStepsPerRay", double(point.counts.cellSteps) / counted},
-                      {"randomBlocksPerRay", double(point.counts.randomBlocks) / counted}};
+                      {"randomBlocksPerRay", double(point.counts.randomBlocks) / counted},
+                      {"truncatedRays", point.counts.truncatedRays}};
+  if (point.method == Method::automatic) row["choice"] = choiceOf(point);
   if (!truth) return row;
   row["rmse"] = std::sqrt(point.mse());
   row["psnr"] = -10 * std::log10(point.mse());
   row["flip"] = point.flip;
   row["bias"] = std::sqrt(squaredBias(point, *truth));
+  addEstimates(row, point);
   return row;
 }
 
 }  // namespace
 
-double Point::time() const {
-  std::vector<double> sorted = seconds;
-  std::nth_element(sorted.begin(), sorted.begin() + std::ptrdiff_t(sorted.size() / 2), sorted.end());
-  return sorted[sorted.size() / 2];
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
 }
+
+double Point::time() const { return median(seconds); }
+double Point::setSceneTime() const { return median(setSceneSeconds); }
 
 double Point::mse() const {
   double all = 0;
   for (const double e : squaredErrors) all += e;
   return all / double(squaredErrors.size());
+}
+
+bool hasNoiseLaw(const Point& point) {
+  return !hasStep(point.method) && !(point.method == Method::automatic && hasStep(point.choice.method));
 }
 
 double squaredBias(const Point& point, const Image& truth) {
@@ -91,6 +121,22 @@ double squaredBias(const Point& point, const Image& truth) {
   for (const glm::dvec4& v : point.sum) mean.pixels.push_back(glm::vec4(v / k));
   const double ofMean = std::pow(compareImages(mean, truth).rmse, 2);
   return std::max(0.0, (k * ofMean - point.mse()) / (k - 1));
+}
+
+std::optional<Reached> reach(double rmse, std::span<const Point* const> points,
+                             const std::optional<Image>& truth) {
+  const double wanted = rmse * rmse;
+  const Point& last = *points.back();
+  if (hasNoiseLaw(last)) return reachedWith(last, std::max(1.0, last.samples * last.mse() / wanted));
+  if (!isBiased(last)) return interpolated(wanted, points);
+  std::optional<Reached> best;
+  for (const Point* point : points) {
+    const auto samples = samplesAboveBias(wanted, *point, *truth);
+    if (!samples) continue;
+    const Reached found = reachedWith(*point, *samples);
+    if (!best || found.seconds < best->seconds) best = found;
+  }
+  return best;
 }
 
 ordered_json report(const std::vector<Point>& points, const std::optional<Image>& truth, std::size_t pixels) {
@@ -105,7 +151,7 @@ ordered_json report(const std::vector<Point>& points, const std::optional<Image>
     rows.push_back(rowOf(point, truth, pixels));
     if (!truth) continue;
     const auto sync = yardstick.find(conditions(point));
-    if (!isBiased(point.method) && sync != yardstick.end())
+    if (hasNoiseLaw(point) && sync != yardstick.end())
       rows.back()["efficiencyToSyncDda"] = point.efficiency() / sync->second->efficiency();
     groups[{point.method, point.macrocell, point.threads}].push_back(&point);
   }
@@ -125,16 +171,16 @@ ordered_json report(const std::vector<Point>& points, const std::optional<Image>
 }
 
 void print(const ordered_json& result) {
-  fmt::print("{:<11}{:>8}{:>6}{:>5}{:>4}{:>11}{:>9}{:>9}{:>8}{:>9}{:>11}{:>8}{:>9}{:>11}{:>9}\n", "method",
-             "samples", "step", "cell", "thr", "seconds", "ns/ray", "fetches", "cells", "randoms", "RMSE",
-             "PSNR", "FLIP", "bias", "to sync");
+  fmt::print("{:<11}{:>8}{:>6}{:>5}{:>4}{:>11}{:>10}{:>9}{:>9}{:>8}{:>9}{:>11}{:>8}{:>9}{:>11}{:>9}\n",
+             "method", "samples", "step", "cell", "thr", "seconds", "setScene", "ns/ray", "fetches", "cells",
+             "randoms", "RMSE", "PSNR", "FLIP", "bias", "to sync");
   for (const auto& row : result["points"]) {
     const auto number = [&](const char* name) { return row[name].get<double>(); };
-    fmt::print("{:<11}{:>8}{:>6}{:>5}{:>4}{:>11.4g}{:>9.0f}{:>9.2f}{:>8.2f}{:>9.2f}",
+    fmt::print("{:<11}{:>8}{:>6}{:>5}{:>4}{:>11.4g}{:>10.2g}{:>9.0f}{:>9.2f}{:>8.2f}{:>9.2f}",
                row["method"].get<std::string>(), row["samples"].get<std::uint32_t>(),
                row["step"].is_null() ? "" : fmt::format("{:g}", number("step")), row["macrocell"].get<int>(),
-               row["threads"].get<int>(), number("seconds"), number("nsPerRay"), number("fetchesPerRay"),
-               number("cellStepsPerRay"), number("randomBlocksPerRay"));
+               row["threads"].get<int>(), number("seconds"), number("setSceneSeconds"), number("nsPerRay"),
+               number("fetchesPerRay"), number("cellStepsPerRay"), number("randomBlocksPerRay"));
     if (row.contains("rmse"))
       fmt::print("{:>11.3e}{:>8.2f}{:>9.4f}{:>11.2e}", number("rmse"), number("psnr"), number("flip"),
                  number("bias"));

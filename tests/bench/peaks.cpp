@@ -170,9 +170,7 @@ Drawn drawOurs(const json& setting, const Data& data, bool counting, std::uint32
   while (renderer->samples() < setting.value("samples", 1u)) renderer->renderSample(never);
   drawn.seconds = secondsSince(begin);
   drawn.image = renderer->image();
-  // The renderer does not count the fetches of the corrections of `auto`.
-  if (counting && scene.method != Method::automatic)
-    drawn.fetches = double(renderer->stats().fetches) / double(drawn.image.pixels.size());
+  if (counting) drawn.fetches = double(renderer->stats().fetches) / double(drawn.image.pixels.size());
   return drawn;
 }
 
