@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`scolopax bench`: its numbers are consistent with each other and with the known properties of the methods."""
 import json
+import math
 import os
 import unittest
 
@@ -40,6 +41,47 @@ class Bench(CommandTest):
         for t in told["timeToError"][:4]:
             # For a tenth of the error, a tracker needs a hundred times the samples.
             self.assertAlmostEqual(t["secondsToRmse0.001"], 100 * t["secondsToRmse0.01"], delta=t["secondsToRmse0.01"])
+
+    def measured(self, *options):
+        done = self.bench(*options, "--json", self.path("b.json"))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with open(self.path("b.json"), encoding="utf-8") as file:
+            return json.load(file)
+
+    def test_counts_the_choice_and_the_corrections_of_auto(self):
+        told = self.measured("--methods", "auto", "--samples", "1,64", "--steps", "1")
+        first, last = told["points"]
+        self.assertEqual(first["choice"]["corrections"], [])
+        self.assertGreater(len(last["choice"]["corrections"]), 0)
+        chosen = first["choice"]
+        base = self.measured("--methods", chosen["method"], "--samples", "1,64", "--steps", str(chosen["step"] or 0))
+        self.assertEqual(first["fetchesPerRay"], base["points"][0]["fetchesPerRay"])
+        self.assertGreater(last["fetchesPerRay"], base["points"][1]["fetchesPerRay"])
+        self.assertEqual([first["samplesCounted"], last["samplesCounted"]], [1, 64])
+        # An error that the first point has.
+        easy = next(t for t in told["timeToError"])
+        self.assertLess(first["rmse"], 1e-2)
+        self.assertAlmostEqual(easy["secondsToRmse0.01"], first["seconds"] + first["setSceneSeconds"])
+        self.assertIn(told["instructions"], ("baseline", "avx2", "avx512"))
+        # Estimates are of two samples and more.
+        self.assertNotIn("estimateToError", first)
+        self.assertLess(abs(math.log2(last["estimateToError"])), 1)
+
+    def test_doubles_samples_until_an_error(self):
+        told = self.measured("--methods", "auto,superposed,raymarch", "--samples", "1", "--steps", "1", "--until", "1e-3",
+                             "--longest", "0.2", "--auto-longest", "60")
+        points = {}
+        for point in told["points"]:
+            points.setdefault(point["method"], []).append(point)
+        for method, ascending in points.items():
+            self.assertEqual([p["samples"] for p in ascending], [2**n for n in range(len(ascending))], method)
+            for point in ascending[:-1]:
+                self.assertGreater(point["rmse"], 1e-3, method)
+        self.assertLessEqual(points["auto"][-1]["rmse"], 1e-3)
+        # The bias of the step remains, so that samples are not doubled for ever.
+        self.assertGreater(points["raymarch"][-1]["rmse"], 1e-3)
+        self.assertLess(len(points["raymarch"]), 8)
+        self.assertEqual(self.bench("--until", "1e-3", "--times-only").returncode, 2)
 
     def test_takes_its_truth_from_a_picture_of_the_same_pixel_centres(self):
         truth = []
