@@ -66,8 +66,8 @@ glm::ivec2 sizeOf(const Scene& scene, const ReferenceOptions& options) {
   if (options.samplesPerAxis < 1 || scene.width < 1 || scene.height < 1)
     throw Error(ErrorCode::badInput, "reference: samples per axis, width and height must be at least 1");
   const int every = options.every;
-  if (every < 1 || every % 2 == 0 || scene.width % every != 0 || scene.height % every != 0)
-    throw Error(ErrorCode::badInput, "reference: every: expected an odd divisor of the width " +
+  if (every < 1 || scene.width % every != 0 || scene.height % every != 0)
+    throw Error(ErrorCode::badInput, "reference: every: expected a divisor of the width " +
                                          std::to_string(scene.width) + " and the height " +
                                          std::to_string(scene.height) + ", found " + std::to_string(every));
   if (options.tolerance && !(*options.tolerance > 0 && *options.tolerance < 1))

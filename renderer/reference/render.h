@@ -24,8 +24,8 @@ struct ReferenceOptions {
   std::uint64_t seed = 0;
   std::optional<double> tolerance =
       std::nullopt;  ///< of the Integrator, in (0, 1); by default the Integrator's own
-  /// Renders only every so many pixels along x and along y: those in the middles of blocks of every x every
-  /// pixels, as a picture that much smaller. Odd, and a divisor of the scene's width and height.
+  /// Renders only every so many pixels along x and along y, numbers every / 2, every / 2 + every and so on,
+  /// as a picture that much smaller. A divisor of the scene's width and height.
   int every = 1;
 };
 

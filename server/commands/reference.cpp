@@ -69,9 +69,10 @@ CLI::App* addReferenceCommand(CLI::App& root) {
                                    reference::Integrator::kToleranceLit))
       ->check(numberUpTo(0.1, false));
   command
-      ->add_option("--every", o->options.every,
-                   "Render only every so many pixels along x and along y, into a picture that much smaller: "
-                   "an odd divisor of both")
+      ->add_option(
+          "--every", o->options.every,
+          "Render only every so many pixels along x and along y, into a picture that much smaller; a "
+          "divisor of\nwidth and height. Of 3, numbers 1, 4, 7, ... counted from 0")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
   command->footer(

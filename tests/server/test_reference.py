@@ -58,7 +58,7 @@ class Reference(CommandTest):
         self.assertLess(self.rmse("few.exr", "small.exr"), 1e-6)  # the same rays
         done = self.run_command("reference", "--data", *self.data, *SMALL, "-o", self.path("t.exr"), "--every", "3")
         self.assertEqual(done.returncode, 1)
-        self.assertIn("an odd divisor of the width 24 and the height 20, found 3", done.stderr)
+        self.assertIn("a divisor of the width 24 and the height 20, found 3", done.stderr)
 
     def test_refuses_what_it_cannot_write(self):
         for out in (self.data[0], self.path("truth.bmp"), self.path("no/truth.exr")):

@@ -149,6 +149,11 @@ TEST(RenderReference, EveryThirdPixelIsThatOfTheWholePicture) {
     for (int x = 0; x < 3; ++x)
       EXPECT_EQ(few.image.pixels[std::size_t(x + 3 * y)], view.pixel(whole, 3 * x + 1, 3 * y + 1))
           << x << ' ' << y;
+  // Of an even number, the second pixel of the middle two.
+  view.scene.width = view.scene.height = 4;
+  EXPECT_EQ(renderReference(view.volume, view.scene, {.every = 4}).image.pixels[0],
+            view.pixel(renderReference(view.volume, view.scene, 1), 2, 2));
+  view.scene.width = view.scene.height = 9;
   // With the box filter, pixels keep their area: that with the edge at 0.3 has 0.3 of the alpha.
   view.scene.filter = PixelFilter::box;
   view.scene.camera = {
@@ -189,7 +194,7 @@ TEST(RenderReference, ASmallerToleranceIsSmallerAnErrorInLight) {
 
 TEST(RenderReference, RefusesOptionsThatMakeNoSense) {
   const CubeView view;  // 8x8
-  for (const int every : {0, -1, 2, 3})
+  for (const int every : {0, -1, 3, 16})
     EXPECT_THROW(renderReference(view.volume, view.scene, {.every = every}), Error) << every;
   for (const double tolerance : {0.0, -1.0, 1.0, std::nan("")})
     EXPECT_THROW(renderReference(view.volume, view.scene, {.tolerance = tolerance}), Error) << tolerance;
