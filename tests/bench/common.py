@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shared by the experiments: program, scenes and their data, reference pictures, and calls of `scolopax bench`."""
-import hashlib
+import functools
 import json
 import os
 import platform
@@ -8,6 +8,9 @@ import subprocess
 import sys
 import tempfile
 import time
+
+from store import Store, content_hash
+from truths import Truths, assignments
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 PROGRAM = os.environ.get("SCOLOPAX", os.path.join(HERE, "../../build/release/scolopax"))
@@ -29,18 +32,24 @@ SCENES = {
 MULTICHANNEL = ("orbitals", "tcga", "stroke", "cells", "many")
 
 
+def instructions(program=PROGRAM):
+    """The vector instructions that the program uses here, "AVX-512" for example. An upper limit is set by
+    SCOLOPAX_INSTRUCTIONS; if the processor has fewer, they are what it has."""
+    told = subprocess.run([program, "info", "--devices"], check=True, stdout=subprocess.PIPE, text=True).stdout
+    return told.splitlines()[0].split(", ", 1)[1]
+
+
+@functools.lru_cache(maxsize=None)
 def processor():
+    """Model, threads and instructions."""
     with open("/proc/cpuinfo", encoding="utf-8") as file:
         names = [line.split(":")[1].strip() for line in file if line.startswith("model name")]
-    return f"{names[0]}, {len(names)} threads" if names else platform.processor()
+    name = f"{names[0]}, {len(names)} threads" if names else platform.processor()
+    return f"{name}, {instructions()}"
 
 
 def median(values):
     return sorted(values)[len(values) // 2]
-
-
-def assignments(settings):
-    return [word for path, value in settings.items() for word in ("--set", f"{path}={json.dumps(value)}")]
 
 
 def light_settings(light):
@@ -48,16 +57,18 @@ def light_settings(light):
 
 
 class Bench:
-    """Runs the program on scenes; its output goes to `folder`, reference pictures to `truths`."""
+    """Runs the program on scenes; its output goes to `folder`, reference pictures to `truths`, results to `store`."""
 
-    def __init__(self, folder, truths, quick):
-        self.folder, self.truths, self.quick = folder, truths or folder, quick
-        os.makedirs(self.truths, exist_ok=True)
+    def __init__(self, folder, truths=None, quick=False, store=None, longest=600):
+        self.folder, self.quick, self.store = folder, quick, store or Store()
+        self.truths = Truths(PROGRAM, truths or folder)
         # A reference picture has only every third pixel, because a ray takes seconds with shadows and many curves.
         self.side, self.truth_side = (48, 16) if quick else (96, 32)
         self.repetitions = 2 if quick else 3
+        self.longest = longest  # seconds that a picture of `auto` may take
         self.scenes = [name for name in SCENES if not quick or name in ("orbitals", "cells", "bonsai")]
         self.lights = [light for light in LIGHTS if not quick or light in ("emission-absorption", "both")]
+        self.save = lambda found: None  # called with what an experiment has found so far
 
     def path(self, name):
         return os.path.join(self.folder, name)
@@ -91,35 +102,43 @@ class Bench:
     def run(*words):
         return subprocess.run([PROGRAM, *map(str, words)], check=True, stdout=subprocess.PIPE, text=True).stdout
 
+    def kept(self, key, measure, program=PROGRAM):
+        """The result of measure(), kept for the next run. The key must hold all that the result depends on, except the
+        program and the machine."""
+        return self.store.get({"program": content_hash(program), "machine": processor(), **key}, measure)
+
     def truth(self, scene, data, settings):
         """The reference's picture of a scene file with `settings`."""
-        with open(scene, encoding="utf-8") as file:
-            key = [file.read(), [(os.path.basename(path), os.path.getsize(path)) for path in data], settings, self.truth_side]
-        out = os.path.join(self.truths, hashlib.sha256(json.dumps(key).encode()).hexdigest()[:20] + ".exr")
-        if not os.path.exists(out):
-            size = {"image.width": self.truth_side, "image.height": self.truth_side, "image.filter": "point"}
-            self.run("reference", scene, "--data", *data, "-o", out, *assignments({**settings, **size}))
-        return out
+        size = {"image.width": self.truth_side, "image.height": self.truth_side, "image.filter": "point"}
+        return self.truths.picture(scene, data, {**settings, **size})
 
-    def bench(self, name, settings=None, data=None, truth=True, side=None, **options):
+    def bench(self, name, settings=None, data=None, truth=True, side=None, turn=0, **options):
         """The JSON that `scolopax bench` writes for a scene with `settings`; None if data is missing. Options, such as
-        samples=[1, 4], are passed on. With truth=False only times are measured, no errors."""
+        samples=[1, 4], are passed on. With truth=False only times are measured, no errors. `turn` distinguishes
+        measurements that are repeated."""
         data, settings = data or self.data(name), settings or {}
         if data is None:
             return None
-        out, side = self.path("bench.json"), side or self.side
+        side, options = side or self.side, {"repetitions": self.repetitions, **options}
         words = ["--truth", self.truth(self.scene(name), data, settings)] if truth else ["--times-only"]
-        for option, value in {"repetitions": self.repetitions, **options}.items():
-            words += [f"--{option}", ",".join(map(str, value)) if isinstance(value, (list, tuple)) else value]
-        begin = time.monotonic()
-        self.run("bench", self.scene(name), "--data", *data, "--json", out, *words,
-                 *assignments({**settings, "image.width": side, "image.height": side}))
-        with open(out, encoding="utf-8") as file:
-            result = json.load(file)
-        result.pop("scene")
-        told = {path: value for path, value in settings.items() if not path.startswith("channels")}
-        print(f"  {name} {told}: {time.monotonic() - begin:.1f} s", file=sys.stderr, flush=True)
-        return result
+        for option, value in options.items():
+            words += [f"--{option.replace('_', '-')}", ",".join(map(str, value)) if isinstance(value, (list, tuple)) else value]
+        with open(self.scene(name), encoding="utf-8") as file:
+            key = {"bench": file.read(), "data": list(map(content_hash, data)), "settings": settings, "options": options,
+                   "side": side, "turn": turn, "truth": os.path.basename(words[1]) if truth else None}
+
+        def measure():
+            begin, out = time.monotonic(), self.path("bench.json")
+            self.run("bench", self.scene(name), "--data", *data, "--json", out, *words,
+                     *assignments({**settings, "image.width": side, "image.height": side}))
+            with open(out, encoding="utf-8") as file:
+                result = json.load(file)
+            result.pop("scene")
+            told = {path: value for path, value in settings.items() if not path.startswith("channels")}
+            print(f"  {name} {told}: {time.monotonic() - begin:.1f} s", file=sys.stderr, flush=True)
+            return result
+
+        return self.kept(key, measure)
 
 
 def resources(words):

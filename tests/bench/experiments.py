@@ -4,23 +4,14 @@ entry of the JSON file under its name."""
 import json
 import os
 import time
+from typing import Callable, NamedTuple
 
-from common import LIGHTS, MULTICHANNEL, PROGRAM, SCENES, light_settings, median, resources
+from common import MULTICHANNEL, PROGRAM, SCENES, light_settings, median, resources
 from device_experiment import proxies
+from session_experiment import sessions
+from speed_experiment import estimates, speed
+from store import content_hash
 from surface_experiment import surfaces
-
-
-def speed(bench):
-    """All methods, scenes and lights: time against error (the paper's Figure 8 configurations)."""
-    found = {}
-    for name in bench.scenes:
-        for light in bench.lights:
-            steps = [4, 2, 1, 0.5, 0.25] + ([] if LIGHTS[light][1] else [0.125])
-            result = bench.bench(name, light_settings(light), samples=[1, 16, 64], steps=steps,
-                                 longest=0.02 if bench.quick else 0.25)
-            if result:
-                found.setdefault(name, {})[light] = result
-    return found
 
 
 def macrocells(bench):
@@ -72,14 +63,21 @@ def blends(bench):
         data = bench.data(name) if name in bench.scenes else None
         if not data:
             continue
-        for mode in ("density", "max", "mix", "composite"):
-            out = bench.path(f"{mode}.png")
-            bench.run("render", bench.scene(name), "--data", *data, "-o", out, "--samples", samples, "--set",
-                      f"blend.mode={mode}", "--set", "integrator.method=raymarch", "--set", "integrator.step=0.5", "--set",
-                      f"image.width={side}", "--set", f"image.height={side}")
-            if mode != "density":
-                told = bench.run("compare", out, bench.path("density.png"), "--json")
-                found.setdefault(name, {})[mode] = {key: json.loads(told)[key] for key in ("flip", "psnr", "rmse")}
+
+        def measure(name=name, data=data):
+            different = {}
+            for mode in ("density", "max", "mix", "composite"):
+                out = bench.path(f"{mode}.png")
+                bench.run("render", bench.scene(name), "--data", *data, "-o", out, "--samples", samples, "--set",
+                          f"blend.mode={mode}", "--set", "integrator.method=raymarch", "--set", "integrator.step=0.5", "--set",
+                          f"image.width={side}", "--set", f"image.height={side}")
+                if mode != "density":
+                    told = bench.run("compare", out, bench.path("density.png"), "--json")
+                    different[mode] = {key: json.loads(told)[key] for key in ("flip", "psnr", "rmse")}
+            return different
+
+        found[name] = bench.kept({"blends": content_hash(bench.scene(name)), "data": list(map(content_hash, data)), "side": side,
+                                  "samples": samples}, measure)
     return found
 
 
@@ -94,26 +92,37 @@ def memory(bench):
 
 
 def sizes(bench):
-    """Time per ray and peak memory for the same content on finer grids: medians of rounds with the sizes in turn."""
+    """Time per ray, time of `auto` to an RMSE of 1e-3, and peak memory for the same content on finer grids: medians of rounds
+    with the sizes in turn."""
     rows = {}
     edges = (32, 64) if bench.quick else (64, 128, 256, 512)
-    for _ in range(2 if bench.quick else 3):
+    for turn in range(2 if bench.quick else 3):
         for edge in edges:
             data = bench.orbitals(4, edge)
-            result = bench.bench("orbitals", {}, data, truth=False, samples=[16], steps=[1], repetitions=2, longest=1,
-                                 methods=["superposed", "sync-dda", "raymarch"], side=128)
-            row = rows.setdefault(edge, {"memory": result["memory"][0], "points": {}})
-            for point in result["points"]:
+            rays = bench.bench("orbitals", {}, data, truth=False, samples=[16], steps=[1], repetitions=2, longest=1,
+                               methods=["superposed", "sync-dda", "raymarch"], side=128, turn=turn)
+            row = rows.setdefault(edge, {"memory": rays["memory"][0], "points": {}, "auto": []})
+            for point in rays["points"]:
                 row["points"].setdefault(point["method"], []).append(point)
+            auto = bench.bench("orbitals", {}, data, methods=["auto"], samples=[1], until=1e-3, longest=20, turn=turn)
+            row["auto"].append({"seconds": auto["timeToError"][0]["secondsToRmse0.001"],
+                                "setSceneSeconds": median([p["setSceneSeconds"] for p in auto["points"]]),
+                                "step": auto["points"][-1]["choice"]["step"]})
     for edge, row in rows.items():
         row["points"] = {method: {key: median([p[key] for p in points])
                                   for key in ("nsPerRay", "fetchesPerRay", "cellStepsPerRay")}
                          for method, points in row["points"].items()}
-        command = [PROGRAM, "render", bench.scene("orbitals"), "--data", *bench.orbitals(4, edge), "-o",
-                   bench.path("sizes.exr"), "--samples", "1"]
-        # Without the memory that the program and its libraries need before they do anything.
-        row["peakBytes"] = resources(command)[1] - resources([PROGRAM, "--version"])[1]
+        row["auto"] = {**row["auto"][0], **{key: median([one[key] for one in row["auto"]]) for key in ("seconds", "setSceneSeconds")}}
+        data = bench.orbitals(4, edge)
+        row["peakBytes"] = bench.kept({"peak": content_hash(bench.scene("orbitals")), "data": list(map(content_hash, data))},
+                                      lambda data=data: peak_bytes(bench, data))
     return rows
+
+
+def peak_bytes(bench, data):
+    """Of rendering the orbitals, without the memory that the program and its libraries need before they do anything."""
+    command = [PROGRAM, "render", bench.scene("orbitals"), "--data", *data, "-o", bench.path("sizes.exr"), "--samples", "1"]
+    return resources(command)[1] - resources([PROGRAM, "--version"])[1]
 
 
 def threads(bench):
@@ -143,22 +152,33 @@ def loading(bench):
     for name in bench.scenes:
         if not isinstance(SCENES[name], int) and bench.data(name):
             cases[f"{name}, {os.path.basename(bench.data(name)[0]).split('.', 1)[1]}"] = bench.data(name)
-    for case, files in cases.items():
-        times = {"load": [], "read": [], "gzip": []}
-        for _ in range(bench.repetitions + 2):
-            times["load"].append(resources([PROGRAM, "info", *files])[0])
-            begin = time.monotonic()
-            for file in files:
-                with open(file, "rb") as opened:
-                    while opened.read(1 << 20):
-                        pass
-            times["read"].append(time.monotonic() - begin)
-            if files[0].endswith(".gz"):
-                times["gzip"].append(resources(["gzip", "-dc", *files])[0])
-        found[case] = {"bytes": sum(map(os.path.getsize, files)), "start": median([resources([PROGRAM, "--version"])[0] for _ in range(5)]),
-                       **{key: median(values) if values else None for key, values in times.items()}}
-    return found
+    return {case: bench.kept({"loading": list(map(content_hash, files)), "repetitions": bench.repetitions},
+                             lambda files=files: load(files, bench.repetitions + 2)) for case, files in cases.items()}
 
 
-EXPERIMENTS = {f.__name__: f for f in (speed, macrocells, channels, quality, blends, memory, sizes, threads, loading, surfaces,
-                                       proxies)}
+def load(files, repetitions):
+    """Medians of seconds."""
+    times = {"load": [], "read": [], "gzip": []}
+    for _ in range(repetitions):
+        times["load"].append(resources([PROGRAM, "info", *files])[0])
+        begin = time.monotonic()
+        for file in files:
+            with open(file, "rb") as opened:
+                while opened.read(1 << 20):
+                    pass
+        times["read"].append(time.monotonic() - begin)
+        if files[0].endswith(".gz"):
+            times["gzip"].append(resources(["gzip", "-dc", *files])[0])
+    return {"bytes": sum(map(os.path.getsize, files)),
+            "start": median([resources([PROGRAM, "--version"])[0] for _ in range(5)]),
+            **{key: median(values) if values else None for key, values in times.items()}}
+
+
+class Experiment(NamedTuple):
+    run: Callable
+    takes: str  # on two quiet cores, with the reference's pictures
+
+
+EXPERIMENTS = {run.__name__: Experiment(run, takes) for run, takes in (
+    (speed, "?"), (estimates, "?"), (sizes, "?"), (sessions, "?"), (surfaces, "?"), (macrocells, "?"), (channels, "?"), (quality, "?"),
+    (blends, "?"), (memory, "?"), (threads, "?"), (loading, "?"), (proxies, "?"))}
