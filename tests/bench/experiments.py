@@ -3,6 +3,7 @@
 entry of the JSON file under its name."""
 import json
 import os
+import sys
 import time
 from typing import Callable, NamedTuple
 
@@ -104,7 +105,9 @@ def sizes(bench):
             row = rows.setdefault(edge, {"memory": rays["memory"][0], "points": {}, "auto": []})
             for point in rays["points"]:
                 row["points"].setdefault(point["method"], []).append(point)
-            auto = bench.bench("orbitals", {}, data, methods=["auto"], samples=[1], until=1e-3, longest=20, turn=turn)
+            auto = bench.bench("orbitals", {}, data, methods=["auto"], samples=[1], until=1e-3, longest=60, turn=turn)
+            if auto["timeToError"][0]["secondsToRmse0.001"] is None:
+                sys.exit(f"sizes: auto does not reach 1e-3 within a minute on {edge}^3 voxels")
             row["auto"].append({"seconds": auto["timeToError"][0]["secondsToRmse0.001"],
                                 "setSceneSeconds": median([p["setSceneSeconds"] for p in auto["points"]]),
                                 "step": auto["points"][-1]["choice"]["step"]})
@@ -112,7 +115,7 @@ def sizes(bench):
         row["points"] = {method: {key: median([p[key] for p in points])
                                   for key in ("nsPerRay", "fetchesPerRay", "cellStepsPerRay")}
                          for method, points in row["points"].items()}
-        row["auto"] = {**row["auto"][0], **{key: median([one[key] for one in row["auto"]]) for key in ("seconds", "setSceneSeconds")}}
+        row["auto"] = {key: median([one[key] for one in row["auto"]]) for key in ("seconds", "setSceneSeconds", "step")}
         data = bench.orbitals(4, edge)
         row["peakBytes"] = bench.kept({"peak": content_hash(bench.scene("orbitals")), "data": list(map(content_hash, data))},
                                       lambda data=data: peak_bytes(bench, data))

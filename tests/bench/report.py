@@ -66,6 +66,8 @@ def main():
                      "pixel each way, against the\ndouble-precision reference.\n")
         if any(entry["quick"] for entry in known):
             text += "\n**Made with --quick: a test of the scripts, not a measurement.**\n"
+        if not all(entry.get("complete", True) for entry in known):
+            text += "\n**Not complete: the measurement was interrupted.**\n"
         for section, entry in entries:
             if len(sections) > 1:
                 text += f"\n## {section.__name__.capitalize()}\n"

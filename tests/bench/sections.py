@@ -3,54 +3,9 @@
 Every function gets the experiment's entry of run.py's file, and a function that saves a plot and returns its link."""
 from device_sections import gpu, proxies
 from plots import lines
+from speed_sections import bold, by_method, estimates, most_samples, sessions, speed
 from surface_sections import surfaces
 from tables import number, table
-
-TARGETS = ("0.01", "0.001")
-
-
-def by_method(rows):
-    found = {}
-    for row in rows:
-        found.setdefault(row["method"], []).append(row)
-    return found
-
-
-def most_samples(points):
-    return max(points, key=lambda p: p["samples"])
-
-
-def speed(entry, plot):
-    methods = []
-    rows, counts = {target: [] for target in TARGETS}, []
-    for scene, lights in entry["found"].items():
-        for light, found in lights.items():
-            times = {row["method"]: row for row in found["timeToError"]}
-            methods = methods or list(times)
-            for target in TARGETS:
-                sync = times["sync-dda"][f"secondsToRmse{target}"]
-                cells = []
-                for method in (m for m in methods if m != "sync-dda"):
-                    value, step = times[method][f"secondsToRmse{target}"], times[method][f"stepToRmse{target}"]
-                    cells.append("-" if value is None else f"x{number(sync / value)}" +
-                                 (f" ({number(value)} s, step {step:g})" if step else ""))
-                rows[target].append([scene, light, f"{number(sync)} s", *cells])
-            for method, points in by_method(found["points"]).items():
-                best = most_samples([p for p in points if p["step"] in (None, 1)])
-                counts.append([scene, light, method, best["samples"], number(best["nsPerRay"]), f"{best['rmse']:.1e}",
-                               f"{best['flip']:.4f}", f"{best['bias']:.0e}", number(best["fetchesPerRay"]),
-                               number(best["cellStepsPerRay"]), number(best["randomBlocksPerRay"]),
-                               number(best.get("efficiencyToSyncDda"))])
-    header = ["scene", "light", "sync-dda", *(m for m in methods if m != "sync-dda")]
-    return (f"## Time to RMSE 1e-2\n\n{table(header, rows['0.01'])}\n## Time to RMSE 1e-3\n\n{table(header, rows['0.001'])}\n"
-            "The time of sync-dda, and how many times less the other methods take in the same run. For unbiased methods it is "
-            "extrapolated\nby the law of their noise from the most samples measured. For methods with a step it is that of the "
-            "best measured step, where\nmore samples reduce the noise if the bias is small enough (-: no measured step reaches the "
-            "error).\n\n## Counts and errors\n"
-            "The most samples measured, steps of one voxel. Fetches, macrocells and random blocks are per ray. The last column is "
-            "the ratio of\n1 / (MSE x seconds) to that of sync-dda.\n\n" +
-            table(["scene", "light", "method", "samples", "ns/ray", "RMSE", "FLIP", "bias", "fetches", "cells", "randoms",
-                   "to sync"], counts))
 
 
 def macrocells(entry, plot):
@@ -172,7 +127,14 @@ def sizes(entry, plot):
              *(number(p["cellStepsPerRay"]) for m, p in row["points"].items() if m == "superposed"),
              f"{row['peakBytes'] / 1e6:.0f}", f"{row['peakBytes'] / row['memory']['voxels'] / row['memory']['channels']:.2f}",
              f"{row['memory']['data'] / row['memory']['voxels'] / row['memory']['channels']:.0f}"] for edge, row in found.items()]
-    return (plot("sizes", lines(panels, "voxels per edge", "ns/ray")) + "\n\nPeak: resident memory of `scolopax render` at "
+    autos = {edge: row["auto"] for edge, row in found.items()}
+    growth = autos[max(autos, key=int)]["seconds"] / autos[min(autos, key=int)]["seconds"]
+    return (plot("sizes", lines(panels, "voxels per edge", "ns/ray")) + "\n\nTime of `auto` to an RMSE of 1e-3, with its choice, at "
+            f"{entry['side']}x{entry['side']} pixels: from the smallest to the largest size it grows {bold(f'{growth:.3g} times', growth > 1.5)}\n(goal: at most "
+            "1.5).\n\n" + table(["volume", "time to 1e-3", "of that the choice", "step"],
+                               [[f"{edge}^3", f"{1e3 * auto['seconds']:.3g} ms", f"{1e3 * auto['setSceneSeconds']:.3g} ms",
+                                 number(auto["step"])] for edge, auto in autos.items()]) +
+            "\nPeak: resident memory of `scolopax render` at "
             "256x256, above that of the program that has just started.\n\n" +
             table(["volume", *(f"{m}, ns/ray" for m in next(iter(found.values()))["points"]), "cells/ray, superposed",
                    "peak, MB", "bytes per voxel and channel", "of them data"], rows))
@@ -205,6 +167,7 @@ def loading(entry, plot):
 # File -> (title, experiments).
 REPORT = {
     "speed": ("Speed against error", [speed]),
+    "estimates": ("Estimated errors", [estimates, sessions]),
     "macrocells": ("Macrocell sizes (section 5.1 of the paper)", [macrocells]),
     "channels": ("Channels (section 5.2)", [channels]),
     "quality": ("Quality and performance (section 5.3)", [quality]),

@@ -21,7 +21,9 @@ SINGLE = {name: [f"scalar/{name}.nii.gz"] for name in ("heptane", "bonsai", "eng
 MULTIPLE = {"tcga": SCENES["tcga"]}
 STEPS = [8, 4, 2, 1, 0.5]  # in voxels
 FRAME_STEPS = STEPS[1:]  # with four channels
-BETWEEN = [6, 3, 1.5, 0.75, 0.25, 0.125]  # further steps of Scolopax: the fastest sufficient one, convergence
+BETWEEN = [6, 3, 1.5, 0.75, 0.25, 0.125, 0]  # further steps of Scolopax (0: whole voxel cells)
+SAMPLES = [1, 4, 16, 64]  # of Scolopax
+LONGEST = 0.5  # seconds of a picture with more than one sample
 ROUNDS = 5  # of VTK before Scolopax's turn, and as many after it
 COLORS = ["#ff4030", "#40c060", "#4080ff", "#ffd040"]
 
@@ -89,11 +91,11 @@ class Workplace:
     def path(self, name):
         return os.path.join(self.folder, name)
 
-    def run(self, command, scene, *options):
+    def run(self, command, scene, *options, environment=None):
         with open(self.path("scene.json"), "w", encoding="utf-8") as file:
             json.dump(scene, file)
         subprocess.run([PROGRAM, command, self.path("scene.json"), "--data", *self.data, *options], check=True,
-                       stdout=subprocess.DEVNULL)
+                       stdout=subprocess.DEVNULL, env={**os.environ, **(environment or {})})
 
     def reference(self, scene):
         self.run("reference", scene, "-o", self.path("truth.exr"), "--samples-per-axis", "1")
@@ -104,12 +106,21 @@ class Workplace:
                              check=True, capture_output=True, text=True).stdout
         return {name: json.loads(out)[name] for name in ("rmse", "psnr")}
 
-    def bench(self, scene, steps, *options):
-        """Points of the marcher: no tracker comes near VTK's errors in VTK's time."""
-        self.run("bench", scene, "--methods", "raymarch", "--steps", ",".join(map(str, steps)), "--samples", "1",
-                 "--repetitions", str(2 * ROUNDS), "--json", self.path("bench.json"), *options)
+    def bench(self, scene, *options):
+        """Points of Scolopax, with the instructions that it takes here and, if these are AVX-512, also with AVX2."""
+        points = self.bench_with({}, scene, *options)
+        if points[0]["instructions"] == "avx512":
+            points += self.bench_with({"SCOLOPAX_INSTRUCTIONS": "avx2"}, scene, *options)
+        return points
+
+    def bench_with(self, environment, scene, *options):
+        self.run("bench", scene, "--repetitions", str(2 * ROUNDS), "--json", self.path("bench.json"), *options,
+                 environment=environment)
         with open(self.path("bench.json"), encoding="utf-8") as file:
-            return json.load(file)["points"]
+            told = json.load(file)
+        if environment and told["instructions"] != environment["SCOLOPAX_INSTRUCTIONS"]:
+            sys.exit(f"vtk.py: asked for {environment['SCOLOPAX_INSTRUCTIONS']}, the program used {told['instructions']}")
+        return [{**point, "instructions": told["instructions"]} for point in told["points"]]
 
 
 def take_turns(mappers, steps, bench):
@@ -151,7 +162,10 @@ def single(channels, scene, folder):
             mapper.draw(step)
             errors[name, step] = place.error(mapper.picture())
     truth = place.path("truth.exr")
-    seconds, points = take_turns(mappers, STEPS, lambda: place.bench(scene, STEPS + BETWEEN, "--truth", truth))
+    # No tracker comes near VTK's errors in VTK's time.
+    options = ["--methods", "auto,raymarch", "--steps", ",".join(map(str, STEPS + BETWEEN)), "--samples",
+               ",".join(map(str, SAMPLES)), "--longest", str(LONGEST), "--truth", truth]
+    seconds, points = take_turns(mappers, STEPS, lambda: place.bench(scene, *options))
     return {"vtk": [row(*key, halves, errors[key]) for key, halves in seconds.items()], "scolopax": points}
 
 
@@ -161,8 +175,8 @@ def multiple(channels, scene, folder):
     for shading in (False, True):
         scene["shading"] = shading
         mapper = VtkMapper(channels, scene)
-        seconds, points = take_turns({"i16": mapper}, FRAME_STEPS,
-                                     lambda: place.bench(scene, FRAME_STEPS, "--times-only"))
+        options = ["--methods", "raymarch", "--steps", ",".join(map(str, FRAME_STEPS)), "--samples", "1", "--times-only"]
+        seconds, points = take_turns({"i16": mapper}, FRAME_STEPS, lambda: place.bench(scene, *options))
         found.append({"shading": shading, "vtk": [row(*key, halves, {}) for key, halves in seconds.items()],
                       "scolopax": points})
     return {"lights": found}
