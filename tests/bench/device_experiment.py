@@ -6,7 +6,9 @@ import subprocess
 import sys
 import time
 
-from common import PROGRAM, assignments
+from common import PROGRAM
+from store import content_hash
+from truths import assignments
 
 PTX_COSTS = os.environ.get("SCOLOPAX_PTX_COSTS", os.path.join(os.path.dirname(PROGRAM), "ptx_costs"))
 
@@ -22,9 +24,15 @@ def proxies(bench):
         data = bench.data(name)
         if data is None:
             continue
-        begin = time.monotonic()
-        out = subprocess.run([PTX_COSTS, bench.scene(name), "--data", *data, *assignments(settings)], check=True,
-                             stdout=subprocess.PIPE, text=True).stdout
-        found[name] = json.loads(out)
-        print(f"  {name}: {time.monotonic() - begin:.1f} s", file=sys.stderr, flush=True)
+        key = {"proxies": content_hash(bench.scene(name)), "data": list(map(content_hash, data)), "settings": settings}
+        found[name] = bench.kept(key, lambda name=name, data=data: count(bench.scene(name), data, settings), PTX_COSTS)
+        bench.save(found)
     return found
+
+
+def count(scene, data, settings):
+    begin = time.monotonic()
+    out = subprocess.run([PTX_COSTS, scene, "--data", *data, *assignments(settings)], check=True,
+                         stdout=subprocess.PIPE, text=True).stdout
+    print(f"  {os.path.basename(scene)}: {time.monotonic() - begin:.1f} s", file=sys.stderr, flush=True)
+    return json.loads(out)

@@ -13,7 +13,8 @@ import subprocess
 import sys
 
 sys.path[:0] = [os.path.dirname(os.path.abspath(__file__))]
-from common import LIGHTS, SCENES, Bench, assignments, light_settings, scratch  # noqa: E402
+from common import LIGHTS, SCENES, Bench, light_settings, scratch  # noqa: E402
+from truths import assignments  # noqa: E402
 
 
 def seconds(program, instructions, scene, files, out, settings, options):

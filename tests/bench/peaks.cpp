@@ -5,8 +5,9 @@
 // SETTINGS is {"repetitions": N, "settings": [...]}. Each setting has a method (postclassified,
 // preintegrated, or one of the renderer's) and, as far as they apply, step (smallest spacings) or footprints
 // (s_k), peaks (off, both, only; of the paper's methods also either), most (peaks of a segment), table
-// (entries per edge), adaptive (what longer steps follow: variance or bounds of macrocells, opacity, or
-// gradient), tolerance (of bounds and of gradient), opaque (transmittance at which rays end), samples, truth
+// (entries per edge), interpolation (as in a scene), adaptive (what longer steps follow: variance or bounds
+// of macrocells, opacity, or gradient), tolerance (of bounds and of gradient), leaps (over blocks of empty
+// macrocells; false: every macrocell is visited), opaque (transmittance at which rays end), samples, truth
 // (a reference picture, which may be smaller by an odd factor), picture (a file to write). Prints one JSON
 // object for each: seconds is the median of the repetitions, and null without.
 #include <tbb/parallel_for.h>
@@ -88,6 +89,36 @@ peaks::StepLaw lawOf(const json& setting, const Scene& scene, const Grid& grid) 
   return peaks::uniformLaw(setting.value("step", 1.0) * grid.smallestSpacing());
 }
 
+Interpolation interpolationOf(const json& setting) {
+  return Interpolation(indexOf(kInterpolations, setting.value("interpolation", "trilinear")));
+}
+
+/// Codes of macrocells as in MajorantView, with which a walk leaps over no block.
+std::vector<kernel::TotalCode> codesWithoutLeaps(const kernel::MajorantView& majorants) {
+  const glm::ivec3 cells = majorants.cells;
+  const std::size_t count = std::size_t(cells.x) * std::size_t(cells.y) * std::size_t(cells.z);
+  std::vector<kernel::TotalCode> codes(majorants.totals, majorants.totals + count);
+  for (kernel::TotalCode& code : codes)
+    if (code >= kernel::kEmptyCode) code = kernel::codeOfEmpty(1);
+  return codes;
+}
+
+/// For every macrocell, how many steps may be taken at once; none: 1.
+std::vector<int> ratesOf(const json& setting, const Data& data, const ChannelAppearance& appearance) {
+  const std::string adaptive = setting.value("adaptive", "");
+  const Channel& channel = data.volume->channels()[0];
+  const Grid& grid = data.volume->grid();
+  const int macrocell = data.scene.macrocell;
+  if (adaptive == "variance") return peaks::cellRates(channel, grid.dims, macrocell);
+  if (adaptive == "bounds")
+    return peaks::boundedRates(channel, grid, macrocell, appearance,
+                               setting.value("step", 1.0) * grid.smallestSpacing(),
+                               setting.value("tolerance", 0.0));
+  if (adaptive != "" && adaptive != "opacity" && adaptive != "gradient")
+    fail("adaptive: expected variance, bounds, opacity or gradient");
+  return {};
+}
+
 /// Casts a ray through every pixel's centre.
 void castRays(const peaks::RayCaster& caster, Drawn& drawn) {
   Image& image = drawn.image;
@@ -114,9 +145,12 @@ Drawn drawPaper(const json& setting, const Data& data) {
   ChannelAppearance& appearance = scene.channels.at(0);
   appearance.peaks = Peaks::off;
   appearance.isovalues.clear();
+  appearance.interpolation = interpolationOf(setting);
   scene.method = Method::raymarch;
   const RenderPlan plan(data.volume, scene);
-  const kernel::SceneView& view = plan.view();
+  kernel::SceneView view = plan.view();
+  const std::vector<kernel::TotalCode> codes = codesWithoutLeaps(view.majorants);
+  if (!setting.value("leaps", true)) view.majorants.totals = codes.data();
   if (scene.channels.size() != 1 || view.channelCount != 1 || appearance.gamma != 1 || scene.shadows ||
       appearance.gradientOpacity)
     fail("expected one visible channel with gamma 1, and no shadows or gradientOpacity");
@@ -134,20 +168,12 @@ Drawn drawPaper(const json& setting, const Data& data) {
     found.emplace(peaks::surfacesAtPeaks(appearance.opacity, view.channels[0], grid.smallestSpacing()),
                   std::min(setting.value("most", 4), peaks::PeakTable::kMost));
   drawn.prepareSeconds = secondsSince(begin);
-  std::vector<int> rates;
+  const std::vector<int> rates = ratesOf(setting, data, appearance);
   const std::string adaptive = setting.value("adaptive", "");
-  const double tolerance = setting.value("tolerance", 0.0);
-  if (adaptive == "variance")
-    rates = peaks::cellRates(data.volume->channels()[0], grid.dims, scene.macrocell);
-  else if (adaptive == "bounds")
-    rates = peaks::boundedRates(data.volume->channels()[0], grid, scene.macrocell, appearance,
-                                setting.value("step", 1.0) * grid.smallestSpacing(), tolerance);
-  else if (adaptive != "" && adaptive != "opacity" && adaptive != "gradient")
-    fail("adaptive: expected variance, bounds, opacity or gradient");
   castRays(peaks::RayCaster({view, lawOf(setting, scene, grid), means ? &*means : nullptr,
                              found ? &*found : nullptr, mode, rates.empty() ? nullptr : &rates,
                              float(setting.value("opaque", kOpaqueTransmittance)), adaptive == "opacity",
-                             adaptive == "gradient" ? float(tolerance) : 0.0f}),
+                             adaptive == "gradient" ? setting.value("tolerance", 0.0f) : 0.0f}),
            drawn);
   return drawn;
 }
@@ -158,6 +184,7 @@ Drawn drawOurs(const json& setting, const Data& data, bool counting, std::uint32
   scene.method = Method(indexOf(kMethods, setting.at("method")));
   if (hasStep(scene.method)) scene.step = setting.value("step", 1.0);
   scene.channels.at(0).peaks = Peaks(indexOf(kPeaks, setting.value("peaks", "off")));
+  scene.channels.at(0).interpolation = interpolationOf(setting);
   scene.seed = seed;
   const auto renderer = makeCpuRenderer(data.volume, 0);
   if (counting) renderer->countCosts();

@@ -9,6 +9,7 @@ import sys
 import time
 
 from common import PROGRAM
+from store import content_hash
 from surface_scenes import VOLUMES, scene, vti_to_nrrd, with_isovalues
 
 PEAKS = os.path.join(os.path.dirname(PROGRAM), "bench_peaks")
@@ -27,8 +28,8 @@ def post(name, peaks="off", truth=None, **options):
     return setting(name, "postclassified", truth or ("both" if peaks == "either" else peaks), peaks=peaks, **options)
 
 
-def marched(name, peaks, truth=None):
-    return setting(name, "raymarch", truth or peaks, peaks=peaks, step=1)
+def marched(name, peaks, truth=None, **options):
+    return setting(name, "raymarch", truth or peaks, peaks=peaks, step=1, **options)
 
 
 def automatic(name, peaks):
@@ -37,6 +38,9 @@ def automatic(name, peaks):
 
 def preintegrated(size, **options):
     return setting(f"preintegrated, {size}^2", "preintegrated", "off", table=size, **options)
+
+
+B_SPLINE = {"interpolation": "cubic"}
 
 
 def footprints(side, count=PAPER_FOOTPRINTS):
@@ -66,14 +70,22 @@ def run_peaks(bench, made, files, settings, repetitions):
 
 def measure(bench, label, files, made, settings):
     """The settings with times, counts and errors."""
-    begin = time.monotonic()
     path = bench.path("truth.json")
     with open(path, "w", encoding="utf-8") as file:
         json.dump(made, file)
-    asked = [{**one, "truth": bench.truth(path, files, {"channels.0.peaks": one["truth"]})} for one in settings]
-    found = run_peaks(bench, made, files, asked, bench.repetitions)
-    print(f"  {label}: {time.monotonic() - begin:.1f} s", file=sys.stderr, flush=True)
-    return [{**one, **result} for one, result in zip(settings, found)]
+    asked = [{**one, "truth": bench.truth(path, files, {"channels.0.peaks": one["truth"],
+                                                        "channels.0.interpolation": one.get("interpolation", "trilinear")})}
+             for one in settings]
+
+    def run():
+        begin = time.monotonic()
+        found = run_peaks(bench, made, files, asked, bench.repetitions)
+        print(f"  {label}: {time.monotonic() - begin:.1f} s", file=sys.stderr, flush=True)
+        return [{**one, **result} for one, result in zip(settings, found)]
+
+    key = {"surfaces": made, "data": list(map(content_hash, files)), "repetitions": bench.repetitions,
+           "settings": [{**one, "truth": os.path.basename(one["truth"])} for one in asked]}
+    return bench.kept(key, run, PEAKS)
 
 
 def draw(bench, name, files, made, settings):
@@ -175,31 +187,36 @@ RATES = {"width": 1e-2}
 
 
 def sampling(bench, volumes, view, names):
-    """Figures 6 and 7, table 2: equal steps against differential sampling, by number of samples."""
+    """Figures 6 and 7, table 2: equal steps against differential sampling, by number of samples, with trilinear
+    interpolation and with B-splines."""
     steps, counts = ((2, 1, 0.5), (8, 4)) if bench.quick else ((4, 2, 1, 0.5, 0.25, 0.125), (16, 8, 4, 2, 1))
     found, pictures = [], []
     for volume in (name for name in names if name in volumes):
         made, shown = scene(volume, bench.side, view=view, **RATES), []
-        for name, peaks in (("postclassification", "off"), ("peak finding", "either")):
-            equal = [post("uniform", peaks, step=step) for step in steps]
-            growing = [{**post("differential", peaks, **footprints(bench.side, count)), "count": count} for count in counts]
+        for name, peaks, options in (("postclassification", "off", {}), ("postclassification, B-spline", "off", B_SPLINE),
+                                     ("peak finding", "either", {}), ("peak finding, B-spline", "either", B_SPLINE)):
+            equal = [post("uniform", peaks, step=step, **options) for step in steps]
+            growing = [{**post("differential", peaks, **footprints(bench.side, count), **options), "count": count} for count in counts]
             rows = measure(bench, f"{view} view, {volume}, {name}", volumes[volume], made, equal + growing)
             found.append({"volume": volume, "view": view, "name": name, "rows": rows})
             # Equal steps with about as many samples as the paper's differential sampling.
             wanted = next(row for row in rows if row.get("count") == PAPER_FOOTPRINTS)["samplesPerPixel"]
             nearest = min(rows[:len(equal)], key=lambda row: abs(row["samplesPerPixel"] - wanted))
-            shown += [post("uniform", peaks, step=nearest["step"]), post("differential", peaks, **footprints(TILE))]
+            shown += [post("uniform", peaks, step=nearest["step"], **options)] if not options else []
+            shown += [post("differential", peaks, **footprints(TILE), **options)]
         pictures += draw(bench, f"{view}-{volume}", volumes[volume], scene(volume, TILE, view=view, **RATES), shown)
-    return {"found": found, "sheet": sheet(bench, pictures, 4)} if found else None
+    return {"found": found, "sheet": sheet(bench, pictures, 6)} if found else None
 
 
 def table1(bench, volumes):
-    """The paper's settings (differential sampling, either) on every volume, with rates by macrocell, and ours."""
+    """The paper's settings (differential sampling, either) on every volume, with rates by macrocell and with B-splines, and
+    ours."""
     found = []
     step = footprints(bench.side)
     settings = [post("postclassification", **step), preintegrated(256, **step), post("peak finding", "either", **step),
-                post("peak finding, rates by macrocell", "either", adaptive="variance", **step), marched("raymarch, both", "both"),
-                automatic("auto, both", "both")]
+                post("peak finding, rates by macrocell", "either", adaptive="variance", **step),
+                post("peak finding, B-spline", "either", **step, **B_SPLINE), marched("raymarch, both", "both"),
+                marched("raymarch, both, B-spline", "both", **B_SPLINE), automatic("auto, both", "both")]
     for volume, files in volumes.items():
         for view in ("far", "close"):
             if view in VOLUMES[volume]:
@@ -218,6 +235,7 @@ def adaptive(bench, volumes):
     settings += [{**preintegrated(1024, adaptive=by, tolerance=value, step=0.25), "name": f"by {by}" + (f", {value:g}" if value else "")}
                  for by, values in switches.items() for value in values]
     settings += [{**preintegrated(1024, opaque=opaque, step=0.25), "name": f"rays end at {opaque:g}"} for opaque in (0.05, 0.01)]
+    settings += [{**preintegrated(1024, step=0.25, leaps=False), "name": "no leaps over empty blocks"}]
     settings += [{**marched("raymarch, whole cells", "off"), "step": 0}, automatic("auto", "off")]
     return [{"volume": volume, "rows": measure(bench, f"adaptive steps, {volume}", files,
                                                scene(volume, bench.side, [], smooth=0.2, shading=False), settings)}

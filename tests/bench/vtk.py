@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Compares Scolopax with VTK's CPU ray caster, in turns: vtk.py OUT.json [--only NAME,...] [--size PIXELS,...]
+Takes some 15 minutes on two quiet cores. A run that was interrupted continues where it stopped.
 
 One channel: speed against error, both against the double-precision reference. Four channels: time per frame at
 equal step. Missing volumes are skipped with a message. Reads SCOLOPAX (the program), SCOLOPAX_DATA_DIR."""
@@ -15,6 +16,7 @@ import tempfile
 
 import numpy
 from common import DATA, PROGRAM, SCENES, processor
+from store import Store, content_hash
 from vtk_mapper import VERSION, VtkMapper, read_nifti
 
 SINGLE = {name: [f"scalar/{name}.nii.gz"] for name in ("heptane", "bonsai", "engine")}
@@ -182,7 +184,7 @@ def multiple(channels, scene, folder):
     return {"lights": found}
 
 
-def measure(name, sizes):
+def measure(name, sizes, store):
     files = [os.path.join(DATA, file) for file in {**SINGLE, **MULTIPLE}[name]]
     missing = [file for file in files if not os.path.exists(file)]
     if missing:
@@ -193,8 +195,14 @@ def measure(name, sizes):
     for size in sizes or ((256, 1024) if name in SINGLE else (512,)):
         print(f"{name}, {size}x{size}", file=sys.stderr)
         scene = scene_of(channels, size)
-        with tempfile.TemporaryDirectory() as folder:
-            result = (single if name in SINGLE else multiple)(channels, scene, folder)
+
+        def compare(scene=scene):
+            with tempfile.TemporaryDirectory() as folder:
+                return (single if name in SINGLE else multiple)(channels, {**scene}, folder)
+
+        key = {"program": content_hash(PROGRAM), "machine": processor(), "vtk": VERSION, "script": content_hash(__file__),
+               "data": list(map(content_hash, files)), "scene": scene}
+        result = store.get(key, compare)
         found.append({"volume": name, "voxels": list(channels[0].shape[::-1]), "size": size, **result})
     return found
 
@@ -206,11 +214,13 @@ def main():
                         help="volumes of " + ", ".join([*SINGLE, *MULTIPLE]))
     parser.add_argument("--size", type=lambda text: [int(size) for size in text.split(",")], metavar="PIXELS,...",
                         help="edges of the pictures instead of 256 and 1024, of tcga 512")
+    parser.add_argument("--again", action="store_true", help="measure anew what OUT.json.parts has from an interrupted run")
     options = parser.parse_args()
     unknown = [name for name in options.only if name not in SINGLE and name not in MULTIPLE]
     if unknown:
         parser.error(f"there is no {unknown[0]}")
-    measured = [found for name in options.only for found in measure(name, options.size)]
+    store = Store(options.out + ".parts", options.again)
+    measured = [found for name in options.only for found in measure(name, options.size, store)]
     if not measured:
         sys.exit("vtk.py: nothing was measured")
     with open(options.out, "w", encoding="utf-8") as file:
