@@ -7,8 +7,8 @@ matplotlib.rcParams.update({"svg.hashsalt": "scolopax", "svg.fonttype": "none", 
                             "lines.linewidth": 1})
 from matplotlib import pyplot  # noqa: E402  (after the choice of a backend)
 
-COLORS = {"auto": "#000000", "superposed": "#d62728", "sync-dda": "#1f77b4", "n-dda": "#17becf", "cumulative": "#9467bd", "raymarch": "#2ca02c",
-          "hybrid": "#ff7f0e"}
+COLORS = {"auto": "#000000", "superposed": "#d62728", "sync-dda": "#1f77b4", "n-dda": "#17becf", "cumulative": "#9467bd",
+          "raymarch": "#2ca02c", "hybrid": "#ff7f0e"}
 
 
 def lines(panels, xlabel, ylabel, logx=True, logy=True):

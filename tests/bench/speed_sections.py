@@ -155,6 +155,6 @@ def sessions(entry, plot):
         last = found[-1]
         sentences.append(bold(f"{kind}: {last['claimed']:.1e} claimed and {last['true']:.1e} true after {last['samples']} samples.",
                               last["claimed"] >= SESSION_GOAL))
-    return (f"The claimed error should fall below {SESSION_GOAL:g}. {' '.join(sentences)}\nTrue errors are over one pixel in a block of 32 x 32. "
-            f"The reference of pixels with an area (box) has 128 rays in each, and noise of its\nown. A session without `stop` ends at "
-            f"4096 samples.\n\n" + table(["filter", "samples", "seconds", "claimed error", "true error"], rows))
+    return (f"The claimed error should fall below {SESSION_GOAL:g}. {' '.join(sentences)}\nTrue errors are over one pixel in a block of "
+            "32 x 32. The reference of pixels with an area (box) has 128 rays in each, and noise of its\nown. A session without `stop` "
+            "ends at 4096 samples.\n\n" + table(["filter", "samples", "seconds", "claimed error", "true error"], rows))

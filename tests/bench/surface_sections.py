@@ -160,8 +160,8 @@ def table1(found):
 def adaptive(found):
     text = ("\n## Adaptive steps\nA smooth curve with preintegration; steps are multiples of a quarter of a voxel that follow the "
             "variance of a macrocell's voxels (section\n6.2), our bounds of the error of linear interpolation, the light that is "
-            "left, or the change of the value from one sample to the\nnext. "No leaps": as uniform, 0.25, but every macrocell of an empty block is visited. The last columns: what equal steps need for the same "
-            "error.\n")
+            "left, or the change of the value from one sample to the\nnext. Without leaps: as uniform, 0.25, but every macrocell of an "
+            "empty block is visited. The last columns: what equal steps\nneed for the same error.\n")
     for entry in found:
         equal = [row for row in entry["rows"] if row["name"] == "uniform"]
         rows = []
@@ -181,6 +181,6 @@ def surfaces(entry, plot):
             "They skip the same macrocells as ours,\nhave its shading, and like ours march one ray at a time here (ours can march "
             "sixteen). The paper's equations for differential\nsampling are missing from our text; here the step is s_k footprints, "
             "of pictures 1024 pixels high, where the volume is nearest and\nwhere it is farthest. Of the paper's volumes we have "
-            "heptane. B-splines are the scene's `interpolation` cubic, against the reference with the same. `either` is the paper's exclusive-or,\n`both` its default. Errors are over "
-            "every third pixel each way.\n\n" + figure3(found, plot) + figure4(found, plot) + figure5(found, plot) +
+            "heptane. B-splines are the scene's `interpolation` cubic, against the reference with the same. `either` is the paper's "
+            "exclusive-or,\n`both` its default. Errors are over every third pixel each way.\n\n" + figure3(found, plot) + figure4(found, plot) + figure5(found, plot) +
             differential(found, plot) + table1(found["table1"]) + adaptive(found["adaptive"]))

@@ -49,7 +49,9 @@ def milliseconds(value):
 
 
 def times_less(ratio, wanted):
-    """The ratio, in bold if it misses the goal."""
+    """The ratio, in bold if it misses the goal; 0: none."""
+    if ratio == 0:
+        return "**-**"
     return f"{ratio:.3g}" if ratio >= wanted else f"**{ratio:.3g}**"
 
 
@@ -65,7 +67,8 @@ def error_rows(found):
         cells = []
         for points in (of_set(found["scolopax"], name) for name in sets):
             fast = reaching(points, vtk["rmse"])
-            cells += [f"{milliseconds(seconds(fast))} ({named(fast)})", times_less(ratio_of(vtk, points), goal(vtk["rmse"]))] if fast else ["-", "**-**"]
+            cells += [f"{milliseconds(seconds(fast))} ({named(fast)})" if fast else "-",
+                      times_less(ratio_of(vtk, points), goal(vtk["rmse"]))]
         good = within(of_set(found["scolopax"], sets[0]), vtk["seconds"])
         yield [f"{vtk['voxels']}, step {vtk['step']:g}", milliseconds(vtk["seconds"]), f"{vtk['rmse']:.2e}", *cells,
                f"{good['rmse']:.2e} ({named(good)})" if good else "-"]
@@ -81,16 +84,17 @@ def frame_rows(light, sets):
 
 
 def goals_met(measured):
-    """One sentence for each instruction set."""
+    """Sentences for each instruction set and goal."""
     sentences = []
     for name in instruction_sets(measured[0]["scolopax"]):
         ratios = {FINE_GOAL: [], COARSE_GOAL: []}
         for found in measured:
             for vtk in found["vtk"]:
                 ratios[goal(vtk["rmse"])].append(ratio_of(vtk, of_set(found["scolopax"], name)))
-        parts = [f"{sum(ratio >= wanted for ratio in some)} of {len(some)} are at least {wanted:g} times faster (ratios {min(some):.3g} to {max(some):.3g})"
-                 for wanted, some in ratios.items() if some]
-        sentences.append(f"{NAMES[name]}: of VTK's errors up to {FINE:g} and of the others, {' and '.join(parts)}.")
+        for (wanted, some), which in zip(ratios.items(), (f"up to {FINE:g}", f"above {FINE:g}")):
+            if some:
+                sentences.append(f"{NAMES[name]}: of {len(some)} errors {which}, {sum(ratio >= wanted for ratio in some)} are reached at "
+                                 f"least {wanted:g} times faster; ratios {min(some):.3g} to {max(some):.3g}.")
     return "\n".join(sentences)
 
 
