@@ -131,9 +131,10 @@ def sizes(entry, plot):
     growth = autos[max(autos, key=int)]["seconds"] / autos[min(autos, key=int)]["seconds"]
     return (plot("sizes", lines(panels, "voxels per edge", "ns/ray")) + "\n\nTime of `auto` to an RMSE of 1e-3, with its choice, of "
             f"{entry['side']}x{entry['side']} pixels. From the smallest to the largest volume it grows "
-            f"{bold(f'{growth:.3g} times', growth > 1.5)}\n(goal: at most 1.5).\n\n" + table(["volume", "time to 1e-3", "of that the choice", "step"],
-                               [[f"{edge}^3", f"{1e3 * auto['seconds']:.3g} ms", f"{1e3 * auto['setSceneSeconds']:.3g} ms",
-                                 number(auto["step"])] for edge, auto in autos.items()]) +
+            f"{bold(f'{growth:.3g} times', growth > 1.5)}\n(goal: at most 1.5).\n\n" +
+            table(["volume", "time to 1e-3", "of that the choice", "step"],
+                  [[f"{edge}^3", f"{1e3 * auto['seconds']:.3g} ms", f"{1e3 * auto['setSceneSeconds']:.3g} ms", number(auto["step"])]
+                   for edge, auto in autos.items()]) +
             "\nPeak: resident memory of `scolopax render` at "
             "256x256, above that of the program that has just started.\n\n" +
             table(["volume", *(f"{m}, ns/ray" for m in next(iter(found.values()))["points"]), "cells/ray, superposed",

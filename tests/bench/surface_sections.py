@@ -182,5 +182,6 @@ def surfaces(entry, plot):
             "sixteen). The paper's equations for differential\nsampling are missing from our text; here the step is s_k footprints, "
             "of pictures 1024 pixels high, where the volume is nearest and\nwhere it is farthest. Of the paper's volumes we have "
             "heptane. B-splines are the scene's `interpolation` cubic, against the reference with the same. `either` is the paper's "
-            "exclusive-or,\n`both` its default. Errors are over every third pixel each way.\n\n" + figure3(found, plot) + figure4(found, plot) + figure5(found, plot) +
+            "exclusive-or,\n`both` its default. Errors are over every third pixel each way.\n\n" +
+            figure3(found, plot) + figure4(found, plot) + figure5(found, plot) +
             differential(found, plot) + table1(found["table1"]) + adaptive(found["adaptive"]))
