@@ -2,7 +2,6 @@
 // The CPU backend's choice of a method for scenes with the method `auto`.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -16,7 +15,6 @@
 #include "renderer/reference/render.h"
 #include "renderer/renderer.h"
 #include "tests/support/orbitals.h"
-#include "tests/support/statistics.h"
 #include "tests/support/volumes.h"
 
 namespace scolopax {
