@@ -320,7 +320,8 @@ SCOLOPAX_LANES void cellVoxelsOfChannel(const kernel::SceneView& scene, const Po
   }
 }
 
-/// kernel::cellVoxels for one point per lane.
+/// Voxels of the cells that contain points, as kernel::cellVoxels, of all of `channels` (bit n: visible
+/// channel n). Those of channel n go to corners[n].
 SCOLOPAX_LANES void cellVoxels(const kernel::SceneView& scene, std::uint32_t channels, const Vec& point,
                                Float (*corners)[kernel::kCorners]) {
   const Points at = pointsAt(scene.dims, point);

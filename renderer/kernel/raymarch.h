@@ -112,6 +112,7 @@ template <class Lighting, class Steps, class L, class Blend, class View>
 SCOLOPAX_LANES_RARE void meetSurfaces(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                       std::uint32_t channels, const typename L::Float& reached,
                                       const typename L::Float& end, const typename L::Float& offset,
+                                      const ShadowMemory<L, Steps, Blend, View>& ofShadows,
                                       SurfacesAhead<L>& ahead, Marched<L>& light, CostOf<L>* cost,
                                       FirstCollisionOf<L>* first) {
   using Float = typename L::Float;
@@ -136,7 +137,7 @@ SCOLOPAX_LANES_RARE void meetSurfaces(const View& scene, const Blend& blend, con
         points.share[n] = Float(1.0f);
         points.color[n] = hit.color;
       }
-      findLight<Steps, L>(scene, blend, ray, channels, points, hit.surface, met, cost, &radiance);
+      findLight<Steps, L>(scene, blend, ray, channels, points, hit.surface, met, ofShadows, cost, &radiance);
     }
     const Float absorbedHere = where(met, light.transmittance * hit.opacity);
     light.color = light.color + radiance * absorbedHere;
@@ -198,10 +199,14 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
   const bool hasSurfaces = scene.hasSurfaces();
   if (hasSurfaces) [[unlikely]]
     ahead.begin(scene, ray, inside, channels, cost);
-  [[maybe_unused]] typename OfStrata::Memory memory;
-  [[maybe_unused]] OfStrata strata(memory, scene, blend, ray, channels, set, ofStrata, cost);
   typename Steps::template Scalars<L, View> scalars;
   Hidden<L, Blend::kSums> hidden;
+  [[maybe_unused]] typename Steps::template Scalars<L, View> scalarsOfShadows;
+  // Strata end after the parts of a segment have been used, so that shadow rays may overwrite them.
+  const typename OfStrata::OfShadows ofShadows{Lighting::kAny ? &scalarsOfShadows : nullptr,
+                                               Lighting::kAny ? &hidden : nullptr};
+  [[maybe_unused]] typename OfStrata::Memory memory;
+  [[maybe_unused]] OfStrata strata(memory, ofShadows, scene, blend, ray, channels, set, ofStrata, cost);
   Segment<L> segment;
   Spans<L> spans(scene, ray, inside, channels);
   for (bool last = false; !last;) {
@@ -238,7 +243,7 @@ SCOLOPAX_LANES Radiance<L> marchRay(const View& scene, const Blend& blend, const
     if (hasSurfaces) [[unlikely]] {
       Marched<L> marched = state.marched();
       meetSurfaces<Lighting, Steps, L>(scene, blend, ray, channels, span.exit, state.end - state.opacity,
-                                       uniformOf(random.z), ahead, marched, cost, first);
+                                       uniformOf(random.z), ofShadows, ahead, marched, cost, first);
       state.take(marched);
     }
   }

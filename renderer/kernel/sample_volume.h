@@ -94,12 +94,6 @@ SCOLOPAX_HD inline void cellVoxels(const FieldView& field, glm::ivec3 dims, glm:
       corners[c] = float(voxels[(c & 1 ? step[0] : 0) + (c & 2 ? step[1] : 0) + (c & 4 ? step[2] : 0)]);
   });
 }
-/// The same for all of `channels` (bit n: visible channel n); those of channel n go to corners[n].
-SCOLOPAX_HD inline void cellVoxels(const SceneView& scene, std::uint32_t channels, glm::vec3 point,
-                                   float (*corners)[kCorners]) {
-  for (int n = 0; n < scene.channelCount; ++n)
-    if (channels >> n & 1) cellVoxels(scene.channels[n].field, scene.dims, point, corners[n]);
-}
 
 /// Place of points in the cell of eight voxels that contains `point`: 0 at its lower voxel, 1 at its upper.
 template <class L>

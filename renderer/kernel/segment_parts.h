@@ -13,6 +13,9 @@ struct EqualSteps {
   static constexpr bool kDivides = false;  ///< segments of dense matter can be shortened
   template <class L, class View>
   using Cuts = Segments<L, View>;
+  /// The same for rays on which no segment is shortened.
+  template <class L, class View>
+  using WholeCuts = Segments<L, View>;
   template <class L, class View>
   using Scalars = SegmentEnds<L, View>;
 };
@@ -21,6 +24,8 @@ struct VoxelCells {
   static constexpr bool kDivides = true;
   template <class L, class View>
   using Cuts = VoxelSegments<L, View>;
+  template <class L, class View>
+  using WholeCuts = WholeVoxelSegments<L, View>;
   template <class L, class View>
   using Scalars = SegmentCubics<L, View>;
 };

@@ -4,44 +4,10 @@
 // strata, hybrid 8.
 #pragma once
 #include "renderer/kernel/rng.h"
-#include "renderer/kernel/segment_parts.h"
 #include "renderer/kernel/shade.h"
-#include "renderer/kernel/surfaces.h"
+#include "renderer/kernel/shadow_rays.h"
 
 namespace scolopax::kernel {
-
-/// Step of shadow rays, as a multiple of the scene's step. A shadow ray estimates only one factor of the
-/// light, which varies less.
-inline constexpr float kShadowSteps = 2.0f;
-
-/// Transmittance of shadow rays through the channels in `channels` (bit n: visible channel n) and their
-/// surfaces. `start`: the surface at which the rays begin.
-template <class L, class Steps, class Blend, class View>
-SCOLOPAX_LANES typename L::Float marchTransmittance(const View& scene, const Blend& blend,
-                                                    const RayOf<L>& ray, IntervalOf<L> inside,
-                                                    std::uint32_t channels, typename L::Float offset,
-                                                    const SurfaceStart<L>& start, CostOf<L>* cost) {
-  typename L::Float ofSurfaces(1.0f);
-  if (scene.hasSurfaces()) [[unlikely]] {
-    passSurfaces<L>(scene, ray, inside, channels, start, scene.opaque.transmittance, cost, &ofSurfaces);
-    inside.exit = select(ofSurfaces > scene.opaque.transmittance, inside.exit, inside.enter);
-  }
-  typename Steps::template Scalars<L, View> scalars;
-  Hidden<L, Blend::kSums> hidden;
-  Segment<L> segment;
-  typename L::Float depth(0.0f);
-  Spans<L> spans(scene, ray, inside, channels);
-  do {
-    const auto span = spans.next(depth < scene.opaque.depth);
-    typename Steps::template Cuts<L, View> along(scalars, scene, ray, span, channels, offset,
-                                                 kShadowSteps * scene.step, cost);
-    for (bool more = true; more && along.next(segment); more = along.keep(depth < scene.opaque.depth))
-      depth = depth + visitParts<Detail::extinction>(scene, blend, segment, scalars, hidden,
-                                                     [](int, const PartOf<L>&) SCOLOPAX_LANES_LAMBDA {}) *
-                          segment.length();
-  } while (!spans.done(depth < scene.opaque.depth));
-  return ofSurfaces * (1.0f - absorbed(depth));
-}
 
 /// Place, in [0,1], up to which a segment of optical depth `depth` absorbs the share `share` of all that it
 /// absorbs. `centre` is the mean place of its extinction, which is taken to be linear.
@@ -75,14 +41,15 @@ template <class Steps, class L, class Blend, class View>
 SCOLOPAX_LANES_APART void findLight(const View& scene, const Blend& blend, const RayOf<L>& ray,
                                     std::uint32_t channels, const StratumPoints<L>& points,
                                     const SurfaceStart<L>& surface, const typename L::Mask& which,
-                                    CostOf<L>* cost, typename L::Vec* radiance) {
+                                    const ShadowMemory<L, Steps, Blend, View>& ofShadows, CostOf<L>* cost,
+                                    typename L::Vec* radiance) {
   using Vec = typename L::Vec;
   const LitPoint<L> hit{ray, points.t, insideOf<L>(scene.clip, ray.origin + points.t * ray.direction)};
 
   const Visibility<L> visibility = visibilityAt(
       scene, hit, which, [&](const RayOf<L>& shadow, const IntervalOf<L>& part) SCOLOPAX_LANES_LAMBDA {
         return marchTransmittance<L, Steps>(scene, blend, shadow, part, channels, points.offset, surface,
-                                            cost);
+                                            ofShadows, cost);
       });
   const typename L::Mask onSurface = surface.channel > typename L::Int(-1);
   Vec sum(0.0f);
@@ -156,6 +123,7 @@ class Strata {
   using Word = typename L::Word;
   using Mask = typename L::Mask;
   using Vec = typename L::Vec;
+  using OfShadows = ShadowMemory<L, Steps, Blend, View>;
   /// Arrays indexed by variables, apart from the rest as in SegmentEnds.
   struct Memory {
     PartOf<L> parts[kMaxVisibleChannels];  ///< per channel, of the current segment
@@ -172,9 +140,11 @@ class Strata {
 
   /// `channels`: bit n is visible channel n. `set` selects the blocks of `sampler` that are used: marches
   /// with different sets draw independent numbers.
-  SCOLOPAX_LANES Strata(Memory& memory, const View& scene, const Blend& blend, const RayOf<L>& ray,
-                        std::uint32_t channels, int set, const SamplerOf<L>& sampler, CostOf<L>* cost)
+  SCOLOPAX_LANES Strata(Memory& memory, const OfShadows& ofShadows, const View& scene, const Blend& blend,
+                        const RayOf<L>& ray, std::uint32_t channels, int set, const SamplerOf<L>& sampler,
+                        CostOf<L>* cost)
       : memory_(memory),
+        ofShadows_(ofShadows),
         scene_(scene),
         blend_(blend),
         ray_(ray),
@@ -285,7 +255,7 @@ class Strata {
     if constexpr (L::kLanes == 1) {
       if (which) {
         Vec lit;
-        findLight<Steps, L>(scene_, blend_, ray_, channels_, points, {}, which, cost_, &lit);
+        findLight<Steps, L>(scene_, blend_, ray_, channels_, points, {}, which, ofShadows_, cost_, &lit);
         sum_.add({lit, radiance_, emission_, mass}, color);
       }
     } else {
@@ -324,7 +294,7 @@ class Strata {
     CostOf<L> spent{};
     Vec sum;
     findLight<Steps, L>(scene_, blend_, rays, channels_, waiting.points, {}, Int(count_) > L::laneNumbers(),
-                        &spent, &sum);
+                        ofShadows_, &spent, &sum);
     for (int i = 0; i < count_; ++i) {
       const int to = at(ray, i);
       const Mask lane = L::laneNumbers() == Int(to);
@@ -355,6 +325,7 @@ class Strata {
   }
 
   Memory& memory_;
+  OfShadows ofShadows_;
   const View& scene_;
   const Blend& blend_;
   const RayOf<L>& ray_;

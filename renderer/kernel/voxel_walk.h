@@ -149,13 +149,16 @@ SCOLOPAX_LANES void sampleCubics(const SceneView& scene, const RayOf<L>& rays, s
   using Float = typename L::Float;
   using Vec = typename L::Vec;
   constexpr float kFarValue = 0x1p124f;  // as voxels; coefficients of a cubic are below 12 times that
-  Float corners[kMaxVisibleChannels][kCorners];
+  // Many rays read channels together. A single ray keeps the voxels of one channel in registers instead: a
+  // device would keep those of all channels in memory.
+  constexpr bool kTogether = L::kLanes > 1;
+  Float corners[kTogether ? kMaxVisibleChannels : 1][kCorners];
   std::uint32_t trilinear = 0;
   for (std::uint32_t left = channels; left != 0; left &= left - 1)
     if (scene.channels[lowestBit(left)].field.has(Filter::trilinear)) trilinear |= left & -left;
   const Float middle = 0.5f * (start + end), half = 0.5f * (end - start);
   const Vec centre = rays.origin + middle * rays.direction;
-  cellVoxels(scene, trilinear, centre, corners);
+  if constexpr (kTogether) cellVoxels(scene, trilinear, centre, corners);
   const CellPlaces<L> cell(scene.dims, centre);
   Vec points[kCubicNodes], places[kCubicNodes];
   for (int i = 0; i < kCubicNodes; ++i) {
@@ -166,10 +169,12 @@ SCOLOPAX_LANES void sampleCubics(const SceneView& scene, const RayOf<L>& rays, s
     const int n = lowestBit(left);
     const ChannelView& channel = scene.channels[n];
     Float stored[kCubicNodes], values[kCubicNodes];
-    if (trilinear >> n & 1) [[likely]]
-      for (int i = 0; i < kCubicNodes; ++i) stored[i] = interpolate<L>(corners[n], places[i]);
-    else
+    if (trilinear >> n & 1) [[likely]] {
+      if constexpr (!kTogether) cellVoxels(channel.field, scene.dims, centre, corners[0]);
+      for (int i = 0; i < kCubicNodes; ++i) stored[i] = interpolate<L>(corners[kTogether ? n : 0], places[i]);
+    } else {
       sampleNodes<L>(channel.field, scene.dims, centre, points, stored);
+    }
     for (int i = 0; i < kCubicNodes; ++i) {
       const Float value = clamp(stored[i] - channel.origin, -kFarValue, kFarValue);
       values[i] = select(isFinite(stored[i]), value, Float(kNaN));
