@@ -27,8 +27,8 @@ struct Pass {
   kernel::SceneView scene;
   kernel::SampleNumber number;
   glm::vec4* pixels;
-  kernel::SampleCost* cost;
-  kernel::FirstCollision* first;
+  kernel::SampleCost* cost = nullptr;       ///< null if costs are not counted
+  kernel::FirstCollision* first = nullptr;  ///< null if first collisions are not recorded
   std::uint8_t* done;  ///< width x height: nonzero for the pixels of this pass that are already rendered
   const std::atomic<bool>* cancel;
   std::chrono::steady_clock::time_point deadline;
@@ -50,7 +50,8 @@ class Launcher {
   virtual bool uploadTakesLong(const RenderPlan& before, const Scene& scene) const = 0;
   /// Renders the pixels of a pass that are not yet done. Returns false if pixels are left because `cancel`
   /// became true or the deadline passed. Rays end early once `cancel` is true; the deadline is looked at
-  /// between rays, so that one that takes longer than a turn is completed. Runs in the caller's thread arena:
+  /// between rays or, on a device, between bands of rows, so that one that takes longer than a turn is
+  /// completed. Runs in the caller's thread arena:
   /// call it from run() to use the launcher's threads.
   virtual bool launch(const Pass& pass) = 0;
 };

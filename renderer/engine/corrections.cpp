@@ -61,11 +61,15 @@ bool Corrections::render(Launcher& launcher, const RenderPlan& plan, Film& film,
                          const std::atomic<bool>& cancel, std::chrono::steady_clock::time_point deadline) {
   if (stage_ == Stage::notBegun) beginRows(film, addLevel);
   if (stage_ == Stage::complete) return true;
-  Pass pass{&plan,       plan.scene().method,
-            plan.view(), sampleNumber(plan.scene().sampling, film.corrections(level_)),
-            nullptr,     cost,
-            nullptr,     done_.data(),
-            &cancel,     deadline};
+  Pass pass{.plan = &plan,
+            .method = plan.scene().method,
+            .scene = plan.view(),
+            .number = sampleNumber(plan.scene().sampling, film.corrections(level_)),
+            .pixels = nullptr,  // each picture has its own
+            .cost = cost,
+            .done = done_.data(),
+            .cancel = &cancel,
+            .deadline = deadline};
   // Independent of the samples of the film and of the other levels.
   pass.scene.seed = kernel::hashOf(plan.scene().seed + 0x9e3779b9u * std::uint32_t(level_ + 1));
   const auto renderAt = [&](const Resolution& resolution, glm::vec4* pixels) {

@@ -84,16 +84,16 @@ class Engine final : public Renderer {
   }
 
   bool renderPixels(const std::atomic<bool>& cancel, std::chrono::nanoseconds budget) override {
-    Pass pass{plan_.get(),
-              plan_->scene().method,
-              plan_->view(),
-              sampleNumber(plan_->scene().sampling, film_.samples()),
-              film_.pass(),
-              costs_.pass(),
-              recording_ ? first_.pass() : nullptr,
-              done_.data(),
-              &cancel,
-              std::chrono::steady_clock::now() + budget};
+    Pass pass{.plan = plan_.get(),
+              .method = plan_->scene().method,
+              .scene = plan_->view(),
+              .number = sampleNumber(plan_->scene().sampling, film_.samples()),
+              .pixels = film_.pass(),
+              .cost = costs_.pass(),
+              .first = recording_ ? first_.pass() : nullptr,
+              .done = done_.data(),
+              .cancel = &cancel,
+              .deadline = std::chrono::steady_clock::now() + budget};
     if (automaticChosen_ && hasStep(automatic_.method)) setResolution(pass.scene, automatic_.resolution);
     bool complete = false;
     launcher_->run([&] {

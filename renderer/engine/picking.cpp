@@ -50,8 +50,15 @@ class SampledPicking final : public Picking {
       // a time.
       const glm::vec2 corner = glm::vec2(pixels_[at_]) + (isPoint_ ? 0.5f : 0.0f);
       view_.rays.halfSize = (halfSize_ - corner) / unit_;
-      if (!launcher_->launch({plan_.get(), method_, view_, number_, colors_.data(), nullptr, met_.data(),
-                              done_.data(), &cancel, deadline}))
+      if (!launcher_->launch({.plan = plan_.get(),
+                              .method = method_,
+                              .scene = view_,
+                              .number = number_,
+                              .pixels = colors_.data(),
+                              .first = met_.data(),
+                              .done = done_.data(),
+                              .cancel = &cancel,
+                              .deadline = deadline}))
         return false;
       if (const auto sample = visibleSample(met_)) found_.push_back(pickedBy(int(*sample)));
       std::fill(done_.begin(), done_.end(), std::uint8_t(0));

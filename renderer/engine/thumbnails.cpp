@@ -75,10 +75,15 @@ Thumbnails::Work Thumbnails::renderRows(std::uint32_t sample, int firstRow, int 
   done_.assign(pixels.size(), 1);
   std::fill_n(done_.begin() + std::ptrdiff_t(first), count, std::uint8_t(0));
   cost_.assign(pixels.size(), {});
-  const auto number = sampleNumber(Sampling::independent, sample);
-  const Pass pass{
-      &plan_,       method_, view_,        number,    pixels.data(),
-      cost_.data(), nullptr, done_.data(), &stopped_, std::chrono::steady_clock::time_point::max()};
+  const Pass pass{.plan = &plan_,
+                  .method = method_,
+                  .scene = view_,
+                  .number = sampleNumber(Sampling::independent, sample),
+                  .pixels = pixels.data(),
+                  .cost = cost_.data(),
+                  .done = done_.data(),
+                  .cancel = &stopped_,
+                  .deadline = std::chrono::steady_clock::time_point::max()};
   if (!launcher_.launch(pass)) throw Error(ErrorCode::cancelled, "rendering thumbnails was cancelled");
   Work work;
   for (const kernel::SampleCost& ray : cost_) {

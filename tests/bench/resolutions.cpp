@@ -37,8 +37,14 @@ Image draw(const std::shared_ptr<const Volume>& volume, const Scene& scene, int 
     const std::clock_t begin = std::clock();
     launcher->run([&] {
       std::vector<std::uint8_t> done(film.pixelCount());
-      launcher->launch({&plan, scene.method, view, sampleNumber(scene.sampling, 0), film.pass(), nullptr,
-                        nullptr, done.data(), &never, std::chrono::steady_clock::time_point::max()});
+      launcher->launch({.plan = &plan,
+                        .method = scene.method,
+                        .scene = view,
+                        .number = sampleNumber(scene.sampling, 0),
+                        .pixels = film.pass(),
+                        .done = done.data(),
+                        .cancel = &never,
+                        .deadline = std::chrono::steady_clock::time_point::max()});
       film.add();
     });
     const double time = 1000.0 * double(std::clock() - begin) / CLOCKS_PER_SEC;

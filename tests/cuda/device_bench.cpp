@@ -167,13 +167,11 @@ class DeviceFrames {
   /// Milliseconds of a frame.
   double frame(std::size_t number) {
     const Scene& scene = plan_->scene();
-    const cuda::DeviceBand band{scene_->viewOf(plan_->view()),
-                                sampleNumber(scene.sampling, std::uint32_t(number)),
-                                0,
-                                scene.height,
-                                reinterpret_cast<glm::vec4*>(pixels_.get()),
-                                nullptr,
-                                nullptr};
+    const cuda::DeviceBand band{.scene = scene_->viewOf(plan_->view()),
+                                .number = sampleNumber(scene.sampling, std::uint32_t(number)),
+                                .firstRow = 0,
+                                .rows = scene.height,
+                                .pixels = reinterpret_cast<glm::vec4*>(pixels_.get())};
     const cuda::LaunchFunction launch = cuda::chooseLaunch(
         instanceOf(scene.method, scene.blend, plan_->view()), band, plan_->view().channels);
     return timer_.run([&] { return launch(band, nullptr); });

@@ -45,13 +45,11 @@ class UploadedPlan {
   const RenderPlan& plan() const { return *plan_; }
   /// Renders the first sample of the whole picture.
   cuda::DeviceBand band(glm::vec4* pixels) const {
-    return {scene_->viewOf(plan_->view()),
-            sampleNumber(plan_->scene().sampling, 0),
-            0,
-            plan_->scene().height,
-            pixels,
-            nullptr,
-            nullptr};
+    return {.scene = scene_->viewOf(plan_->view()),
+            .number = sampleNumber(plan_->scene().sampling, 0),
+            .firstRow = 0,
+            .rows = plan_->scene().height,
+            .pixels = pixels};
   }
 
  private:

@@ -75,9 +75,14 @@ inline Replicates replicateLevels(const std::shared_ptr<const Volume>& volume, S
     launcher->run([&] {
       for (int s = 0; s < result.samples; ++s) {
         std::vector<std::uint8_t> done(film.pixelCount());
-        launcher->launch({plan.get(), scene.method, plan->view(),
-                          sampleNumber(scene.sampling, film.samples()), film.pass(), nullptr, nullptr,
-                          done.data(), &never, kNoDeadline});
+        launcher->launch({.plan = plan.get(),
+                          .method = scene.method,
+                          .scene = plan->view(),
+                          .number = sampleNumber(scene.sampling, film.samples()),
+                          .pixels = film.pass(),
+                          .done = done.data(),
+                          .cancel = &never,
+                          .deadline = kNoDeadline});
         const auto addLevel = [&] {
           film.addLevel();
           return true;

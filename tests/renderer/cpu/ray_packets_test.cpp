@@ -181,16 +181,16 @@ class RayPackets : public testing::TestWithParam<InstructionSet> {
     const std::atomic<bool> never = false;
     Picture picture{std::vector<glm::vec4>(count(), glm::vec4(3)), std::vector<kernel::SampleCost>(count()),
                     std::vector<kernel::FirstCollision>(count())};
-    const Pass pass{&*plan_,
-                    scene_.method,
-                    view_,
-                    sampleNumber(scene_.sampling, sample),
-                    picture.pixels.data(),
-                    picture.cost.data(),
-                    picture.first.data(),
-                    done.data(),
-                    &never,
-                    std::chrono::steady_clock::time_point::max()};
+    const Pass pass{.plan = &*plan_,
+                    .method = scene_.method,
+                    .scene = view_,
+                    .number = sampleNumber(scene_.sampling, sample),
+                    .pixels = picture.pixels.data(),
+                    .cost = picture.cost.data(),
+                    .first = picture.first.data(),
+                    .done = done.data(),
+                    .cancel = &never,
+                    .deadline = std::chrono::steady_clock::time_point::max()};
     for (int y = 0; y * kTile < scene_.height; ++y)
       for (int x = 0; x * kTile < scene_.width; ++x) tiles_(pass, x, y);
     EXPECT_EQ(std::count(done.begin(), done.end(), 1), std::ptrdiff_t(count()));
