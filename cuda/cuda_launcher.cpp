@@ -2,12 +2,12 @@
 #include "cuda/cuda_launcher.h"
 
 #include <algorithm>
-#include <deque>
 #include <mutex>
 #include <optional>
 
 #include "cuda/check.h"
 #include "cuda/device.h"
+#include "cuda/flights.h"
 #include "renderer/core/error.h"
 #include "renderer/core/short_text.h"
 
@@ -17,41 +17,12 @@ namespace {
 /// Bands at once on each device: one is rendered while the other's pixels are copied.
 constexpr int kBandsAtOnce = 2;
 
-/// The rows of a pass that are not done, as runs of neighbouring rows. A row that is done in part is rendered
-/// again: it comes out the same.
-class RowsLeft {
- public:
-  explicit RowsLeft(const Pass& pass) : pass_(pass) {}
-  struct Run {
-    int first, count;
-  };
-  /// The next run, of at most `most` rows.
-  std::optional<Run> next(int most) {
-    while (row_ < pass_.scene.height && done(row_)) ++row_;
-    const int first = row_;
-    while (row_ < pass_.scene.height && row_ - first < most && !done(row_)) ++row_;
-    if (row_ == first) return std::nullopt;
-    return Run{first, row_ - first};
-  }
-
- private:
-  bool done(int row) const {
-    const auto width = std::size_t(pass_.scene.width);
-    const std::uint8_t* begin = pass_.done + std::size_t(row) * width;
-    return std::find(begin, begin + width, std::uint8_t(0)) == begin + width;
-  }
-  const Pass& pass_;
-  int row_ = 0;
-};
-
 class CudaLauncher final : public Launcher {
  public:
   CudaLauncher(SharedDevices devices, int threads, DeviceFailure failure)
-      : shared_(std::move(devices)),
-        devices_(shared_->all),
-        cpu_(makeCpuLauncher(threads)),
-        failure_(std::move(failure)),
-        scenes_(devices_.size()) {}
+      : shared_(std::move(devices)), cpu_(makeCpuLauncher(threads)), failure_(std::move(failure)) {
+    for (const auto& device : shared_->all) targets_.push_back({.device = *device, .scene = nullptr});
+  }
   ~CudaLauncher() override { forgetScenes(); }
 
   std::string_view name() const override { return onCpu() ? "cpu" : "cuda"; }
@@ -60,18 +31,18 @@ class CudaLauncher final : public Launcher {
   void upload(const std::shared_ptr<const RenderPlan>& plan, const std::stop_token& stop) override {
     unlessFailed([&] {
       inMemory(*plan, [&] {
-        for (std::size_t d = 0; d < devices_.size(); ++d)
-          if (!sceneOn(d, *plan, [&] { return stop.stop_requested(); }))
+        for (Target& target : targets_)
+          if (!sceneOn(target, *plan, [&] { return stop.stop_requested(); }))
             throw Error(ErrorCode::cancelled, "the upload was cancelled");
       });
     });
   }
   bool uploadTakesLong(const RenderPlan& before, const Scene& scene) const override {
-    return !onCpu() && std::any_of(devices_.begin(), devices_.end(), [&](const auto& device) {
+    return !onCpu() && std::any_of(targets_.begin(), targets_.end(), [&](const Target& target) {
       const auto& channels = before.scene().channels;
       for (std::size_t i = 0; i < scene.channels.size() && i < channels.size(); ++i)
         if (scene.channels[i].visible && scene.channels[i] != channels[i] &&
-            !device->volume(before.volume())->has(int(i)))
+            !target.device.volume(before.volume())->has(int(i)))
           return true;
       return false;
     });
@@ -84,6 +55,12 @@ class CudaLauncher final : public Launcher {
   }
 
  private:
+  /// A device, and a plan's scene on it.
+  struct Target {
+    Device& device;
+    std::shared_ptr<const DeviceScene> scene;
+  };
+
   bool onCpu() const { return shared_->failed && failure_.continueOnCpu; }
   /// Calls f(), unless a device has failed or fails now and rendering goes on on the CPU: then returns false.
   template <class F>
@@ -98,13 +75,6 @@ class CudaLauncher final : public Launcher {
       if (!failure_.continueOnCpu) throw;
       if (!known && failure_.log) failure_.log(std::string(error.what()) + "; rendering goes on on the CPU");
       return false;
-    }
-  }
-
-  static void useQuietly(const Device& device) {
-    try {
-      device.use();
-    } catch (const Error&) {
     }
   }
 
@@ -131,9 +101,9 @@ class CudaLauncher final : public Launcher {
       needed += voxels.count() * sizeBytes(voxels.type());
     }
     std::optional<Error> busy;
-    for (const auto& device : devices_) {
-      device->use();
-      const std::size_t most = device->capacity(), held = device->heldBytes();
+    for (const Target& target : targets_) {
+      target.device.use();
+      const std::size_t most = target.device.capacity(), held = target.device.heldBytes();
       const auto textOf = [&](const std::string& use) {
         return "memory of a CUDA device: expected at most " + mebibytes(most) + use + ", found " +
                mebibytes(needed);
@@ -145,90 +115,39 @@ class CudaLauncher final : public Launcher {
   }
   /// Returns whether there were any.
   bool forgetScenes() {
-    std::vector<std::shared_ptr<const DeviceScene>> scenes(devices_.size());
-    {
-      const std::lock_guard lock(mutex_);
-      scenes.swap(scenes_);
-    }
     bool any = false;
-    for (std::size_t d = 0; d < devices_.size(); ++d) {
-      if (!scenes[d]) continue;
-      useQuietly(*devices_[d]);
-      scenes[d].reset();
+    for (Target& target : targets_) {
+      std::shared_ptr<const DeviceScene> scene;
+      {
+        const std::lock_guard lock(mutex_);
+        scene.swap(target.scene);
+      }
+      if (!scene) continue;
+      target.device.tryToUse();
+      scene.reset();
       any = true;
     }
     return any;
   }
 
-  struct Flight {
-    std::size_t device;
-    std::unique_ptr<Band> band;
-  };
-  /// Bands under way; gives them back, or releases them if they have not been finished.
-  class Flights {
-   public:
-    explicit Flights(const Devices::List& devices) : devices_(devices) {}
-    Flights(const Flights&) = delete;
-    Flights& operator=(const Flights&) = delete;
-    ~Flights() {
-      for (Flight& flight : bands_) {
-        useQuietly(*devices_[flight.device]);
-        flight.band.reset();
-      }
-    }
-    std::size_t on(std::size_t device) const {
-      return std::size_t(
-          std::count_if(bands_.begin(), bands_.end(), [&](const Flight& f) { return f.device == device; }));
-    }
-    bool empty() const { return bands_.empty(); }
-    /// A band for a pass; null if the device has no memory for one more.
-    std::unique_ptr<Band> take(std::size_t device, const Pass& pass) const {
-      try {
-        auto band = devices_[device]->takeBand();
-        band->prepare(pass.cost, pass.first);
-        return band;
-      } catch (const Error& error) {
-        if (error.code() != ErrorCode::tooLarge || on(device) == 0) throw;
-        return nullptr;
-      }
-    }
-    void begin(std::size_t device, std::unique_ptr<Band> band, const Pass& pass,
-               const kernel::SceneView& scene, int firstRow, int rows) {
-      bands_.push_back({device, std::move(band)});
-      bands_.back().band->start(pass, scene, firstRow, rows);
-    }
-    void finishOldest(const Pass& pass) {
-      Flight& flight = bands_.front();
-      Device& device = *devices_[flight.device];
-      device.use();
-      flight.band->finish(pass);
-      device.tookMs(flight.band->kernelMs(),
-                    std::size_t(flight.band->rows()) * std::size_t(pass.scene.width));
-      device.giveBack(std::move(flight.band));
-      bands_.pop_front();
-    }
-
-   private:
-    const Devices::List& devices_;
-    std::deque<Flight> bands_;
-  };
-
   bool launchOnDevices(const Pass& pass) {
-    std::vector<std::shared_ptr<const DeviceScene>> scenes(devices_.size());
-    for (std::size_t d = 0; d < devices_.size(); ++d) {
-      scenes[d] = sceneOn(d, *pass.plan, [&] { return bool(*pass.cancel); });
-      if (!scenes[d]) return false;
+    std::vector<Target> targets;
+    for (Target& target : targets_) {
+      auto scene = sceneOn(target, *pass.plan, [&] { return bool(*pass.cancel); });
+      if (!scene) return false;
+      targets.push_back({.device = target.device, .scene = std::move(scene)});
     }
     RowsLeft rows(pass);
-    Flights flights(devices_);
+    Flights flights(pass);
     bool more = true, ended = false;
     while (more || !flights.empty()) {
       bool begun = false;
-      for (std::size_t d = 0; more && d < devices_.size(); ++d) {
-        if (flights.on(d) == kBandsAtOnce) continue;
-        Device& device = *devices_[d];
+      for (const Target& target : targets) {
+        if (!more) break;
+        Device& device = target.device;
+        if (flights.on(device) == kBandsAtOnce) continue;
         device.use();
-        std::unique_ptr<Band> band = flights.take(d, pass);
+        std::unique_ptr<Band> band = flights.take(device);
         if (!band) continue;
         ended = *pass.cancel || std::chrono::steady_clock::now() >= pass.deadline;
         const auto run = ended ? std::nullopt : rows.next(device.rowsOf(pass.scene.width, pass.scene.height));
@@ -237,34 +156,36 @@ class CudaLauncher final : public Launcher {
           device.giveBack(std::move(band));
           break;
         }
-        flights.begin(d, std::move(band), pass, scenes[d]->viewOf(pass.scene), run->first, run->count);
+        flights.begin(device, std::move(band), target.scene->viewOf(pass.scene), *run);
         begun = true;
       }
-      if (!begun && !flights.empty()) flights.finishOldest(pass);
+      if (begun || flights.empty()) continue;
+      if (!flights.finishOldest()) {
+        ended = true;
+        more = false;
+      }
     }
     return !ended;
   }
 
   /// A plan's scene on a device; null if `stop` returned true before its volume was there.
-  std::shared_ptr<const DeviceScene> sceneOn(std::size_t d, const RenderPlan& plan,
+  std::shared_ptr<const DeviceScene> sceneOn(Target& target, const RenderPlan& plan,
                                              const std::function<bool()>& stop) {
-    Device& device = *devices_[d];
-    device.use();
+    target.device.use();
     const std::lock_guard lock(mutex_);
-    std::shared_ptr<const DeviceScene>& scene = scenes_[d];
+    std::shared_ptr<const DeviceScene>& scene = target.scene;
     if (scene && scene->plan().get() == &plan) return scene;
-    auto planes = device.volume(plan.volume())->upload(plan.visibleChannels(), stop);
+    auto planes = target.device.volume(plan.volume())->upload(plan.visibleChannels(), stop);
     if (!planes) return nullptr;
-    scene = device.makeScene(plan.shared_from_this(), std::move(*planes), scene.get());
+    scene = target.device.makeScene(plan.shared_from_this(), std::move(*planes), scene.get());
     return scene;
   }
 
   const SharedDevices shared_;
-  const Devices::List& devices_;
   const std::unique_ptr<Launcher> cpu_;
   const DeviceFailure failure_;
-  std::mutex mutex_;
-  std::vector<std::shared_ptr<const DeviceScene>> scenes_;  // per device: the last plan's
+  std::mutex mutex_;             // of the scenes
+  std::vector<Target> targets_;  // with the last plan's scenes
 };
 
 }  // namespace
@@ -286,7 +207,12 @@ std::vector<DeviceInfo> devices(std::string* why) {
       cudaGetLastError();
       continue;
     }
-    found.push_back({index, properties.name, properties.major, properties.minor, total, free});
+    found.push_back({.index = index,
+                     .name = properties.name,
+                     .major = properties.major,
+                     .minor = properties.minor,
+                     .memoryBytes = total,
+                     .freeBytes = free});
   }
   if (found.empty() && why) *why = "no device";
   return found;

@@ -15,9 +15,13 @@ constexpr int kFewestRows = 4;
 
 }  // namespace
 
-Device::~Device() { cudaSetDevice(index_); }
+Device::~Device() { tryToUse(); }
 
 void Device::use() const { check(cudaSetDevice(index_), "choosing a device"); }
+
+void Device::tryToUse() const {
+  if (cudaSetDevice(index_) != cudaSuccess) cudaGetLastError();
+}
 
 std::shared_ptr<DeviceVolume> Device::volume(const std::shared_ptr<const Volume>& volume) {
   const std::lock_guard lock(mutex_);
@@ -79,7 +83,7 @@ std::unique_ptr<Band> Device::takeBand() {
       return band;
     }
   }
-  return std::make_unique<Band>(*memory_);
+  return std::make_unique<Band>(*memory_, cancelWatch_);
 }
 
 void Device::giveBack(std::unique_ptr<Band> band) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cuda/band.h"
+#include "cuda/cancel_watch.h"
 #include "cuda/device_memory.h"
 #include "cuda/device_scene.h"
 #include "cuda/device_volume.h"
@@ -25,6 +26,8 @@ class Device {
 
   /// Makes it the current device of the calling thread, on which the other functions depend.
   void use() const;
+  /// The same for what must go on even if the device has failed.
+  void tryToUse() const;
   /// The volume on the device, empty at first. What nobody holds of it stays there until memory is short.
   std::shared_ptr<DeviceVolume> volume(const std::shared_ptr<const Volume>& volume);
   std::shared_ptr<const DeviceScene> makeScene(std::shared_ptr<const RenderPlan> plan,
@@ -52,6 +55,7 @@ class Device {
   const std::function<bool()> release_;
   const std::shared_ptr<DeviceMemory> memory_ = std::make_shared<DeviceMemory>([this] { return makeRoom(); });
   Uploader uploader_;
+  CancelWatch cancelWatch_;
   mutable std::mutex mutex_;
   std::list<std::shared_ptr<DeviceVolume>> volumes_;  // the most recently used first
   std::vector<std::unique_ptr<Band>> bands_;          // those that nobody uses

@@ -16,9 +16,9 @@ struct DeviceBand {
   kernel::SceneView scene;
   kernel::SampleNumber number;
   int firstRow, rows;
-  glm::vec4* pixels;              ///< as kernel::RenderPixel::pass
-  kernel::SampleCost* cost;       ///< null if costs are not counted
-  kernel::FirstCollision* first;  ///< null if first collisions are not recorded
+  glm::vec4* pixels;                        ///< as kernel::RenderPixel::pass
+  kernel::SampleCost* cost = nullptr;       ///< null if costs are not counted
+  kernel::FirstCollision* first = nullptr;  ///< null if first collisions are not recorded
 };
 
 /// Starts the kernel on a stream of the current device, without waiting for it.

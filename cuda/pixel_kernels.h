@@ -41,8 +41,13 @@ __global__ void __launch_bounds__(kBlockWidth* kBlockHeight, kBlocksAtOnce<View>
 /// `view`: the band's scene.
 template <class Integrator, class Blend, class Lighting, class View>
 cudaError_t launchView(const View& view, const DeviceBand& given, cudaStream_t stream) {
-  RenderBand<Integrator, Blend, Lighting, View> band{
-      {view, given.number, given.pixels, given.cost, given.first}, given.firstRow, given.rows};
+  RenderBand<Integrator, Blend, Lighting, View> band{.render = {.scene = view,
+                                                                .number = given.number,
+                                                                .pass = given.pixels,
+                                                                .cost = given.cost,
+                                                                .first = given.first},
+                                                     .firstRow = given.firstRow,
+                                                     .rows = given.rows};
   const dim3 block(kBlockWidth, kBlockHeight);
   const dim3 grid((unsigned(given.scene.width) + block.x - 1) / block.x,
                   (unsigned(given.rows) + block.y - 1) / block.y);

@@ -35,8 +35,9 @@ __global__ void __launch_bounds__(kThreads) rebuildCells(Rebuild rebuild) {
 
 cudaError_t rebuildTotals(const kernel::MajorantView& majorants, kernel::TotalCode* totals,
                           std::uint32_t* active, cudaStream_t stream) {
-  Rebuild rebuild{majorants, totals, active,
-                  unsigned(majorants.cells.x) * unsigned(majorants.cells.y) * unsigned(majorants.cells.z)};
+  const glm::uvec3 cells(majorants.cells);
+  Rebuild rebuild{
+      .majorants = majorants, .totals = totals, .active = active, .cells = cells.x * cells.y * cells.z};
   void* arguments[] = {&rebuild};
   return cudaLaunchKernel(rebuildCells, dim3((rebuild.cells + kThreads - 1) / kThreads), dim3(kThreads),
                           arguments, 0, stream);

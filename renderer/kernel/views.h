@@ -9,6 +9,7 @@
 #include <glm/vec3.hpp>
 
 #include "renderer/kernel/camera_rays.h"
+#include "renderer/kernel/host_flag.h"
 #include "renderer/kernel/majorants.h"
 #include "renderer/kernel/views/clip_view.h"
 #include "renderer/kernel/views/curve_view.h"
@@ -70,7 +71,7 @@ struct SceneView {
                              ///< any scale
   glm::mat3 gradientFromVoxel;      ///< its inverse transpose
   float smallestSpacing;            ///< world units
-  const std::atomic<bool>* cancel;  ///< null on devices: whether rays should end early, without a result
+  const std::atomic<bool>* cancel;  ///< whether rays should end early, without a result; null: never
 
   /// Channels whose opacity may depend on the gradient: length of arrays, which must not be empty.
   static constexpr int kFactors = kPlainDevice ? 1 : kMaxVisibleChannels;
@@ -79,12 +80,15 @@ struct SceneView {
   SCOLOPAX_HD bool hasNearest() const { return !kPlainDevice && nearest; }
   /// Whether quadrature cuts rays at the faces of voxel cells. It must for nearest voxels, where fields jump.
   SCOLOPAX_HD bool cutsAtVoxels() const { return voxelwise || nearest; }
+  /// A single ray may take seconds, so loops along rays ask. On a device, the answer may be late, and "no"
+  /// after a "yes": results are valid only if `cancel` is not set when the kernel has completed.
+  SCOLOPAX_HD bool isCancelled() const {
 #if defined(__CUDA_ARCH__)
-  SCOLOPAX_HD static constexpr bool isCancelled() { return false; }
+    return cancel && isSetOnHost(cancel);
 #else
-  /// A single ray may take seconds, so loops along rays ask.
-  SCOLOPAX_HD bool isCancelled() const { return cancel && cancel->load(std::memory_order_relaxed); }
+    return cancel && cancel->load(std::memory_order_relaxed);
 #endif
+  }
 };
 
 /// A plain scene: trilinear interpolation, no surfaces, no opacity that depends on the gradient, and no

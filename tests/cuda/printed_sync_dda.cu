@@ -28,9 +28,9 @@ struct PrintedSyncDda {
         while (true) {
           const kernel::RandomBlock random = sampler.next();
           t += kernel::opticalDepth(kernel::uniformOf(random.x)) / majorant;
-          if ((hit && t > hit->place.t()) || !(t < walk.exit())) break;
-          const kernel::Place place{t, 0.0f};
-          const auto found = kernel::testChannel<Blend>(scene, kernel::AllChannels{}, n, majorant, place,
+          if ((hit && t > hit->distance.t()) || !(t < walk.exit())) break;
+          const kernel::RayDistance distance{t, 0.0f};
+          const auto found = kernel::testChannel<Blend>(scene, kernel::AllChannels{}, n, majorant, distance,
                                                         walk.pointAt(t), random, cost);
           if (!found) continue;
           hit = found;

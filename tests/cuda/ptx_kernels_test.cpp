@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests of the compiled kernels: none is missing, and all of their memory accesses are checked.
 #include <gmock/gmock.h>
+#include <tbb/global_control.h>
 
 #include "tests/cuda/device_scenes.h"
 #include "tests/cuda/ptx_counts.h"
@@ -35,6 +36,51 @@ TEST(PtxKernels, AreCaughtReadingAndWritingWhereTheyMayNot) {
   EXPECT_THAT(faultOf(onDevice, 63), testing::HasSubstr("store outside of memory"));
   EXPECT_THAT(faultOf(uploaded.plan().view(), 64),
               testing::HasSubstr("load outside of memory"));  // the host's
+}
+
+TEST(PtxKernels, ReadTheFlagThatEndsThemSeldomUntilItIsSet) {
+  const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
+  const auto volume = mixedVolume();
+  Scene scene = obliqueScene(*volume, 24, 32);
+  scene.method = Method::raymarch;
+  scene.step = 0.1;
+  const UploadedPlan uploaded(volume, scene);
+  const ExactPixels film(24 * 32);
+  cuda::DeviceBand band = uploaded.band(film.data());
+  const auto launch = cuda::chooseLaunch({Method::raymarch, BlendMode::density, false, false}, band,
+                                         uploaded.plan().view().channels);
+  struct Counts {
+    std::uint64_t readings, hostAccesses;
+  };
+  const auto countsOf = [&](const std::atomic<bool>* cancel) {
+    band.scene.cancel = cancel;
+    const Counts before{ptx::clockReadings, ptx::hostAccesses};
+    EXPECT_EQ(launch(band, nullptr), cudaSuccess);
+    EXPECT_EQ(cudaDeviceSynchronize(), cudaSuccess);
+    return Counts{ptx::clockReadings - before.readings, ptx::hostAccesses - before.hostAccesses};
+  };
+  const Counts without = countsOf(nullptr);
+  EXPECT_EQ(without.readings, 0u);
+  EXPECT_EQ(without.hostAccesses, 0u);
+
+  void* memory = nullptr;
+  ASSERT_EQ(cudaHostAlloc(&memory, sizeof(std::atomic<bool>), cudaHostAllocMapped), cudaSuccess);
+  auto* const flag = new (memory) std::atomic<bool>(false);
+  const Counts unset = countsOf(flag);
+  const std::uint64_t blocks = 3 * 2, readingsPerAnswer = kernel::kAnswerCycles / ptx::kCyclesPerReading;
+  EXPECT_GT(unset.readings, 10'000u);
+  EXPECT_GE(unset.hostAccesses, unset.readings / (readingsPerAnswer + 1));
+  EXPECT_LE(unset.hostAccesses, unset.readings / readingsPerAnswer + blocks);
+  *flag = true;
+  const Counts set = countsOf(flag);
+  EXPECT_GE(set.hostAccesses + readingsPerAnswer, set.readings) << "as soon as it is set, always";
+  EXPECT_LE(set.readings, 4u * 24 * 32) << "then rays end";
+  cudaFreeHost(memory);
+
+  band.scene.cancel = &kNever;  // not mapped
+  EXPECT_EQ(launch(band, nullptr), cudaSuccess);
+  EXPECT_EQ(cudaDeviceSynchronize(), cudaErrorIllegalAddress);
+  EXPECT_THAT(substitute::lastFault(), testing::HasSubstr("load outside of memory"));
 }
 
 TEST(PtxInstructions, OfBitFieldsInsertOneAndCutWhatIsBeyond) {

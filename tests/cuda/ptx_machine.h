@@ -2,6 +2,7 @@
 // The parts from which translated PTX (ptx_to_cpp.py) is built: registers, instructions without a C++
 // equivalent, and memory whose accesses are all checked.
 #pragma once
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -52,6 +53,7 @@ struct Index {
 /// A range of memory that a thread may use.
 struct Range {
   std::uint64_t begin, end;
+  bool onHost = false;  ///< memory of the host that is mapped to the device
   bool holds(std::uint64_t address, std::size_t size) const {
     return address >= begin && address < end && size <= end - address;
   }
@@ -116,6 +118,8 @@ inline void checkAlignment(std::uint64_t address, std::size_t size) {
   if (address % size != 0) throw Fault("misaligned address");
 }
 enum class Access { load, store };
+/// Number of accesses to memory of the host so far.
+inline std::atomic<std::uint64_t> hostAccesses = 0;
 /// Throws Fault unless the thread may make this access.
 void checkAccess(const Thread& thread, std::uint64_t address, std::size_t size, Access access);
 
@@ -143,6 +147,11 @@ void store(const Thread& thread, std::uint64_t address, T value) {
 }
 
 inline float floatOf(std::uint32_t bits) { return std::bit_cast<float>(bits); }
+/// A device's clock: here, it advances when it is read.
+inline constexpr std::uint32_t kCyclesPerReading = 1u << 16;
+inline std::atomic<std::uint64_t> clockReadings = 0;
+inline std::uint32_t readClock() { return std::uint32_t(++clockReadings) * kCyclesPerReading; }
+
 inline double doubleOf(std::uint64_t bits) { return std::bit_cast<double>(bits); }
 
 /// A whole float as an integer: the nearest representable one; 0 for NaN.

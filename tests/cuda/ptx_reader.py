@@ -12,7 +12,7 @@ class Refused(Exception):
 
 @dataclass
 class Array:
-    """A parameter, a variable in local memory or a table: bytes with a name."""
+    """A parameter, a variable in local or shared memory or a table: bytes with a name."""
     name: str
     size: int
     align: int
@@ -36,6 +36,7 @@ class Function:
 class Module:
     functions: list[Function]
     tables: list[Array]
+    shared: list[Array]
 
 
 def split_commas(text):
@@ -133,7 +134,7 @@ def read_function(text, start):
 
 def read_module(text):
     text = re.sub(r"//[^\n]*", "", text)
-    module = Module([], [])
+    module = Module([], [], [])
     item = re.compile(r"\.entry\b|\.func\b|\.(?:global|const|shared)\b[^;]*;")
     at = 0
     while match := item.search(text, at):
@@ -142,7 +143,9 @@ def read_module(text):
             module.functions.append(function)
             continue
         if match.group().startswith(".shared"):
-            raise Refused("shared memory")
+            module.shared.append(read_array(match.group()[:-1]))
+            at = match.end()
+            continue
         declaration, _, values = match.group()[:-1].partition("=")
         table = read_array(declaration)
         table.values = values.strip().strip("{}")

@@ -31,7 +31,7 @@ std::vector<ptx::Range> globalMemory(std::span<const substitute::Allocation> all
   std::vector<ptx::Range> ranges = tables();
   for (const substitute::Allocation& allocation : allocations) {
     const std::uint64_t begin = ptx::addressOf(allocation.begin);
-    ranges.push_back({begin, begin + allocation.sizeBytes});
+    ranges.push_back({begin, begin + allocation.sizeBytes, allocation.onHost});
   }
   std::sort(ranges.begin(), ranges.end(), before);
   return ranges;
@@ -66,7 +66,10 @@ std::vector<std::string> kernelNames() {
 void checkAccess(const Thread& thread, std::uint64_t address, std::size_t size, Access access) {
   checkAlignment(address, size);
   const auto after = std::upper_bound(thread.global.begin(), thread.global.end(), Range{address, 0}, before);
-  if (after != thread.global.begin() && std::prev(after)->holds(address, size)) return;
+  if (after != thread.global.begin() && std::prev(after)->holds(address, size)) {
+    hostAccesses += std::prev(after)->onHost;
+    return;
+  }
   for (const Frame* frame = thread.local; frame; frame = frame->outer)
     if (frame->range.holds(address, size)) return;
   if (access == Access::load)

@@ -5,8 +5,9 @@
 Turns compiled kernels into C++ that runs them on a CPU, a statement for every instruction (ptx_machine.h has what
 they are built from). With --count, it also counts what it executes (ptx_counts.h); with --only, kernels whose names do
 not contain the text are left out. Refuses arithmetic whose bits depend on the device: approximations, flushed denormals, float
-operations that a later stage might contract; and what these kernels have no business with: shared memory, barriers,
-atomics, calls of functions that are not in the file."""
+operations that a later stage might contract; and what these kernels have no business with: barriers, atomics, calls of
+functions that are not in the file, shared memory except volatile variables. Threads run one after another, so that the
+result must not depend on when others write these."""
 import argparse
 import re
 import sys
@@ -82,10 +83,13 @@ class FunctionTranslator:
             names = [name] if count is None else [f"{name}{i}" for i in range(int(count))]
             self.lines.append(f"{cpp} {', '.join(names)};")
             return
-        if not text.startswith((".local", ".param")):
+        if not text.startswith((".local", ".param", ".shared")):
             raise Refused("declaration")
         array = read_array(text)
         self.symbols[array.name] = array.name
+        if text.startswith(".shared"):
+            self.lines.append(f"static {shared(array)}")
+            return
         self.lines.append(f"alignas({array.align}) std::byte {array.name}[{array.size}];")
         if text.startswith(".local"):
             self.lines.append(f"const ptx::Frame frame_{array.name}(thread, {array.name});")
@@ -106,6 +110,8 @@ class FunctionTranslator:
         special = re.fullmatch(r"%(tid|ntid|ctaid|nctaid)\.([xyz])", operand)
         if special:
             return f"thread.{special.group(1)}.{special.group(2)}"
+        if operand == "%clock":
+            return "ptx::readClock()"
         if re.fullmatch(r"0[fF][0-9A-Fa-f]{8}", operand):
             return f"ptx::floatOf(0x{operand[2:]}u)"
         if re.fullmatch(r"0[dD][0-9A-Fa-f]{16}", operand):
@@ -176,16 +182,23 @@ class FunctionTranslator:
     def vector(self, modifiers, operand):
         return split_commas(operand[1:-1]) if {"v2", "v4"} & set(modifiers) else [operand]
 
+    def is_unchecked(self, modifiers):
+        """Whether an access needs no check because it names a variable."""
+        if "shared" in modifiers and "volatile" not in modifiers:
+            raise Refused("shared memory that is not volatile")
+        return "param" in modifiers or "shared" in modifiers
+
     def do_ld(self, modifiers, operands):
         type_name = plain(modifiers[-1])
         size = bits(type_name) // 8
-        load = "ptx::read" if "param" in modifiers else "ptx::load"
-        where = "" if "param" in modifiers else "thread, "
+        unchecked = self.is_unchecked(modifiers)
+        load = "ptx::read" if unchecked else "ptx::load"
+        where = "" if unchecked else "thread, "
         code = f"{{ const std::uint64_t at = {self.address(operands[1])}; "
         registers = self.vector(modifiers, operands[0])
         if len(registers) > 1:
             code += f"ptx::checkAlignment(at, {len(registers) * size}); "
-        if self.count and "param" not in modifiers:
+        if self.count and not unchecked:
             code += f"ptx::countLoad(thread, at, {len(registers) * size}); "
         for i, register in enumerate(registers):
             code += self.assign(register, type_name, f"{load}<{CPP_TYPES[type_name]}>({where}at + {i * size})")
@@ -194,8 +207,9 @@ class FunctionTranslator:
     def do_st(self, modifiers, operands):
         type_name = plain(modifiers[-1])
         size = bits(type_name) // 8
-        store = "ptx::write" if "param" in modifiers else "ptx::store"
-        where = "" if "param" in modifiers else "thread, "
+        unchecked = self.is_unchecked(modifiers)
+        store = "ptx::write" if unchecked else "ptx::store"
+        where = "" if unchecked else "thread, "
         code = f"{{ const std::uint64_t at = {self.address(operands[0])}; "
         registers = self.vector(modifiers, operands[1])
         if len(registers) > 1:
@@ -205,6 +219,8 @@ class FunctionTranslator:
         return code + "}"
 
     def do_cvta(self, modifiers, operands):
+        if "shared" in modifiers:
+            raise Refused("address of shared memory")
         return self.assign(operands[0], "u64", self.value(operands[1], "u64"))  # one address space for all
 
     # Moves and conversions
@@ -389,6 +405,12 @@ class FunctionTranslator:
     do_exit = do_ret
 
 
+def shared(array):
+    """Declaration of a variable in shared memory. A thread of the host runs one block at a time; the next one finds
+    what the last one has left, as on a device."""
+    return f"thread_local alignas({array.align}) std::byte {array.name}[{array.size}];"
+
+
 def label(name):
     return name.replace("$", "")
 
@@ -400,11 +422,13 @@ def translate(text, allow_contraction=False, count=False, only=""):
                if function.defined and (only in function.name or not function.is_kernel)]
     names = {function.name: f"function{i}" for i, function in enumerate(defined)}
     symbols = {table.name: f"table_{table.name}" for table in module.tables}
+    symbols |= {array.name: array.name for array in module.shared}
     out = [f'#include "tests/cuda/{"ptx_counts" if count else "ptx_machine"}.h"', "", "namespace {"]
     for table in module.tables:
         out.append(f"alignas({table.align}) {CPP_TYPES[plain(table.element)]} table_{table.name}"
                    f"[{table.size // (bits(table.element) // 8)}] = {{{table.values}}};")
         out.append(f"const ptx::Table register_{table.name}(table_{table.name});")
+    out += [shared(array) for array in module.shared]
     signature = "(ptx::Thread& thread, std::byte* result, const std::byte* const* arguments)"
     out += [f"void {name}{signature};" for name in names.values()]
     refusals = []

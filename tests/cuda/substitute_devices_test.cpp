@@ -120,6 +120,52 @@ TEST_F(SubstituteDevices, HaveMemoryOfTheirOwn) {
   EXPECT_EQ(seen, std::vector<const void*>{one.get()});
 }
 
+TEST_F(SubstituteKernels, UseMemoryOfTheHostThatIsMappedToTheirDevice) {
+  setDeviceCount(cudaSuccess, 2);
+  PinnedInts mapped = pinnedInts({1, 2}, cudaHostAllocMapped);
+  const PinnedInts other = pinnedInts({3});
+  void* onDevice = nullptr;
+  EXPECT_EQ(cudaHostGetDevicePointer(&onDevice, mapped.get(), 0), cudaSuccess);
+  EXPECT_EQ(onDevice, mapped.get());
+  EXPECT_EQ(cudaHostGetDevicePointer(&onDevice, mapped.get(), 1), cudaErrorInvalidValue);
+  EXPECT_EQ(cudaHostGetDevicePointer(&onDevice, other.get(), 0), cudaErrorInvalidValue);
+  EXPECT_TRUE(allocations().empty());
+  ASSERT_EQ(mappedAllocations().size(), 1u);
+  std::vector<const void*> seen;
+  const auto look = [&](std::span<const Allocation> memory) {
+    for (const Allocation& each : memory) seen.push_back(each.onHost ? each.begin : nullptr);
+  };
+  launchKernel(nullptr, dim3(1), dim3(1), 1, look);
+  EXPECT_EQ(seen, std::vector<const void*>{mapped.get()});
+  cudaSetDevice(1);
+  EXPECT_EQ(cudaHostGetDevicePointer(&onDevice, mapped.get(), 0), cudaErrorInvalidValue);
+  launchKernel(nullptr, dim3(1), dim3(1), 1, look);
+  EXPECT_EQ(seen.size(), 1u);
+
+  cudaSetDevice(0);
+  const Stream stream = newStream();
+  int read = 0;
+  launchBlocks(stream.get(), dim3(1), dim3(1), [&, from = mapped.get()](uint3) { read = from[1]; });
+  mapped.reset();
+  EXPECT_EQ(freesThatWaited(), 1u);
+  EXPECT_EQ(read, 2);
+}
+
+TEST_F(SubstituteKernels, CallATestBeforeABlock) {
+  const tbb::global_control oneThread(tbb::global_control::max_allowed_parallelism, 1);
+  int blocks = 0, atCall = -1;
+  const auto launch = [&] { launchBlocks(nullptr, dim3(3), dim3(1), [&](uint3) { ++blocks; }); };
+  callBeforeBlock(5, [&] {
+    EXPECT_EQ(atCall, -1);
+    atCall = blocks;
+  });
+  launch();
+  EXPECT_EQ(atCall, -1);
+  launch();
+  launch();
+  EXPECT_EQ(atCall, 4);
+}
+
 TEST_F(SubstituteDevices, HaveStreamsAndEventsOfTheirOwn) {
   setDeviceCount(cudaSuccess, 2);
   const Stream stream = newStream();

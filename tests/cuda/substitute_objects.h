@@ -28,10 +28,9 @@ inline DeviceInts deviceInts(std::size_t count) {
   cudaMalloc(&memory, count * sizeof(int));
   return DeviceInts(static_cast<int*>(memory));
 }
-inline PinnedInts pinnedInts(const std::vector<int>& values) {
+inline PinnedInts pinnedInts(const std::vector<int>& values, unsigned flags = cudaHostAllocDefault) {
   void* memory = nullptr;
-  if (cudaHostAlloc(&memory, values.size() * sizeof(int), cudaHostAllocDefault) != cudaSuccess)
-    return nullptr;
+  if (cudaHostAlloc(&memory, values.size() * sizeof(int), flags) != cudaSuccess) return nullptr;
   std::copy(values.begin(), values.end(), static_cast<int*>(memory));
   return PinnedInts(static_cast<int*>(memory));
 }

@@ -126,13 +126,23 @@ cudaError_t cudaFree(void* memory) {
 cudaError_t cudaHostAlloc(void** memory, size_t sizeBytes, unsigned flags) {
   return call([&] {
     currentDevice();
-    if (flags & ~unsigned(cudaHostAllocPortable)) throw Failure{cudaErrorInvalidValue};
+    if (flags & ~unsigned(cudaHostAllocPortable | cudaHostAllocMapped)) throw Failure{cudaErrorInvalidValue};
     *memory = nullptr;
     if (sizeBytes == 0) return;
     std::byte* const begin = allocate(sizeBytes);
     if (!begin) throw Failure{cudaErrorMemoryAllocation};
-    state().pinnedMemory[begin] = {sizeBytes, caller().device};
+    state().pinnedMemory[begin] = {sizeBytes, caller().device, (flags & cudaHostAllocMapped) != 0};
     *memory = begin;
+  });
+}
+
+cudaError_t cudaHostGetDevicePointer(void** onDevice, void* memory, unsigned flags) {
+  return call([&] {
+    currentDevice();
+    const Memory* found = allocationOf(state().pinnedMemory, memory, 1);
+    if (flags != 0 || !found || !found->mapped || found->device != caller().device)
+      throw Failure{cudaErrorInvalidValue};
+    *onDevice = memory;
   });
 }
 
@@ -140,7 +150,9 @@ cudaError_t cudaFreeHost(void* memory) {
   return release([&] {
     if (!memory) return;
     const Memory freed = expectAllocation(state().pinnedMemory, memory);
-    state().freesThatWaited += finishUsersOf({static_cast<std::byte*>(memory), freed.sizeBytes});
+    state().freesThatWaited += freed.mapped
+                                   ? finishDevice(freed.device)  // kernels may use it
+                                   : finishUsersOf({static_cast<std::byte*>(memory), freed.sizeBytes});
     state().pinnedMemory.erase(static_cast<std::byte*>(memory));
     std::free(memory);
     expectAlive(freed.device);

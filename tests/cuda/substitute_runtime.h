@@ -32,9 +32,11 @@ struct Allocation {
   const std::byte* begin;
   std::size_t sizeBytes;
   int device;
+  bool onHost = false;  ///< pinned memory that is mapped to the device
 };
-/// Allocations of device memory, by address.
+/// Allocations of device memory, or of mapped memory of the host, by address.
 std::vector<Allocation> allocations();
+std::vector<Allocation> mappedAllocations();
 
 /// The value of all bytes of new memory, of the host memory that a queued copy will write, and of the device
 /// memory that a queued copy will write next.
@@ -79,14 +81,18 @@ std::string lastFault();
 
 // Kernels. They run while the runtime is locked, so they must not call it.
 
+/// Calls f() once, while a kernel runs: before its n-th block from now (1: the next one), in the thread that
+/// runs the block. f must not call the runtime.
+void callBeforeBlock(std::size_t n, std::function<void()> f);
+
 /// Launches a kernel: when its turn comes, runBlock() is called for every block, in parallel and in a random
 /// order. Returns the errors of cudaLaunchKernel: cudaErrorInvalidResourceHandle for a stream of a device
 /// that is not the current one, cudaErrorInvalidConfiguration for sizes that no device can run.
 cudaError_t launchBlocks(cudaStream_t stream, dim3 grid, dim3 block,
                          std::function<void(uint3 blockIndex)> runBlock);
 
-/// The same for a kernel that gets its device's allocations, by address, and calls runBlocks() itself. Also
-/// returns cudaErrorInvalidValue if a block has more than maxThreads threads, and
+/// The same for a kernel that gets the memory of its device, and of the host that is mapped to it, and calls
+/// runBlocks() itself. Also returns cudaErrorInvalidValue if a block has more than maxThreads threads, and
 /// cudaErrorInvalidDeviceFunction without a kernel.
 using Kernel = std::function<void(std::span<const Allocation> memory)>;
 cudaError_t launchKernel(cudaStream_t stream, dim3 grid, dim3 block, unsigned maxThreads, Kernel kernel);

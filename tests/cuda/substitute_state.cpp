@@ -220,12 +220,26 @@ void limitMemory(int device, std::size_t sizeBytes) {
   locked([&] { state().devices.at(std::size_t(device)).limit = sizeBytes; });
 }
 
+std::vector<Allocation> usableByKernels() {
+  std::vector<Allocation> all;
+  for (const auto& [begin, memory] : state().deviceMemory)
+    all.push_back({begin, memory.sizeBytes, memory.device});
+  for (const auto& [begin, memory] : state().pinnedMemory)
+    if (memory.mapped) all.push_back({begin, memory.sizeBytes, memory.device, true});
+  return all;
+}
+
 std::vector<Allocation> allocations() {
   std::vector<Allocation> all;
-  locked([&] {
-    for (const auto& [begin, memory] : state().deviceMemory)
-      all.push_back({begin, memory.sizeBytes, memory.device});
-  });
+  locked([&] { all = usableByKernels(); });
+  std::erase_if(all, [](const Allocation& allocation) { return allocation.onHost; });
+  return all;
+}
+
+std::vector<Allocation> mappedAllocations() {
+  std::vector<Allocation> all;
+  locked([&] { all = usableByKernels(); });
+  std::erase_if(all, [](const Allocation& allocation) { return !allocation.onHost; });
   return all;
 }
 

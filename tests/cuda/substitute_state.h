@@ -4,7 +4,8 @@
 //
 // It is stricter than CUDA in these ways, on which launchers should not rely:
 // - asynchronous copies need pinned memory (cudaHostAlloc);
-// - device memory is used by its own device only;
+// - device memory is used by its own device only, and so is pinned memory, by kernels, if it is mapped at
+// all;
 // - streams and events that nobody waits for make no progress;
 // - cudaErrorNotReady becomes the last error, as others do.
 #pragma once
@@ -68,6 +69,7 @@ struct Device {
 struct Memory {
   std::size_t sizeBytes;
   int device;
+  bool mapped = false;  ///< pinned memory that kernels on the device may use
 };
 using Heap = std::map<const std::byte*, Memory>;  ///< by address
 
@@ -115,6 +117,8 @@ void surfaceFault(int device);
 
 /// The allocation that contains all of these bytes; null if there is none.
 const Memory* allocationOf(const Heap& heap, const void* memory, std::size_t sizeBytes);
+/// All allocations that some kernel may use.
+std::vector<Allocation> usableByKernels();
 /// Throws Failure(cudaErrorInvalidValue) unless one allocation on the device contains all of these bytes.
 void expectOnDevice(const void* memory, std::size_t sizeBytes, int device);
 

@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <numeric>
 #include <utility>
@@ -49,6 +50,22 @@ CUstream_st& streamForLaunch(cudaStream_t handle) {
   return stream;
 }
 
+/// What callBeforeBlock() has asked for.
+struct Interlude {
+  std::function<void()> f;
+  std::atomic<std::size_t> blocksLeft = 0;
+  /// Called by several threads.
+  void countBlock() {
+    std::size_t left = blocksLeft;
+    while (left > 0 && !blocksLeft.compare_exchange_weak(left, left - 1)) continue;
+    if (left == 1) f();
+  }
+};
+Interlude& interlude() {
+  static Interlude one;
+  return one;
+}
+
 bool fits(dim3 grid, dim3 block) {
   if (std::max(block.x, block.y) > 1024 || block.z > 64) return false;
   const unsigned threads = block.x * block.y * block.z;
@@ -73,6 +90,13 @@ void removeFinishedStreams() {
 
 namespace substitute {
 
+void callBeforeBlock(std::size_t n, std::function<void()> f) {
+  locked([&] {
+    interlude().f = std::move(f);
+    interlude().blocksLeft = n;
+  });
+}
+
 void runBlocks(dim3 grid, const std::function<void(uint3 blockIndex)>& runBlock) {
   std::vector<std::size_t> order(std::size_t(grid.x) * grid.y * grid.z);
   std::iota(order.begin(), order.end(), std::size_t(0));
@@ -81,6 +105,7 @@ void runBlocks(dim3 grid, const std::function<void(uint3 blockIndex)>& runBlock)
   tbb::this_task_arena::isolate([&] {
     tbb::parallel_for(std::size_t(0), order.size(), [&](std::size_t n) {
       const std::size_t i = order[n];
+      interlude().countBlock();
       runBlock({unsigned(i % grid.x), unsigned(i / grid.x % grid.y), unsigned(i / grid.x / grid.y)});
     });
   });
@@ -93,9 +118,8 @@ cudaError_t launchKernel(cudaStream_t handle, dim3 grid, dim3 block, unsigned ma
     if (!fits(grid, block)) throw Failure{cudaErrorInvalidConfiguration};
     if (block.x * block.y * block.z > maxThreads) throw Failure{cudaErrorInvalidValue};
     enqueue(stream, {.run = [device = stream.device, kernel = std::move(kernel)] {
-              std::vector<Allocation> own;
-              for (const auto& [begin, memory] : state().deviceMemory)
-                if (memory.device == device) own.push_back({begin, memory.sizeBytes, device});
+              std::vector<Allocation> own = usableByKernels();
+              std::erase_if(own, [&](const Allocation& allocation) { return allocation.device != device; });
               kernel(own);
             }});
   });

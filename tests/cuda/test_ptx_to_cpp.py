@@ -50,8 +50,20 @@ class Translator(unittest.TestCase):
             kernel_with("bar.sync 0;")
         with self.assertRaisesRegex(Refused, "atom"):
             kernel_with("atom.global.add.f32 %f2, [%rd1], %f1;")
-        with self.assertRaisesRegex(Refused, "shared memory"):
-            translate(".shared .align 4 .b8 scratch[64];\n" + KERNEL)
+
+    def test_accepts_shared_variables_only_if_they_are_volatile(self):
+        def with_shared(statement):
+            return translate(".shared .align 4 .u32 word;\n" + KERNEL.replace("STATEMENT", statement))
+        self.assertIn("thread_local alignas(4) std::byte word[4];",
+                      with_shared("ld.volatile.shared.f32 %f2, [word];\n  st.volatile.shared.f32 [word], %f1;"))
+        for statement in ["ld.shared.f32 %f2, [word];", "st.shared.f32 [word], %f1;", "cvta.shared.u64 %rd1, word;"]:
+            with self.assertRaisesRegex(Refused, "shared memory"):
+                with_shared(statement)
+        self.assertIn("static thread_local alignas(4) std::byte word[4];",
+                      kernel_with(".shared .align 4 .u32 word;\n  st.volatile.shared.f32 [word], %f1;"))
+
+    def test_knows_the_clock(self):
+        self.assertIn("ptx::readClock()", kernel_with("mov.u32 %f2, %clock;"))
 
     def test_counts_instructions_and_loads_only_when_asked(self):
         statement = "@%p1 bra END;\n  ld.v2.f32 {%f2, %f3}, [%rd1];\nEND:"

@@ -27,7 +27,7 @@ enum cudaDeviceAttr {
 };
 enum : unsigned { cudaStreamDefault = 0, cudaStreamNonBlocking = 1 };
 enum : unsigned { cudaEventDefault = 0, cudaEventBlockingSync = 1, cudaEventDisableTiming = 2 };
-enum : unsigned { cudaHostAllocDefault = 0, cudaHostAllocPortable = 1 };
+enum : unsigned { cudaHostAllocDefault = 0, cudaHostAllocPortable = 1, cudaHostAllocMapped = 2 };
 
 struct uint3 {
   unsigned x, y, z;
@@ -65,6 +65,7 @@ cudaError_t cudaDeviceSynchronize();
 cudaError_t cudaMalloc(void** memory, size_t sizeBytes);
 cudaError_t cudaFree(void* memory);
 cudaError_t cudaHostAlloc(void** memory, size_t sizeBytes, unsigned flags);
+cudaError_t cudaHostGetDevicePointer(void** onDevice, void* memory, unsigned flags);
 cudaError_t cudaFreeHost(void* memory);
 cudaError_t cudaMemset(void* memory, int value, size_t sizeBytes);
 cudaError_t cudaMemcpy(void* to, const void* from, size_t sizeBytes, cudaMemcpyKind kind);
