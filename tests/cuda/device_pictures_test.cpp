@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstring>
+#include <thread>
 
 #include "renderer/renderer.h"
 #include "tests/cuda/device_scenes.h"
@@ -249,6 +252,32 @@ TEST_F(DevicePicture, OfASceneWithoutVisibleChannelsIsTransparent) {
   device->setScene(scene);
   ASSERT_TRUE(device->renderSample(kNever));
   EXPECT_EQ(coverage(device->image()), 0);
+}
+
+TEST_F(DevicePicture, DoesNotTakeALongRayWhosePassIsCancelled) {
+  // One pixel, whose ray is marched and lit in millions of steps: if it were completed, there would be a
+  // sample.
+  const glm::ivec3 dims(8, 8, 8192);
+  const auto volume = volumeOf(
+      gridOf(dims), channelOf<std::uint8_t>(dims, [](int x, int y, int z) { return 1 + (x + y + z) % 7; }));
+  Scene scene = frontScene(*volume, 1, 1);
+  scene.channels[0].rangeHi = 255;
+  scene.channels[0].density = 0.001;
+  scene.method = Method::raymarch;
+  scene.step = 0.01;
+  scene.shadows = true;
+  for (int i = 0; i < 8; ++i)
+    scene.lights.push_back({LightType::directional, {0.01 * i, 0, 1}, glm::dvec3(1), 1});
+  const auto device = makeCudaRenderer(volume);
+  device->setScene(scene);
+  std::atomic<bool> cancel = false;
+  std::thread canceller([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    cancel = true;
+  });
+  EXPECT_FALSE(device->renderSample(cancel));
+  canceller.join();
+  EXPECT_EQ(device->samples(), 0u);
 }
 
 }  // namespace

@@ -75,33 +75,6 @@ TEST_F(CudaLauncher, EndsTheKernelOfACancelledPassWhileItRunsAndRendersItsRowsAg
   expectSamePicture(renderer->image(), pictureOfTheCpu(volume, scene));
 }
 
-/// Cancels a pass in its first block.
-void expectCancelledSoon(const std::shared_ptr<const Volume>& volume, const Scene& scene) {
-  const auto renderer = makeCudaRenderer(volume);
-  renderer->setScene(scene);
-  Flag cancel = false;
-  substitute::callBeforeBlock(1, [&] { cancel = true; });
-  EXPECT_FALSE(renderer->renderSample(cancel));
-  EXPECT_EQ(renderer->samples(), 0u);
-}
-
-TEST_F(CudaLauncher, EndsALongRayWhenItsPassIsCancelled) {
-  // One pixel, whose ray is marched and lit in millions of steps: if it were completed, there would be a
-  // sample.
-  const glm::ivec3 dims(8, 8, 8192);
-  const auto volume = volumeOf(
-      gridOf(dims), channelOf<std::uint8_t>(dims, [](int x, int y, int z) { return 1 + (x + y + z) % 7; }));
-  Scene scene = frontScene(*volume, 1, 1);
-  scene.channels[0].rangeHi = 255;
-  scene.channels[0].density = 0.001;
-  scene.method = Method::raymarch;
-  scene.step = 0.01;
-  scene.shadows = true;
-  for (int i = 0; i < 8; ++i)
-    scene.lights.push_back({LightType::directional, {0.01 * i, 0, 1}, glm::dvec3(1), 1});
-  expectCancelledSoon(volume, scene);
-}
-
 TEST_F(CudaLauncher, EndsRaysWithManyCollisionsWhenTheirPassIsCancelled) {
   const glm::ivec3 dims(32);
   const auto volume = volumeOf(gridOf(dims), channelOf<std::uint8_t>(dims, [](int x, int y, int z) {
@@ -113,7 +86,12 @@ TEST_F(CudaLauncher, EndsRaysWithManyCollisionsWhenTheirPassIsCancelled) {
   scene.channels[0].density = 1e6;
   for (const Method method : {Method::superposed, Method::syncDda}) {
     scene.method = method;
-    expectCancelledSoon(volume, scene);
+    const auto renderer = makeCudaRenderer(volume);
+    renderer->setScene(scene);
+    Flag cancel = false;
+    substitute::callBeforeBlock(1, [&] { cancel = true; });
+    EXPECT_FALSE(renderer->renderSample(cancel));
+    EXPECT_EQ(renderer->samples(), 0u);
   }
 }
 
