@@ -88,7 +88,7 @@ class FunctionTranslator:
         array = read_array(text)
         self.symbols[array.name] = array.name
         if text.startswith(".shared"):
-            self.lines.append(f"static {shared(array)}")
+            self.lines.append(shared(array))
             return
         self.lines.append(f"alignas({array.align}) std::byte {array.name}[{array.size}];")
         if text.startswith(".local"):
@@ -408,7 +408,7 @@ class FunctionTranslator:
 def shared(array):
     """Declaration of a variable in shared memory. A thread of the host runs one block at a time; the next one finds
     what the last one has left, as on a device."""
-    return f"thread_local alignas({array.align}) std::byte {array.name}[{array.size}];"
+    return f"alignas({array.align}) static thread_local std::byte {array.name}[{array.size}];"
 
 
 def label(name):

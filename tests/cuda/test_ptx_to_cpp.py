@@ -54,12 +54,12 @@ class Translator(unittest.TestCase):
     def test_accepts_shared_variables_only_if_they_are_volatile(self):
         def with_shared(statement):
             return translate(".shared .align 4 .u32 word;\n" + KERNEL.replace("STATEMENT", statement))
-        self.assertIn("thread_local alignas(4) std::byte word[4];",
+        self.assertIn("alignas(4) static thread_local std::byte word[4];",
                       with_shared("ld.volatile.shared.f32 %f2, [word];\n  st.volatile.shared.f32 [word], %f1;"))
         for statement in ["ld.shared.f32 %f2, [word];", "st.shared.f32 [word], %f1;", "cvta.shared.u64 %rd1, word;"]:
             with self.assertRaisesRegex(Refused, "shared memory"):
                 with_shared(statement)
-        self.assertIn("static thread_local alignas(4) std::byte word[4];",
+        self.assertIn("alignas(4) static thread_local std::byte word[4];",
                       kernel_with(".shared .align 4 .u32 word;\n  st.volatile.shared.f32 [word], %f1;"))
 
     def test_knows_the_clock(self):

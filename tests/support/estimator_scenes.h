@@ -87,7 +87,7 @@ inline std::shared_ptr<const Volume> cropped(const Volume& volume, glm::ivec3 lo
   std::vector<ChannelSource> sources;
   for (const Channel& channel : volume.channels()) {
     ChannelSource source{channel.name, channel.unit, VoxelBuffer(channel.voxels.type(), grid.voxelCount()),
-                         channel.slope, channel.intercept};
+                         channel.slope, channel.intercept, channel.look};
     visitScalarType(channel.voxels.type(), [&](auto zero) {
       using T = decltype(zero);
       const auto from = channel.voxels.as<T>();

@@ -87,7 +87,7 @@ inline Replicates replicateLevels(const std::shared_ptr<const Volume>& volume, S
           film.addLevel();
           return true;
         };
-        corrections.render(*launcher, *plan, film, addLevel, never, kNoDeadline);
+        corrections.render(*launcher, *plan, film, addLevel, nullptr, never, kNoDeadline);
         film.add();
         corrections.add(film);
       }

@@ -44,7 +44,7 @@ class TallyingLauncher : public Launcher {
 };
 
 /// A scene that has corrections after few samples.
-Scene correctedScene(const Volume& volume) {
+Scene costlyScene(const Volume& volume) {
   Scene scene = orbitalScene(volume);
   scene.method = Method::automatic;
   scene.filter = PixelFilter::point;
@@ -53,7 +53,7 @@ Scene correctedScene(const Volume& volume) {
 
 TEST(Costs, AreAllThatThePassesOfSamplesAndCorrectionsCost) {
   const auto volume = orbitals();
-  const Scene scene = correctedScene(*volume);
+  const Scene scene = costlyScene(*volume);
   RenderStats tally;
   const auto renderer = makeRenderer(std::make_unique<TallyingLauncher>(scene.width, &tally), volume);
   renderer->countCosts();
@@ -71,7 +71,7 @@ TEST(Costs, AreAllThatThePassesOfSamplesAndCorrectionsCost) {
 
 TEST(Costs, OfAPictureWithCorrectionsExceedThoseOfItsSamples) {
   const auto volume = orbitals();
-  Scene scene = correctedScene(*volume);
+  Scene scene = costlyScene(*volume);
   const auto fetchesOf = [&](const Scene& drawn) {
     const auto renderer = makeCpuRenderer(volume, 2);
     renderer->countCosts();
@@ -87,7 +87,7 @@ TEST(Costs, OfAPictureWithCorrectionsExceedThoseOfItsSamples) {
 
 TEST(Costs, OfAovsAreThoseOfTheSamples) {
   const auto volume = orbitals();
-  const Scene scene = correctedScene(*volume);
+  const Scene scene = costlyScene(*volume);
   const auto renderer = makeCpuRenderer(volume, 2);
   renderer->countCosts();
   renderer->recordAovs();

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "renderer/io/format.h"
+#include "renderer/io/datasets.h"
 #include "renderer/metrics/metrics.h"
 #include "renderer/reference/render.h"
 #include "renderer/renderer.h"

@@ -372,7 +372,7 @@ std::vector<ChannelSource> copyOf(const std::vector<ChannelSource>& channels) {
   std::vector<ChannelSource> copies;
   for (const ChannelSource& channel : channels) {
     ChannelSource copy{channel.name, channel.unit, VoxelBuffer(channel.voxels.type(), channel.voxels.count()),
-                       channel.slope, channel.intercept};
+                       channel.slope, channel.intercept, channel.look};
     std::copy_n(channel.voxels.data(), channel.voxels.sizeBytes(), copy.voxels.data());
     copies.push_back(std::move(copy));
   }
