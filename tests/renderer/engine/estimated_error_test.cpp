@@ -3,11 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <string>
 #include <vector>
 
-#include "renderer/io/datasets.h"
 #include "renderer/metrics/metrics.h"
 #include "renderer/reference/render.h"
 #include "renderer/renderer.h"
@@ -50,39 +47,6 @@ TEST(EstimatedError, OfOrbitalsInLightIsTrueFromTheFirstSamplesOn) {
   Scene scene = orbitalScene(*volume);
   scene.shading = scene.shadows = true;
   expectKnownError(volume, scene);
-}
-
-TEST(EstimatedError, OfFourMriContrastsIsTrueFromTheFirstSamplesOn) {
-  // The scene of tests/bench/scenes/tcga.json.
-  std::vector<std::filesystem::path> files;
-  for (const char* contrast : {"fla", "t1", "t1c", "t2"})
-    files.push_back(std::filesystem::path(SCOLOPAX_DATA_DIR) / "multichannel/tcga_du_7294" /
-                    (std::string("TCGA-DU-7294_") + contrast + "_bet.nii.gz"));
-  for (const auto& file : files)
-    if (!std::filesystem::exists(file)) GTEST_SKIP() << "the data set is absent from " << SCOLOPAX_DATA_DIR;
-  const auto datasets = io::loadDatasets(files, io::defaultMemoryLimitBytes(), [](const std::string&) {});
-  Scene scene;
-  scene.width = scene.height = 48;
-  scene.camera.eye = {-330, 380, 210};
-  scene.camera.target = {-119, 108, 70};
-  scene.camera.up = {0, 0, 1};
-  scene.camera.fovY = 23;
-  const auto look = [](double low, double high, double density, glm::dvec3 color,
-                       std::vector<OpacityKnot> opacity) {
-    ChannelAppearance channel;
-    channel.rangeLo = low;
-    channel.rangeHi = high;
-    channel.density = density;
-    channel.color = {{0, color}};
-    channel.opacity = std::move(opacity);
-    return channel;
-  };
-  scene.channels = {
-      look(380, 600, 0.6, {1, 0.1, 0.05}, {{0, 0}, {0.25, 0.02}, {1, 1}}),
-      look(100, 700, 0.1, {0.7, 0.6, 0.55}, {{0, 0}, {0.15, 0.1}, {0.6, 0.12}, {0.8, 0.4}, {1, 0.6}}),
-      look(620, 1500, 1, {1, 0.65, 0.05}, {{0, 0}, {0.1, 0.05}, {1, 1}}),
-      look(900, 2400, 0.4, {0.05, 0.45, 1}, {{0, 0}, {0.1, 0.02}, {1, 1}})};
-  expectKnownError(datasets.at(0).volume, scene);
 }
 
 }  // namespace
