@@ -138,7 +138,8 @@ class Measuring {
     if (!truth_) return;
     const Image image = thinned(renderer.image(), scene_.width / truth_->width);
     point.squaredErrors.push_back(std::pow(compareImages(image, *truth_).rmse, 2));
-    if (point.samples > 1 && !renderer.errorTakesLong()) point.estimates.push_back(renderer.estimatedError());
+    if (point.samples > 1 && !isBiased(point) && !renderer.errorTakesLong())
+      point.estimates.push_back(renderer.estimatedError());
     if (point.seconds.size() == 1) point.flip = flipDifference(image, *truth_).mean;
     point.sum.resize(image.pixels.size(), glm::dvec4(0));
     for (std::size_t i = 0; i < image.pixels.size(); ++i) point.sum[i] += glm::dvec4(image.pixels[i]);

@@ -27,10 +27,11 @@ struct Point : Setting {
   std::vector<double> seconds;          ///< of the samples, with their corrections
   std::vector<double> setSceneSeconds;  ///< before them; includes the choice of Method::automatic
   std::vector<double> squaredErrors;    ///< empty without a reference
-  std::vector<double> estimates;        ///< estimated errors; empty where estimating would take long
-  std::vector<glm::dvec4> sum;          ///< of the pictures of all repetitions
-  double flip = 0;                      ///< of the first repetition
-  RenderStats counts;                   ///< of the first `samplesCounted` samples, with their corrections
+  std::vector<double> estimates;  ///< estimated errors; empty of a single sample, and of steps, whose bias
+                                  ///< takes long to estimate
+  std::vector<glm::dvec4> sum;    ///< of the pictures of all repetitions
+  double flip = 0;                ///< of the first repetition
+  RenderStats counts;             ///< of the first `samplesCounted` samples, with their corrections
   std::uint32_t samplesCounted = 0;
   Choice choice{};       ///< of the last repetition
   double rebuildMs = 0;  ///< of the first setScene, without building macrocells

@@ -206,8 +206,9 @@ class SpeedTables(unittest.TestCase):
             "shadows": {"timeToError": [times("auto", (1, 1, 1, None)), times("raymarch", (1, 2, 3, 4), 1)],
                         "points": [auto_point(rmse=1e-4)]}}}}
         text = speed_sections.against_steps(entry)
+        self.assertIn("to 1e-04 at most 0.5 times its time: 1 of 2 (1)", text)
         self.assertIn("1e-3 is reached by 1 of 2; not by cells (shading): 2.0e-03.", text)
-        self.assertIn("| cells | shading | raymarch, step 2 | 500 ms | x1 (1 s; raymarch, step 1: 1 s) | **-** | **-** |", text)
+        self.assertIn("| cells | shading | raymarch, step 2 | 500 ms | x1 (x0.5; 1 s; raymarch, step 1: 1 s) | **-** | **-** |", text)
 
     def test_mark_estimates_that_are_off(self):
         points = [auto_point(samples=samples, estimateToError=ratio) for samples, ratio in ((16, 1.24), (64, 1.24), (512, 0.79))]
