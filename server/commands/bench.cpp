@@ -195,7 +195,9 @@ CLI::App* addBenchCommand(CLI::App& root) {
       ->check(CLI::Range(0, 1024));
   command
       ->add_option("--repetitions", o->repetitions,
-                   "Repetitions of every point, each with its own seed; medians are reported")
+                   fmt::format("Repetitions of every point, each with its own seed, 2 of those that take "
+                               "longer than {:g} s; medians are reported",
+                               bench::kLongPicture))
       ->check(CLI::Range(2, 1000))
       ->capture_default_str();
   command

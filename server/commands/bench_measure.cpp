@@ -119,6 +119,7 @@ class Measuring {
     for (int repetition = 0; repetition < wanted_.repetitions; ++repetition)
       for (std::vector<Point>& points : settings)
         for (Point& point : points) {
+          if (repetition >= 2 && point.seconds.front() > kLongPicture) continue;
           // Every picture has its own seed, so that no picture continues the samples of the previous one.
           ++scene_.seed;
           measurePicture(point);

@@ -16,10 +16,14 @@ namespace scolopax::bench {
 /// One renderer for every number of threads.
 using Renderers = std::map<int, std::unique_ptr<Renderer>>;
 
+inline constexpr double kLongPicture = 30;  ///< seconds
+
 struct Measurement {
   std::vector<Setting> settings;       ///< with any number of samples; those of one method adjacent
   std::vector<std::uint32_t> samples;  ///< ascending
-  int repetitions;                     ///< at least 2, of every point, in turns with those of the others
+  /// At least 2, of every point, in turns with those of the others; 2 of those that take longer than
+  /// kLongPicture.
+  int repetitions;
   /// Numbers of samples that take longer, in seconds, are left out, except the smallest. `automaticLongest`
   /// is for points of Method::automatic without a law of noise.
   double longest, automaticLongest;
