@@ -179,9 +179,10 @@ def load(files, repetitions):
 
 class Experiment(NamedTuple):
     run: Callable
-    takes: str  # on two quiet cores, with the reference's pictures
+    takes: str  # on two quiet cores, with the reference's pictures that others do not need
 
 
 EXPERIMENTS = {run.__name__: Experiment(run, takes) for run, takes in (
-    (speed, "?"), (estimates, "?"), (sizes, "?"), (sessions, "?"), (surfaces, "?"), (macrocells, "?"), (channels, "?"), (quality, "?"),
-    (blends, "?"), (memory, "?"), (threads, "?"), (loading, "?"), (proxies, "?"))}
+    (macrocells, "2 minutes"), (channels, "5 minutes"), (quality, "3 minutes"), (blends, "1 minute"), (memory, "1 minute"),
+    (sizes, "15 minutes"), (threads, "1 minute"), (loading, "1 minute"), (estimates, "30 minutes"), (sessions, "4 hours"),
+    (speed, "up to 20 hours, with --longest 60 some 8; 2 of them for references"), (surfaces, "2 hours"), (proxies, "5 minutes"))}

@@ -34,7 +34,7 @@ def main():
     parser.add_argument("--quick", action="store_true", help="small pictures, few scenes: tests the scripts, measures nothing")
     parser.add_argument("--again", action="store_true", help="measure anew what has been measured before")
     parser.add_argument("--longest", type=float, default=600, metavar="SECONDS",
-                        help="time limit for a picture of `auto` in speed (default: 600); the experiment takes up to 100 times as long")
+                        help="time limit for a picture of `auto` in speed (default: 600); the experiment may take 100 times as long")
     parser.add_argument("--truths", metavar="FOLDER",
                         help="where the reference's pictures are kept (default: in OUT.json.parts); others may use them, too")
     options = parser.parse_intermixed_args()

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Compares Scolopax with VTK's CPU ray caster, in turns: vtk.py OUT.json [--only NAME,...] [--size PIXELS,...]
-Takes some 15 minutes on two quiet cores. A run that was interrupted continues where it stopped.
+Takes some 45 minutes on two quiet cores, twice as long with AVX-512. A run that was interrupted continues where it stopped.
 
 One channel: speed against error, both against the double-precision reference. Four channels: time per frame at
 equal step. Missing volumes are skipped with a message. Reads SCOLOPAX (the program), SCOLOPAX_DATA_DIR."""
