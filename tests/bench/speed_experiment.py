@@ -18,7 +18,7 @@ def speed(bench):
             methods = ["auto", "superposed", "sync-dda", "raymarch", *(["hybrid"] if any(LIGHTS[light]) else [])]
             limits = {"longest": 0.05, "auto_longest": 0.2} if bench.quick else {"longest": LONGEST, "auto_longest": bench.longest}
             result = bench.bench(name, light_settings(light), methods=methods, samples=[1],
-                                 steps=STEPS[::3] if bench.quick else STEPS, until=TARGET, **limits)
+                                 steps=[4, 1, 0] if bench.quick else STEPS, until=TARGET, **limits)
             if result:
                 found.setdefault(name, {})[light] = result
                 bench.save(found)

@@ -215,6 +215,10 @@ class SpeedTables(unittest.TestCase):
         text = speed_sections.estimates({"found": {"cells": {"both": points}}}, None)
         self.assertIn("| 1.24 | 2.0e-03 | **1.24** | 2.0e-03 | **0.79** |", text)
         self.assertIn("2 of 3", text)
+        points[1]["rmse"] = 1e-6
+        text = speed_sections.estimates({"found": {"cells": {"both": points}}}, None)
+        self.assertIn("| 1.0e-06 | 1.24 |", text)
+        self.assertIn("1 of 2", text)
 
     def test_mark_sessions_that_claim_too_much(self):
         row = {"samples": 64, "seconds": 1, "true": 1e-4}
