@@ -45,7 +45,7 @@ struct BenchOptions {
   double longest = 10;
   std::optional<double> automaticLongest, until;
   std::filesystem::path truth, json;
-  bool timesOnly = false;
+  bool timesOnly = false, sceneFilter = false;
 };
 
 /// In ascending order, without duplicates.
@@ -121,11 +121,12 @@ std::optional<Image> truthOf(const BenchOptions& options, const Volume& volume, 
     return reference::renderReference(volume, scene, 1).image;
   }
   Image truth = io::readImage(options.truth);
-  const int factor = scene.width / std::max(truth.width, 1);
+  const int factor = options.sceneFilter ? 1 : scene.width / std::max(truth.width, 1);
   if (factor % 2 == 0 || truth.width * factor != scene.width || truth.height * factor != scene.height)
     throw Error(ErrorCode::badInput,
-                fmt::format("{}: expected {}x{} pixels, or fewer by an odd factor, found {}x{}",
-                            options.truth.string(), scene.width, scene.height, truth.width, truth.height));
+                fmt::format("{}: expected {}x{} pixels{}, found {}x{}", options.truth.string(), scene.width,
+                            scene.height, options.sceneFilter ? "" : ", or fewer by an odd factor",
+                            truth.width, truth.height));
   return truth;
 }
 
@@ -141,7 +142,7 @@ void run(BenchOptions options) {
   const auto resolved = resolveScene(options.scene);
   const auto volume = resolved->dataset->volume;
   Scene scene = resolved->render;
-  scene.filter = PixelFilter::point;  // there the reference has no noise
+  if (!options.sceneFilter) scene.filter = PixelFilter::point;  // there the reference has no noise
   if (options.macrocells.empty()) options.macrocells = {scene.macrocell};
   const std::optional<Image> truth = truthOf(options, *volume, scene);
 
@@ -169,6 +170,68 @@ void run(BenchOptions options) {
     io::writeFile(options.json, result.dump(1) + '\n');
 }
 
+/// What is measured.
+void addSettings(CLI::App& command, BenchOptions& o) {
+  command
+      .add_option("--methods", o.methods, "Methods to measure, separated by commas; default: all but auto")
+      ->delimiter(',');
+  command.add_option("--samples", o.samples, "Sample counts; default: 1,4,16,64")
+      ->delimiter(',')
+      ->check(CLI::Range(1u, server::kMaxSamples));
+  command
+      .add_option("--steps", o.steps, "Steps of the methods that have one, in voxels; default: 4,2,1,0.5,0")
+      ->delimiter(',')
+      ->check(numberUpTo(100, true));
+  command.add_option("--macrocells", o.macrocells, "Macrocell edges, in voxels; default: the scene's")
+      ->delimiter(',')
+      ->check(CLI::Range(1, kMaxMacrocell));
+  checkDevice(command.add_option("--device", o.device, kDeviceDoc))->capture_default_str();
+  command.add_option("--threads", o.threads, "Numbers of threads; 0: all")
+      ->delimiter(',')
+      ->check(CLI::Range(0, 1024));
+}
+
+/// How long, and against what.
+void addLimitsAndTruth(CLI::App& command, BenchOptions& o) {
+  command
+      .add_option(
+          "--repetitions", o.repetitions,
+          fmt::format("Repetitions of every point, each with its own seed, 2 of those that take longer "
+                      "than {:g} s; medians are reported",
+                      bench::kLongPicture))
+      ->check(CLI::Range(2, 1000))
+      ->capture_default_str();
+  command
+      .add_option("--longest", o.longest,
+                  "Skip sample counts that would take more seconds than this, except the smallest")
+      ->check(numberUpTo(1e9, false))
+      ->capture_default_str();
+  command
+      .add_option("--auto-longest", o.automaticLongest,
+                  "The same for auto, whose time to an error is measured and not extrapolated; default: "
+                  "--longest")
+      ->check(numberUpTo(1e9, false));
+  auto* until = command
+                    .add_option("--until", o.until,
+                                "Double the samples until the RMSE is at most this, or more samples cannot "
+                                "help, or one of the limits above is reached")
+                    ->check(numberUpTo(1e9, false));
+  auto* truth =
+      command.add_option("--truth", o.truth,
+                         "Reference picture for the errors, made by scolopax reference with "
+                         "image.filter=point. It may be smaller by an odd factor;\nthen only the pixels at "
+                         "the centres of its pixels count. By default, the reference is rendered");
+  command
+      .add_flag(
+          "--scene-filter", o.sceneFilter,
+          "Spread samples over pixels as the scene says. --truth must be a picture of the same kind and "
+          "size, with much less noise,\nwhich adds to the errors")
+      ->needs(truth);
+  command.add_flag("--times-only", o.timesOnly, "Times and counts only, no reference and no errors")
+      ->excludes(truth)
+      ->excludes(until);
+}
+
 }  // namespace
 
 CLI::App* addBenchCommand(CLI::App& root) {
@@ -176,62 +239,18 @@ CLI::App* addBenchCommand(CLI::App& root) {
       root.add_subcommand("bench", "Measure speed against error of the methods on one scene, in one run");
   const auto o = std::make_shared<BenchOptions>();
   addSceneArguments(*command, o->scene);
-  command
-      ->add_option("--methods", o->methods, "Methods to measure, separated by commas; default: all but auto")
-      ->delimiter(',');
-  command->add_option("--samples", o->samples, "Sample counts; default: 1,4,16,64")
-      ->delimiter(',')
-      ->check(CLI::Range(1u, server::kMaxSamples));
-  command
-      ->add_option("--steps", o->steps, "Steps of the methods that have one, in voxels; default: 4,2,1,0.5,0")
-      ->delimiter(',')
-      ->check(numberUpTo(100, true));
-  command->add_option("--macrocells", o->macrocells, "Macrocell edges, in voxels; default: the scene's")
-      ->delimiter(',')
-      ->check(CLI::Range(1, kMaxMacrocell));
-  checkDevice(command->add_option("--device", o->device, kDeviceDoc))->capture_default_str();
-  command->add_option("--threads", o->threads, "Numbers of threads; 0: all")
-      ->delimiter(',')
-      ->check(CLI::Range(0, 1024));
-  command
-      ->add_option("--repetitions", o->repetitions,
-                   fmt::format("Repetitions of every point, each with its own seed, 2 of those that take "
-                               "longer than {:g} s; medians are reported",
-                               bench::kLongPicture))
-      ->check(CLI::Range(2, 1000))
-      ->capture_default_str();
-  command
-      ->add_option("--longest", o->longest,
-                   "Skip sample counts that would take more seconds than this, except the smallest")
-      ->check(numberUpTo(1e9, false))
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--auto-longest", o->automaticLongest,
-          "The same for auto, whose time to an error is measured and not extrapolated; default: --longest")
-      ->check(numberUpTo(1e9, false));
-  auto* truth =
-      command->add_option("--truth", o->truth,
-                          "Reference picture for the errors, made by scolopax reference with "
-                          "image.filter=point. It may be smaller by an odd factor;\nthen only the pixels at "
-                          "the centres of its pixels count. By default, the reference is rendered");
-  auto* until = command
-                    ->add_option("--until", o->until,
-                                 "Double the samples until the RMSE is at most this, or more samples cannot "
-                                 "help, or one of the limits above is reached")
-                    ->check(numberUpTo(1e9, false));
-  command->add_flag("--times-only", o->timesOnly, "Times and counts only, no reference and no errors")
-      ->excludes(truth)
-      ->excludes(until);
+  addSettings(*command, *o);
+  addLimitsAndTruth(*command, *o);
   command->add_option("--json", o->json, "Write the numbers to this file instead of printing a table");
   command->footer(
-      "Samples go through the pixels' centres, where the reference has no noise. Methods without a step are\n"
-      "unbiased; their 1 / (MSE x seconds) is compared with that of sync-dda at the same number of samples\n"
-      "(to sync). The bias is the error that remains when the pictures of all repetitions are averaged. "
-      "setScene\n"
-      "is the time before the first sample, in which auto chooses; times to an error include it. Fetches, "
-      "cells\n"
-      "and randoms are per ray, and include those of auto's corrections.");
+      "Samples go through the pixels' centres, where the reference has no noise, unless --scene-filter is\n"
+      "given. Methods without a step are unbiased; their 1 / (MSE x seconds) is compared with that of "
+      "sync-dda\n"
+      "at the same number of samples (to sync). The bias is the error that remains when the pictures of all\n"
+      "repetitions are averaged. setScene is the time before the first sample, in which auto chooses; times "
+      "to\n"
+      "an error include it. Fetches, cells and randoms are per ray, and include those of auto's "
+      "corrections.");
   command->callback([o] { run(*o); });
   return command;
 }

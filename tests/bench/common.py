@@ -114,18 +114,22 @@ class Bench:
 
     def bench(self, name, settings=None, data=None, truth=True, side=None, turn=0, **options):
         """The JSON that `scolopax bench` writes for a scene with `settings`; None if data is missing. Options, such as
-        samples=[1, 4], are passed on. With truth=False only times are measured, no errors. `turn` distinguishes
-        measurements that are repeated."""
+        samples=[1, 4], are passed on. `truth`: a picture instead of the reference's; False: only times are measured, no
+        errors. `turn` distinguishes measurements that are repeated."""
         data, settings = data or self.data(name), settings or {}
         if data is None:
             return None
         side, options = side or self.side, {"repetitions": self.repetitions, **options}
-        words = ["--truth", self.truth(self.scene(name), data, settings)] if truth else ["--times-only"]
+        if truth is True:
+            truth = self.truth(self.scene(name), data, settings)
+        words = ["--truth", truth] if truth else ["--times-only"]
         for option, value in options.items():
-            words += [f"--{option.replace('_', '-')}", ",".join(map(str, value)) if isinstance(value, (list, tuple)) else value]
+            words.append(f"--{option.replace('_', '-')}")
+            if value is not True:
+                words.append(",".join(map(str, value)) if isinstance(value, (list, tuple)) else value)
         with open(self.scene(name), encoding="utf-8") as file:
             key = {"bench": file.read(), "data": list(map(content_hash, data)), "settings": settings, "options": options,
-                   "side": side, "turn": turn, "truth": os.path.basename(words[1]) if truth else None}
+                   "side": side, "turn": turn, "truth": os.path.basename(truth) if truth else None}
 
         def measure():
             begin, out = time.monotonic(), self.path("bench.json")

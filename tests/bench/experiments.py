@@ -184,5 +184,5 @@ class Experiment(NamedTuple):
 
 EXPERIMENTS = {run.__name__: Experiment(run, takes) for run, takes in (
     (macrocells, "2 minutes"), (channels, "5 minutes"), (quality, "3 minutes"), (blends, "1 minute"), (memory, "1 minute"),
-    (sizes, "15 minutes"), (threads, "1 minute"), (loading, "1 minute"), (estimates, "30 minutes"), (sessions, "4 hours"),
+    (sizes, "15 minutes"), (threads, "1 minute"), (loading, "1 minute"), (estimates, "1.5 hours"), (sessions, "4 hours"),
     (speed, "up to 20 hours, with --longest 60 some 8; 2 of them for references"), (surfaces, "2 hours"), (proxies, "5 minutes"))}

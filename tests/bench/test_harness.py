@@ -212,11 +212,11 @@ class SpeedTables(unittest.TestCase):
 
     def test_mark_estimates_that_are_off(self):
         points = [auto_point(samples=samples, estimateToError=ratio) for samples, ratio in ((16, 1.24), (64, 1.24), (512, 0.79))]
-        text = speed_sections.estimates({"found": {"cells": {"both": points}}}, None)
+        text = speed_sections.estimates({"found": {"cells": {"both": {"box": points}}}}, None)
         self.assertIn("| 1.24 | 2.0e-03 | **1.24** | 2.0e-03 | **0.79** |", text)
         self.assertIn("2 of 3", text)
         points[1]["rmse"] = 1e-6
-        text = speed_sections.estimates({"found": {"cells": {"both": points}}}, None)
+        text = speed_sections.estimates({"found": {"cells": {"both": {"box": points}}}}, None)
         self.assertIn("| 1.0e-06 | 1.24 |", text)
         self.assertIn("1 of 2", text)
 
