@@ -101,6 +101,17 @@ class Bench(CommandTest):
         self.assertEqual(done.returncode, 1)
         self.assertIn("expected 24x20 pixels, or fewer by an odd factor, found 12x10", done.stderr)
 
+    def test_spreads_samples_over_pixels_where_its_truth_is_spread(self):
+        done = self.run_command("render", "--data", *self.data, *SMALL, "-o", self.path("box.exr"), "--samples", "512")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        options = ["--methods", "auto", "--samples", "64", "--truth", self.path("box.exr")]
+        spread, centred = self.measured(*options, "--scene-filter"), self.measured(*options)
+        self.assertLess(spread["points"][0]["rmse"], 0.5 * centred["points"][0]["rmse"])
+        done = self.bench(*options, "--scene-filter", "--set", "image.width=72", "--set", "image.height=60")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("expected 72x60 pixels, found 24x20", done.stderr)
+        self.assertEqual(self.bench("--scene-filter").returncode, 2)
+
     def test_varies_macrocells_and_threads_and_tells_the_memory(self):
         done = self.bench("--methods", "sync-dda", "--samples", "4", "--macrocells", "8,2", "--threads", "1,2", "--json",
                           self.path("b.json"))
