@@ -41,7 +41,7 @@ def converge(bench, name, data, side, kind, truth, truth_side):
     """A row for every doubling of the samples."""
     os.environ.setdefault("SCOLOPAX", PROGRAM)
     sys.path[:0] = [os.path.join(HERE, "../server")]
-    import serving  # pylint: disable=import-outside-toplevel  (needs SCOLOPAX)
+    import serving  # here, because it needs SCOLOPAX
 
     with open(bench.scene(name), encoding="utf-8") as file:
         scene = json.load(file)

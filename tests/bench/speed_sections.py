@@ -91,8 +91,8 @@ def against_steps(entry):
                      for target, goal in RATIO_GOALS.items())
     reach = f"1e-3 is reached by {count - len(unreached)} of {count}" + (f"; not by {', '.join(unreached)}" if unreached else "") + "."
     return (f"## `auto` against the best step\nThe best step of raymarch or hybrid is known only with hindsight. Times include what "
-            f"precedes the first sample, for `auto` its choice;\nin brackets first: without it. In bold: misses its goal. Goals, and how many "
-            f"meet them: {text}. {reach}\n\n" + table(["scene", "light", "chosen", "before the first sample",
+            "precedes the first sample, for `auto` its choice;\nin brackets first: without it. In bold: misses its goal. Goals, and how "
+            f"many meet them: {text}.\n{reach}\n\n" + table(["scene", "light", "chosen", "before the first sample",
                                     *(f"RMSE {float(target):.0e}" for target in RATIO_GOALS), "smallest RMSE measured"], rows))
 
 
@@ -151,10 +151,11 @@ def estimates(entry, plot):
     counts = [point["samples"] for point in filters[0][3]]
     goals = ", ".join(f"{100 * share:.0f} % at {samples}" for samples, share in ESTIMATE_GOALS.items())
     return (f"RMSE of ten pictures with seeds of their own, and the median of their claimed errors divided by their true ones. Goals: "
-            f"within {goals}\nsamples. In bold: off by more, {missed} of {count}. Errors below {JUDGED:.0e} are not judged:\nthrough pixel centres "
-            "(point), unlit pictures have hardly any noise. Pixels with an area (box) are compared with pictures of 8192 samples, whose\n"
-            "noise adds at most 1/16 to squared errors.\n\n" +
-            table(["scene", "light", "filter", "chosen", *(text for n in counts for text in (f"RMSE, {n} samples", "claimed / true"))], rows))
+            f"within {goals}\nsamples. In bold: off by more, {missed} of {count}. Errors below {JUDGED:.0e} are not judged: through "
+            "pixel centres (point),\nunlit pictures have hardly any noise. Pixels with an area (box) are compared with pictures of 8192 "
+            "samples, whose noise adds at most\n1/16 to squared errors.\n\n" +
+            table(["scene", "light", "filter", "chosen",
+                   *(text for n in counts for text in (f"RMSE, {n} samples", "claimed / true"))], rows))
 
 
 def sessions(entry, plot):
