@@ -86,8 +86,9 @@ inline std::shared_ptr<const Volume> cropped(const Volume& volume, glm::ivec3 lo
   grid.worldFromVoxel[3] = grid.worldFromVoxel * glm::dvec4(glm::dvec3(lo), 1);
   std::vector<ChannelSource> sources;
   for (const Channel& channel : volume.channels()) {
-    ChannelSource source{channel.name, channel.unit, VoxelBuffer(channel.voxels.type(), grid.voxelCount()),
-                         channel.slope, channel.intercept, channel.look};
+    ChannelSource source{
+        channel.name,  channel.unit,      VoxelBuffer(channel.voxels.type(), grid.voxelCount()),
+        channel.slope, channel.intercept, channel.look};
     visitScalarType(channel.voxels.type(), [&](auto zero) {
       using T = decltype(zero);
       const auto from = channel.voxels.as<T>();

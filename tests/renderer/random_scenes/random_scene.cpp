@@ -371,8 +371,9 @@ json drawWire(std::uint64_t number, const VolumeSource& source) {
 std::vector<ChannelSource> copyOf(const std::vector<ChannelSource>& channels) {
   std::vector<ChannelSource> copies;
   for (const ChannelSource& channel : channels) {
-    ChannelSource copy{channel.name, channel.unit, VoxelBuffer(channel.voxels.type(), channel.voxels.count()),
-                       channel.slope, channel.intercept, channel.look};
+    ChannelSource copy{
+        channel.name,  channel.unit,      VoxelBuffer(channel.voxels.type(), channel.voxels.count()),
+        channel.slope, channel.intercept, channel.look};
     std::copy_n(channel.voxels.data(), channel.voxels.sizeBytes(), copy.voxels.data());
     copies.push_back(std::move(copy));
   }
