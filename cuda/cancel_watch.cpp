@@ -17,7 +17,7 @@ void CancelWatch::remove(const Flag& to) {
 void CancelWatch::run(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   // Sleeps while no pass is under way.
-  while (added_.wait(lock, stop, [&] { return !watched_.empty(); })) {
+  while (added_.wait(lock, stop, [&] { return !watched_.empty(); }) && !stop.stop_requested()) {
     for (const Watched& watched : watched_)
       if (*watched.from) *watched.to = true;
     added_.wait_for(lock, stop, kEvery, [] { return false; });
