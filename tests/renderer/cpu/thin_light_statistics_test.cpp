@@ -108,18 +108,18 @@ struct ShadowedElsewhere : kernel::EqualSteps {
   struct Moved {
     kernel::Ray own;
   };
+  /// The segments of shadow rays.
   template <class L, class View>
-  struct Cuts : private Moved, public kernel::CellSegments<View> {
-    Cuts(kernel::SegmentEnds<L, View>& ends, const View& scene, const kernel::Ray& ray,
-         const kernel::Interval& inside, std::uint32_t channels, float offset, float step,
-         kernel::SampleCost* cost)
+  struct WholeCuts : private Moved, public kernel::CellSegments<View> {
+    WholeCuts(kernel::SegmentEnds<L, View>& ends, const View& scene, const kernel::Ray& ray,
+              const kernel::Interval& inside, std::uint32_t channels, float offset, float step,
+              kernel::SampleCost* cost)
         : Moved{ray},
-          kernel::CellSegments<View>(ends, scene, moved(ray, step > scene.step), inside, channels, offset,
-                                     step, cost) {}
+          kernel::CellSegments<View>(ends, scene, moved(), inside, channels, offset, step, cost) {}
 
    private:
-    const kernel::Ray& moved(const kernel::Ray& ray, bool isShadowRay) {
-      if (isShadowRay) own.origin.z = 19 - ray.origin.z;
+    const kernel::Ray& moved() {
+      own.origin.z = 19 - own.origin.z;
       return own;
     }
   };
