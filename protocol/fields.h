@@ -291,6 +291,10 @@ struct Table<Scene> {
   static constexpr std::string_view doc = "All that a client can edit; {} is a valid scene.";
   static constexpr auto fields = std::tuple{
       field("dataset", &Scene::dataset, "Id of the data set; null is the first.", {.maxLength = 256}),
+      field(
+          "time", &Scene::time,
+          "Step of a time series, from 0; nothing is interpolated. A data set of one step is the same at all "
+          "times."),
       field("channels", &Scene::channels,
             "Entry i is the i-th channel of the data set; missing entries have the defaults.",
             {.maxItems = kMaxChannelItems}),

@@ -134,6 +134,7 @@ struct Stop {
 
 struct Scene {
   std::optional<std::string> dataset;
+  std::uint32_t time = 0;
   std::vector<Channel> channels;
   Blend blend;
   Camera camera;

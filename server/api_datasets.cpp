@@ -22,9 +22,18 @@ net::Response listDatasets(const ApiContext& context) {
   return jsonResponse(200, {{"datasets", std::move(list)}});
 }
 
+/// What was measured of the data set, which is loaded first if necessary.
+std::shared_ptr<const DatasetFacts> factsIn(const ApiContext& context, const net::Request& request,
+                                            const Dataset& dataset) {
+  if (auto facts = dataset.facts()) return facts;
+  return inLongRequest(context, request,
+                       [&](const std::stop_token& stop) { return dataset.factsOrLoad(stop); });
+}
+
 net::Response histogramAnswer(const ApiContext& context, const net::Request& request) {
   const auto dataset = datasetAt(context, request);
-  return jsonResponse(200, histogramJson(*dataset, int(queryUnsigned(request, "channel", 0))));
+  const int channel = int(queryUnsigned(request, "channel", 0));
+  return jsonResponse(200, histogramJson(factsIn(context, request, *dataset)->volume, channel));
 }
 
 net::Response gradientHistogramAnswer(const ApiContext& context, const net::Request& request) {
@@ -36,13 +45,22 @@ net::Response gradientHistogramAnswer(const ApiContext& context, const net::Requ
     gradients = inLongRequest(context, request, [&](const std::stop_token& stop) {
       return context.datasets.measuredGradients(*dataset, channel, stop);
     });
-  return jsonResponse(200, gradientHistogramJson(*dataset, channel, *gradients, joint));
+  return jsonResponse(200, gradientHistogramJson(dataset->facts()->volume, channel, *gradients, joint));
 }
 
 net::Response probeAnswer(const ApiContext& context, const net::Request& request) {
   const auto dataset = datasetAt(context, request);
-  return jsonResponse(200, probeJson(*dataset, queryNumber(request, "x"), queryNumber(request, "y"),
-                                     queryNumber(request, "z")));
+  const double x = queryNumber(request, "x"), y = queryNumber(request, "y"), z = queryNumber(request, "z");
+  const std::size_t time = queryUnsigned(request, "time", 0);
+  if (dataset->times() > 1 && time >= dataset->times())
+    throw protocol::ProtocolError(422, "/time",
+                                  "/time: expected a step from 0 to " + std::to_string(dataset->times() - 1) +
+                                      ", found " + std::to_string(time));
+  auto volume = dataset->loaded(time);
+  if (!volume)
+    volume = inLongRequest(context, request,
+                           [&](const std::stop_token& stop) { return dataset->load(time, stop); });
+  return jsonResponse(200, probeJson(*volume, x, y, z));
 }
 
 }  // namespace
@@ -95,7 +113,8 @@ std::vector<Route> datasetRoutes(ApiContext& context) {
        {id,
         {"x", "query", "number", "World coordinate"},
         {"y", "query", "number", "World coordinate"},
-        {"z", "query", "number", "World coordinate"}},
+        {"z", "query", "number", "World coordinate"},
+        {"time", "query", "integer", "Step of a time series, from 0 (default)"}},
        "",
        kJson,
        {},

@@ -107,14 +107,23 @@ ProtocolError tooLate(double limit, std::uint32_t samples) {
           " samples were done by then; request fewer samples or pixels, or set stop.seconds");
 }
 
-/// The scene in the body. The data that it needs is measured first, which may take no longer than a render.
-std::shared_ptr<const ResolvedScene> sceneOf(const ApiContext& context, const net::Request& request) {
+/// A scene, and the voxels that it shows.
+struct SceneAndVolume {
+  std::shared_ptr<const ResolvedScene> scene;
+  std::shared_ptr<const Volume> volume;
+};
+
+/// The scene in the body. The data that it needs is loaded and measured first, which does not count as
+/// rendering.
+SceneAndVolume sceneOf(const ApiContext& context, const net::Request& request) {
   const auto body = jsonBody(request, context.config);
-  const AbortSignal signal(request.gone, context.abortRequests, context.config.maxRenderSeconds);
-  const auto scene = unlessStopped([&] { return context.renderResolver.replace(body, signal.token()); });
-  if (scene) return *scene;
-  throwIfUnwanted(context, request);
-  throw tooLate(context.config.maxRenderSeconds, 0);
+  const AbortSignal signal(request.gone, context.abortRequests, kForever);
+  const auto found = unlessStopped([&]() -> SceneAndVolume {
+    const auto scene = context.renderResolver.replace(body, signal.token());
+    return {scene, scene->dataset->load(scene->time, signal.token())};
+  });
+  if (!found) throw unwantedProblem(request);
+  return *found;
 }
 
 std::uint64_t pixelsOf(const ResolvedScene& scene) {
@@ -138,13 +147,14 @@ struct Rendered {
 /// The picture of the scene, whose stop.seconds is at most the server's limit. The place and the memory of
 /// the film are free again when this returns.
 Rendered renderPicture(const ApiContext& context, FairPlaces& places, const net::Request& request,
-                       const std::shared_ptr<const ResolvedScene>& scene) {
+                       const SceneAndVolume& made) {
+  const auto& scene = made.scene;
   const double limit = context.config.maxRenderSeconds;
   const FairPlaces::Place place = places.take(request.remoteAddress);
   if (!place) throw protocol::limitReached(503, places.most(), "renders at once");
   const auto begin = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
-  const auto renderer = context.makeRenderer(scene->dataset->volume);
+  const auto renderer = context.makeRenderer(made.volume);
   const AbortSignal signal(request.gone, context.abortRequests, limit);
   const auto rebuild = unlessStopped([&] { return renderer->setScene(scene->render, signal.token()); });
   if (!rebuild) {
@@ -193,11 +203,12 @@ net::Response render(ApiContext& context, FairPlaces& places, const net::Request
                         "expected Accept to include " + imageTypesText(&ImageType::mediaType) + ", found " +
                             protocol::shortened(*request.header("accept")));
   const double limit = context.config.maxRenderSeconds;
-  const auto scene = sceneOf(context, request);
+  const SceneAndVolume made = sceneOf(context, request);
+  const auto& scene = made.scene;
   if (scene->stop.seconds > limit)
     throw ProtocolError(422, "/stop/seconds",
                         "expected at most " + shortText(limit) + ", found " + shortText(scene->stop.seconds));
-  Rendered rendered = renderPicture(context, places, request, scene);
+  Rendered rendered = renderPicture(context, places, request, made);
   net::Response response{200, std::string(type->mediaType), "", std::move(rendered.headers)};
   setEncodedBody(
       context, request, type->memory(pixelsOf(*scene)),

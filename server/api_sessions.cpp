@@ -98,7 +98,7 @@ net::Response describe(ApiContext& context, const net::Request& request) {
   const auto state = session->scene();
   json description = {{"id", session->id()},
                       {"revision", state.revision},
-                      {"dataset", state.scene->dataset->id},
+                      {"dataset", state.scene->dataset->id()},
                       {"viewers", session->viewerCount()}};
   if (const auto frame = session->latestFrame())
     description["frame"] = {{"frame", frame->info.number},

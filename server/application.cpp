@@ -58,13 +58,13 @@ struct Application::Impl {
   Authorizer authorizer;
   std::optional<net::Server> server;
 
-  Impl(Config given, std::vector<Dataset> loaded, MakeRenderer make, std::shared_ptr<MemoryBudget> budget,
-       Log logLine)
+  Impl(Config given, std::shared_ptr<const DatasetStore> store, MakeRenderer make,
+       std::shared_ptr<MemoryBudget> budget, Log logLine)
       : config(std::move(given)),
         log(std::move(logLine)),
         makeRenderer(std::move(make)),
         memory(std::move(budget)),
-        datasets(std::make_shared<const DatasetStore>(std::move(loaded), memory)),
+        datasets(std::move(store)),
         resolver(std::make_shared<const SceneResolver>(
             datasets, SceneResolver::Options{.maxPixels = config.maxPixels, .memory = memory})),
         sessions(resolver, {.maxSessions = config.maxSessions, .keep = config.keepSession},
@@ -84,7 +84,9 @@ struct Application::Impl {
                     .wake = [this] { renderThread.wake(); },
                     .memory = memory,
                     .wakeWatch = [this] { watchThread.wake(); },
-                    .maxPickSeconds = config.maxRenderSeconds},
+                    .maxPickSeconds = config.maxRenderSeconds,
+                    .volumes = datasets->cache(),
+                    .prefetch = datasets->cache() ? std::make_shared<Prefetch>(memory) : nullptr},
                    [this](const PassResult& pass) { metrics.passEnded(pass); }),
         encodeLoop(
             sessions, now, log, pictures, [this] { encodeThread.wake(); }, memory),
@@ -152,8 +154,8 @@ struct Application::Impl {
   }
 };
 
-Application::Application(Config config, std::vector<Dataset> datasets, MakeRenderer makeRenderer,
-                         std::shared_ptr<MemoryBudget> memory, Log log) {
+Application::Application(Config config, std::shared_ptr<const DatasetStore> datasets,
+                         MakeRenderer makeRenderer, std::shared_ptr<MemoryBudget> memory, Log log) {
   if (config.token.empty()) config.token = createToken();
   impl_ = std::make_unique<Impl>(std::move(config), std::move(datasets), std::move(makeRenderer),
                                  std::move(memory), std::move(log));

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "server/config.h"
 #include "server/dataset_store.h"
@@ -15,9 +14,9 @@ namespace scolopax::server {
 
 class Application {
  public:
-  /// An empty token in `config` is replaced by a new random one. The renderers of `makeRenderer` must use the
-  /// budget `memory`, too.
-  Application(Config config, std::vector<Dataset> datasets, MakeRenderer makeRenderer,
+  /// An empty token in `config` is replaced by a new random one. The data sets and the renderers of
+  /// `makeRenderer` must use the budget `memory`, too.
+  Application(Config config, std::shared_ptr<const DatasetStore> datasets, MakeRenderer makeRenderer,
               std::shared_ptr<MemoryBudget> memory, Log log);
   ~Application();  ///< stops at once
 

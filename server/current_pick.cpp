@@ -60,18 +60,20 @@ void CurrentPick::supervise() {
 }
 
 void CurrentPick::run(const PendingPick& pick, const std::shared_ptr<const ResolvedScene>& scene,
-                      std::uint32_t revision, const std::shared_ptr<const Renderer>& renderer) {
+                      std::uint32_t revision, const std::shared_ptr<const Volume>& volume,
+                      const std::shared_ptr<const Renderer>& renderer) {
   PickAnswer result;
   try {
     if (!has(pick.id)) {
       end();
       // The picture may have become smaller since the query came.
       const PixelArea area = areaOf(pick.query, scene->render.width, scene->render.height);
-      work_.emplace(Work{pick, scene, revision, renderer->pick(scene->render, area),
+      work_.emplace(Work{pick, scene, volume, revision, renderer->pick(scene->render, area),
                          latestEnd(context_.now(), context_.maxPickSeconds)});
     }
     if (!goOn()) return;
-    result.found = pickedJson(*work_->scene, work_->revision, pick.query, work_->picking->found());
+    result.found =
+        pickedJson(*work_->scene, *work_->volume, work_->revision, pick.query, work_->picking->found());
   } catch (const ProtocolError&) {
     result.failure = std::current_exception();
   } catch (const Error&) {

@@ -35,15 +35,16 @@ class CurrentPick {
   /// Ends the pick if nobody waits for it any more, or if it has taken too long.
   void supervise();
   /// Begins a pick or goes on with it, for a short turn, and answers it when it is complete. A pick begins
-  /// with the scene that `renderer` has. Throws nothing: if the pick fails, that is the answer, and the log
-  /// receives a cause that clients must not see. Requires !busy().
+  /// with the scene and the volume that `renderer` has. Throws nothing: if the pick fails, that is the
+  /// answer, and the log receives a cause that clients must not see. Requires !busy().
   void run(const PendingPick& pick, const std::shared_ptr<const ResolvedScene>& scene, std::uint32_t revision,
-           const std::shared_ptr<const Renderer>& renderer);
+           const std::shared_ptr<const Volume>& volume, const std::shared_ptr<const Renderer>& renderer);
 
  private:
   struct Work {
     PendingPick pick;
     std::shared_ptr<const ResolvedScene> scene;
+    std::shared_ptr<const Volume> volume;
     std::uint32_t revision;
     std::shared_ptr<Picking> picking;
     TimePoint latest;                           ///< when it has taken too long

@@ -19,14 +19,17 @@ namespace {
 
 using nlohmann::json;
 
-/// Throws ProtocolError(422) if there is no such channel.
-const Channel& channelOf(const Dataset& dataset, int channel) {
-  const auto channels = dataset.volume->channels();
-  if (channel < 0 || std::size_t(channel) >= channels.size())
-    throw protocol::ProtocolError(422, "/channel",
-                                  "expected a channel from 0 to " + std::to_string(channels.size() - 1) +
-                                      ", found " + std::to_string(channel));
-  return channels[std::size_t(channel)];
+/// Throws ProtocolError(422) unless there are more channels than this index.
+void checkChannel(int channel, std::size_t count) {
+  if (channel < 0 || std::size_t(channel) >= count)
+    throw protocol::ProtocolError(
+        422, "/channel",
+        "expected a channel from 0 to " + std::to_string(count - 1) + ", found " + std::to_string(channel));
+}
+
+const ChannelFacts& channelOf(const VolumeFacts& volume, int channel) {
+  checkChannel(channel, volume.channels.size());
+  return volume.channels[std::size_t(channel)];
 }
 
 json list(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
@@ -64,17 +67,30 @@ double interpolate(const Channel& channel, const glm::ivec3& dims, const glm::dv
   return channel.slope * double(sampleStored(channel, dims, voxel, interpolation)) + channel.intercept;
 }
 
+void throwIfEmpty(const std::vector<std::shared_ptr<const Dataset>>& datasets) {
+  if (datasets.empty()) throw Error(ErrorCode::badInput, "expected at least one data set, found none");
+}
+
 }  // namespace
 
-DatasetStore::DatasetStore(std::vector<Dataset> datasets, std::shared_ptr<MemoryBudget> memory)
+DatasetStore::DatasetStore(std::vector<io::Dataset> datasets, std::shared_ptr<VolumeCache> cache,
+                           std::shared_ptr<MemoryBudget> memory)
+    : cache_(std::move(cache)), memory_(std::move(memory)) {
+  for (io::Dataset& dataset : datasets)
+    datasets_.push_back(std::make_shared<const Dataset>(std::move(dataset), cache_));
+  throwIfEmpty(datasets_);
+}
+
+DatasetStore::DatasetStore(std::vector<io::LoadedDataset> datasets, std::shared_ptr<MemoryBudget> memory)
     : memory_(std::move(memory)) {
-  for (Dataset& dataset : datasets) datasets_.push_back(std::make_shared<const Dataset>(std::move(dataset)));
-  if (datasets_.empty()) throw Error(ErrorCode::badInput, "expected at least one data set, found none");
+  for (io::LoadedDataset& dataset : datasets)
+    datasets_.push_back(std::make_shared<const Dataset>(std::move(dataset)));
+  throwIfEmpty(datasets_);
 }
 
 std::shared_ptr<const Dataset> DatasetStore::find(std::string_view id) const {
   const auto found =
-      std::find_if(datasets_.begin(), datasets_.end(), [&](const auto& d) { return d->id == id; });
+      std::find_if(datasets_.begin(), datasets_.end(), [&](const auto& d) { return d->id() == id; });
   return found == datasets_.end() ? nullptr : *found;
 }
 
@@ -88,7 +104,7 @@ DatasetStore::Gradients DatasetStore::kept(const Dataset& dataset, int channel) 
 }
 
 DatasetStore::Gradients DatasetStore::gradients(const Dataset& dataset, int channel) const {
-  channelOf(dataset, channel);
+  checkChannel(channel, dataset.headers().channels.size());
   const std::lock_guard lock(mutex_);
   return kept(dataset, channel);
 }
@@ -96,7 +112,8 @@ DatasetStore::Gradients DatasetStore::gradients(const Dataset& dataset, int chan
 DatasetStore::Gradients DatasetStore::measuredGradients(const Dataset& dataset, int channel,
                                                         const std::stop_token& stop) const {
   if (Gradients known = gradients(dataset, channel)) return known;
-  Gradients measured = sharedGradientHistogram(dataset.volume, channel, stop, memory_);
+  const auto facts = dataset.factsOrLoad(stop);
+  Gradients measured = sharedGradientHistogram(dataset.load(facts->time, stop), channel, stop, memory_);
   const std::lock_guard lock(mutex_);
   if (Gradients known = kept(dataset, channel)) return known;  // another thread measured the same
   gradients_.push_front({&dataset, channel, measured});
@@ -126,9 +143,7 @@ std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesys
 
 namespace {
 
-/// What loaded and unloaded data sets have in common.
-template <class AnyDataset>
-json describeGrid(const AnyDataset& dataset, const Grid& grid) {
+json gridJson(const io::Dataset& dataset, const Grid& grid) {
   json description = {
       {"id", dataset.id}, {"title", dataset.title}, {"dims", {grid.dims.x, grid.dims.y, grid.dims.z}}};
   description["worldUnit"] = dataset.worldUnit;
@@ -140,6 +155,10 @@ json describeGrid(const AnyDataset& dataset, const Grid& grid) {
   for (int column = 0; column < 4; ++column)
     for (int row = 0; row < 4; ++row) matrix.push_back(grid.worldFromVoxel[column][row]);
   description["worldFromVoxel"] = std::move(matrix);
+  json& levels = description["levels"] = json::array();
+  for (const Grid& level : dataset.levels)
+    levels.push_back(
+        {{"dims", {level.dims.x, level.dims.y, level.dims.z}}, {"spacing", list(level.spacing())}});
   return description;
 }
 
@@ -156,31 +175,38 @@ json describeChannel(const std::string& name, const std::string& unit, std::stri
 }  // namespace
 
 json describeJson(const Dataset& dataset) {
-  json description = describeGrid(dataset, dataset.volume->grid());
+  json description = describeJson(dataset.headers(), dataset.level());
+  description["memoryBytes"] = dataset.memoryBytes();
+  const auto facts = dataset.facts();
+  const auto load = dataset.loading();
+  description["state"] = load ? "loading" : dataset.isLoaded() ? "loaded" : "stored";
+  if (load)
+    description["loading"] = {{"time", load->time},
+                              {"stage", load->stage},
+                              {"doneBytes", load->doneBytes},
+                              {"allBytes", load->allBytes}};
+  if (!facts) return description;
   json& channels = description["channels"] = json::array();
-  for (const Channel& c : dataset.volume->channels()) {
-    channels.push_back(describeChannel(c.name, c.unit, nameOf(c.voxels.type()), c.look));
+  for (const ChannelFacts& c : facts->volume.channels) {
+    channels.push_back(describeChannel(c.name, c.unit, nameOf(c.type), c.look));
     channels.back()["minimum"] = c.histogram.minimum;
     channels.back()["maximum"] = c.histogram.maximum;
   }
   return description;
 }
 
-json describeJson(const io::Dataset& dataset) {
-  json description = describeGrid(dataset, dataset.levels[0]);
-  json& levels = description["levels"] = json::array();
-  for (const Grid& level : dataset.levels)
-    levels.push_back(
-        {{"dims", {level.dims.x, level.dims.y, level.dims.z}}, {"spacing", list(level.spacing())}});
-  description["memoryBytes"] = io::memoryBytes(dataset);
+json describeJson(const io::Dataset& dataset, std::size_t level) {
+  json description = gridJson(dataset, dataset.levels[level]);
+  description["level"] = level;
+  description["memoryBytes"] = io::memoryBytes(dataset, level);
   json& channels = description["channels"] = json::array();
   for (const io::ChannelInfo& c : dataset.channels)
     channels.push_back(describeChannel(c.name, c.unit, io::nameOf(c.type), c.look));
   return description;
 }
 
-json histogramJson(const Dataset& dataset, int channel) {
-  const Channel& measured = channelOf(dataset, channel);
+json histogramJson(const VolumeFacts& volume, int channel) {
+  const ChannelFacts& measured = channelOf(volume, channel);
   const Histogram& histogram = measured.histogram;
   return {{"channel", channel},
           {"name", measured.name},
@@ -192,9 +218,9 @@ json histogramJson(const Dataset& dataset, int channel) {
           {"bins", histogram.bins}};
 }
 
-json gradientHistogramJson(const Dataset& dataset, int channel, const GradientHistogram& gradients,
+json gradientHistogramJson(const VolumeFacts& volume, int channel, const GradientHistogram& gradients,
                            bool joint) {
-  const Channel& measured = channelOf(dataset, channel);
+  const ChannelFacts& measured = channelOf(volume, channel);
   json answer = {{"channel", channel},
                  {"name", measured.name},
                  {"unit", measured.unit},
@@ -225,14 +251,13 @@ json valuesJson(const Volume& volume, const glm::dvec3& voxel,
   return values;
 }
 
-json probeJson(const Dataset& dataset, double x, double y, double z) {
-  const Grid& grid = dataset.volume->grid();
+json probeJson(const Volume& volume, double x, double y, double z) {
+  const Grid& grid = volume.grid();
   const auto voxel = glm::dvec3(glm::inverse(grid.worldFromVoxel) * glm::dvec4(x, y, z, 1));
   bool inside = true;
   for (int axis = 0; axis < 3; ++axis)
     inside = inside && voxel[axis] >= -0.5 && voxel[axis] <= grid.dims[axis] - 0.5;
-  json values = inside ? valuesJson(*dataset.volume, voxel)
-                       : json(std::vector<json>(dataset.volume->channels().size()));
+  json values = inside ? valuesJson(volume, voxel) : json(std::vector<json>(volume.channels().size()));
   return {{"inside", inside}, {"voxel", list(voxel)}, {"values", std::move(values)}};
 }
 

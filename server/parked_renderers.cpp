@@ -6,26 +6,26 @@
 
 namespace scolopax::server {
 
-void ParkedRenderers::park(const void* owner, std::shared_ptr<Renderer> renderer) {
+void ParkedRenderers::park(const void* owner, Parked parked) {
   const std::lock_guard lock(mutex_);
-  parked_.push_back({owner, std::move(renderer)});
+  places_.push_back({owner, std::move(parked)});
 }
 
-std::shared_ptr<Renderer> ParkedRenderers::take(const void* owner) {
+ParkedRenderers::Parked ParkedRenderers::take(const void* owner) {
   const std::lock_guard lock(mutex_);
-  const auto found = std::find_if(parked_.begin(), parked_.end(),
-                                  [&](const Parked& parked) { return parked.owner == owner; });
-  if (found == parked_.end()) return nullptr;
-  auto renderer = std::move(found->renderer);
-  parked_.erase(found);
-  return renderer;
+  const auto found =
+      std::find_if(places_.begin(), places_.end(), [&](const Place& place) { return place.owner == owner; });
+  if (found == places_.end()) return {};
+  Parked parked = std::move(found->parked);
+  places_.erase(found);
+  return parked;
 }
 
 bool ParkedRenderers::dropOldest() {
-  std::list<Parked> dropped;  // destroyed after the lock is released, since it may be large
+  std::list<Place> dropped;  // destroyed after the lock is released, since it may be large
   const std::lock_guard lock(mutex_);
-  if (parked_.empty()) return false;
-  dropped.splice(dropped.end(), parked_, parked_.begin());
+  if (places_.empty()) return false;
+  dropped.splice(dropped.end(), places_, places_.begin());
   return true;
 }
 

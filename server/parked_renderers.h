@@ -13,20 +13,24 @@ namespace scolopax::server {
 /// Every function may be called from any thread.
 class ParkedRenderers {
  public:
+  /// A renderer and the volume that it renders; both null if they have been dropped.
+  struct Parked {
+    std::shared_ptr<Renderer> renderer;
+    std::shared_ptr<const Volume> volume;
+  };
   /// `owner` must not have a renderer here.
-  void park(const void* owner, std::shared_ptr<Renderer> renderer);
-  /// The owner's renderer; null if it has been dropped.
-  std::shared_ptr<Renderer> take(const void* owner);
+  void park(const void* owner, Parked parked);
+  Parked take(const void* owner);
   /// Drops the renderer that was parked first; false if there is none.
   bool dropOldest();
 
  private:
-  struct Parked {
+  struct Place {
     const void* owner;
-    std::shared_ptr<Renderer> renderer;
+    Parked parked;
   };
   std::mutex mutex_;
-  std::list<Parked> parked_;  ///< in the order in which they were parked
+  std::list<Place> places_;  ///< in the order in which they were parked
 };
 
 }  // namespace scolopax::server

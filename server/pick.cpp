@@ -37,8 +37,7 @@ std::array<int, 3> nearestVoxel(const Picked& picked, const glm::ivec3& dims) {
   return voxel;
 }
 
-json hitJson(const ResolvedScene& scene, const Picked& picked) {
-  const Volume& volume = *scene.dataset->volume;
+json hitJson(const ResolvedScene& scene, const Volume& volume, const Picked& picked) {
   return {{"point", {picked.point.x, picked.point.y, picked.point.z}},
           {"voxel", nearestVoxel(picked, volume.grid().dims)},
           {"channel", picked.channel},
@@ -61,12 +60,12 @@ PixelArea areaOf(const PickQuery& query, int width, int height) {
   return {columns.first, rows.first, columns.count, rows.count};
 }
 
-json pickedJson(const ResolvedScene& scene, std::uint32_t revision, const PickQuery& query,
-                const std::vector<Picked>& found) {
+json pickedJson(const ResolvedScene& scene, const Volume& volume, std::uint32_t revision,
+                const PickQuery& query, const std::vector<Picked>& found) {
   json answer = {{"revision", revision}};
   if (!query.x2) {
     answer["hit"] = !found.empty();
-    if (!found.empty()) answer.update(hitJson(scene, found.front()));
+    if (!found.empty()) answer.update(hitJson(scene, volume, found.front()));
     return answer;
   }
   const PixelArea area = areaOf(query, scene.render.width, scene.render.height);
@@ -74,8 +73,8 @@ json pickedJson(const ResolvedScene& scene, std::uint32_t revision, const PickQu
   json& hits = answer["hits"] = json::array();
   std::set<std::array<int, 3>> seen;
   for (const Picked& picked : found)
-    if (seen.insert(nearestVoxel(picked, scene.dataset->volume->grid().dims)).second)
-      hits.push_back(hitJson(scene, picked));
+    if (seen.insert(nearestVoxel(picked, volume.grid().dims)).second)
+      hits.push_back(hitJson(scene, volume, picked));
   return answer;
 }
 

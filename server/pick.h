@@ -27,8 +27,9 @@ struct PickQuery {
 PixelArea areaOf(const PickQuery& query, int width, int height);
 
 /// The answer as in the protocol: one hit for a pixel, or a list of hits for a rectangle, each voxel once.
-nlohmann::json pickedJson(const ResolvedScene& scene, std::uint32_t revision, const PickQuery& query,
-                          const std::vector<Picked>& found);
+/// `volume`: the one that the scene shows.
+nlohmann::json pickedJson(const ResolvedScene& scene, const Volume& volume, std::uint32_t revision,
+                          const PickQuery& query, const std::vector<Picked>& found);
 
 /// The result of a pick, or the reason why it failed: an Error or a ProtocolError.
 struct PickAnswer {

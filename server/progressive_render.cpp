@@ -54,14 +54,15 @@ void ProgressiveRender::dropRenderer() {
 }
 
 void ProgressiveRender::park() {
-  context_.parked->park(this, std::move(renderer_));
-  renderer_.reset();
+  context_.parked->park(this, {std::exchange(renderer_, nullptr), std::exchange(volume_, nullptr)});
   parked_ = true;
 }
 
 void ProgressiveRender::unpark() {
   if (!std::exchange(parked_, false)) return;
-  renderer_ = context_.parked->take(this);
+  auto [renderer, volume] = context_.parked->take(this);
+  renderer_ = std::move(renderer);
+  volume_ = std::move(volume);
   if (!renderer_) dropRenderer();
 }
 
@@ -201,13 +202,11 @@ void ProgressiveRender::buildScene(const RenderRequest& request, const OtherSess
                                    PassResult& result) {
   if (film_.begunInteractive && film_.unfinished && film_.scene)
     resolution_.passGivenUp(true, filmSize(), film_.passSeconds);
-  const auto volume = request.scene->dataset->volume;
-  if (volume_ != volume) {
-    dropRenderer();
-    resolution_.forget();
-  }
+  if (dataset_ != request.scene->dataset) resolution_.forget();  // another time costs the same
+  if (dataset_ != request.scene->dataset || time_ != request.scene->time) dropRenderer();
   if (film_.recording && !request.aovs) dropRenderer();  // to release the memory of the records
-  volume_ = volume;
+  dataset_ = request.scene->dataset;
+  time_ = request.scene->time;
   film_.abandoned = film_.unfinished;
   film_.unfinished = false;
   const auto build = std::make_shared<SceneBuild>();
@@ -216,6 +215,7 @@ void ProgressiveRender::buildScene(const RenderRequest& request, const OtherSess
   build->divisor = wantedDivisor(request, others.edited);
   build->scene = drawnScene(*request.scene, build->divisor, request.interactive);
   build->record = request.aovs && !film_.recording;
+  build->volume = volume_;
   build->renderer = renderer_;
   build->make = context_.makeRenderer;
   // Recording begins by clearing a lot of memory.
@@ -228,6 +228,7 @@ void ProgressiveRender::buildScene(const RenderRequest& request, const OtherSess
 
 void ProgressiveRender::ended(const std::shared_ptr<SceneBuild>& build, PassResult& result) {
   const RenderRequest& request = build->request;
+  volume_ = build->volume;
   renderer_ = build->renderer;
   if (build->record) {
     film_.recording = true;
@@ -240,6 +241,7 @@ void ProgressiveRender::ended(const std::shared_ptr<SceneBuild>& build, PassResu
   film_.divisor = build->divisor;
   film_.begunInteractive = request.interactive;
   film_.restShown = false;
+  if (context_.prefetch) context_.prefetch->around(dataset_, time_, build->scene.macrocell);
   result.built = build->inBackground;
   result.rebuildSeconds = secondsBetween(build->begin, context_.now());
   rebuildUs_ = microseconds(result.rebuildSeconds);
@@ -347,7 +349,7 @@ void ProgressiveRender::ended(const std::shared_ptr<PictureJob>& picture, PassRe
 /// Gives the turn to a pick, if there is one that can go on. Picks and pictures take turns.
 bool ProgressiveRender::pickIn(const RenderRequest& request) {
   pickedLast_ = pickReady(request) && !(pickedLast_ && request.pictures);
-  if (pickedLast_) pick_.run(*request.pick, film_.scene, film_.revision, renderer_);
+  if (pickedLast_) pick_.run(*request.pick, film_.scene, film_.revision, volume_, renderer_);
   return pickedLast_;
 }
 

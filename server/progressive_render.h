@@ -120,7 +120,9 @@ class ProgressiveRender {
   CurrentPick pick_;
   bool pickedLast_ = false;  ///< the last turn was a pick's, so the next is the picture's
 
-  std::shared_ptr<const Volume> volume_;
+  std::shared_ptr<const Dataset> dataset_;  ///< of the last build
+  std::size_t time_ = 0;
+  std::shared_ptr<const Volume> volume_;  ///< the renderer's
   std::shared_ptr<Renderer> renderer_;
   bool parked_ = false;  ///< the renderer is in RenderContext::parked, unless it has been dropped
   FilmState film_;

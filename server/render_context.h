@@ -12,7 +12,9 @@
 #include "server/config.h"
 #include "server/frame.h"
 #include "server/parked_renderers.h"
+#include "server/prefetch.h"
 #include "server/resolution.h"
+#include "server/volume_cache.h"
 
 namespace scolopax::server {
 
@@ -34,6 +36,8 @@ struct RenderContext {
   std::shared_ptr<MemoryBudget> memory = nullptr;     ///< for pictures; null: no limit
   std::function<void()> wakeWatch = [] {};            ///< makes RenderLoop::watch() run again
   double maxPickSeconds = Config().maxRenderSeconds;  ///< from the beginning of a pick to its answer
+  std::shared_ptr<VolumeCache> volumes = nullptr;  ///< from which data sets come; null: they stay in memory
+  std::shared_ptr<Prefetch> prefetch = nullptr;    ///< null: nothing is loaded in advance
   std::shared_ptr<ParkedRenderers> parked = std::make_shared<ParkedRenderers>();
 };
 

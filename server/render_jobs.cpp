@@ -27,7 +27,8 @@ Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive
 }
 
 void SceneBuild::run(const std::stop_token& stop) {
-  if (!renderer) renderer = make(request.scene->dataset->volume);
+  if (!volume) volume = request.scene->dataset->load(request.scene->time, stop);
+  if (!renderer) renderer = make(volume);
   stats = renderer->setScene(scene, stop);
   if (record) renderer->recordAovs();
 }

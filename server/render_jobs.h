@@ -32,17 +32,17 @@ struct SceneBuild {
   Scene scene;
   bool record = false;  ///< AOVs are recorded from this scene on
   bool inBackground = false;
-  bool onlyChooses = false;            ///< only the automatic choice of the method takes long
-  std::shared_ptr<Renderer> renderer;  ///< null: made by `make`
+  bool onlyChooses = false;              ///< only the automatic choice of the method takes long
+  std::shared_ptr<const Volume> volume;  ///< null: loaded first
+  std::shared_ptr<Renderer> renderer;    ///< null: made by `make`
   MakeRenderer make;
   RebuildStats stats;
 
   void run(const std::stop_token& stop);
   /// Whether the expensive part of this build is of no use for `other`.
   bool uselessFor(const RenderRequest& other) const {
-    return (onlyChooses && other.edit != request.edit) ||
-           other.scene->dataset->volume != request.scene->dataset->volume ||
-           other.scene->render.macrocell != scene.macrocell;
+    return (onlyChooses && other.edit != request.edit) || other.scene->dataset != request.scene->dataset ||
+           other.scene->time != request.scene->time || other.scene->render.macrocell != scene.macrocell;
   }
 };
 

@@ -23,6 +23,11 @@ RenderLoop::RenderLoop(SessionStore& store, RenderContext context, OnPass onPass
       context_(std::move(context)),
       onPass_(std::move(onPass)),
       interrupter_(context_.now, context_.wakeWatch) {
+  if (context_.volumes)
+    context_.volumes->setRelease([kept = std::weak_ptr(context_.parked)] {
+      const auto parked = kept.lock();
+      return parked && parked->dropOldest();
+    });
   if (!context_.memory) return;
   // Pictures first, because they can be made again from the films.
   context_.memory->setRelease([dropPicture = store_.pictureRelease(), kept = std::weak_ptr(context_.parked)] {

@@ -73,10 +73,29 @@ protocol::Scene pictureOf(protocol::Scene resolved) {
   return resolved;
 }
 
+/// A data set with a single step is the same at all times, so that one can change to it and back.
+std::size_t timeOf(const protocol::Scene& scene, const Dataset& dataset) {
+  if (dataset.times() > 1 && scene.time >= dataset.times())
+    throw ProtocolError(422, "/time",
+                        "expected a step from 0 to " + std::to_string(dataset.times() - 1) + ", found " +
+                            std::to_string(scene.time));
+  return dataset.times() > 1 ? scene.time : 0;
+}
+
+/// Throws Unmeasured if nothing of the data set has been loaded.
+std::shared_ptr<const DatasetFacts> factsOf(const ResolvedScene& scene) {
+  auto facts = scene.dataset->facts();
+  if (!facts)
+    throw Unmeasured([dataset = scene.dataset, time = scene.time](const std::stop_token& stop) {
+      dataset->factsOrLoad(stop, time);
+    });
+  return facts;
+}
+
 }  // namespace
 
 bool makeSameFilm(const ResolvedScene& a, const ResolvedScene& b) {
-  return a.dataset == b.dataset && makeSameFilm(a.render, b.render);
+  return a.dataset == b.dataset && a.time == b.time && makeSameFilm(a.render, b.render);
 }
 
 json pictureJson(const protocol::Scene& resolved) {
@@ -86,22 +105,21 @@ json pictureJson(const protocol::Scene& resolved) {
 }
 
 SceneResolver::SceneResolver(std::shared_ptr<const DatasetStore> datasets, Options options)
-    : datasets_(std::move(datasets)), options_(std::move(options)), lists_(rendererLists()) {
-  for (const auto& dataset : datasets_->all())
-    coarse_.emplace(dataset.get(), buildCoarseMacrocells(*dataset->volume));
-}
+    : datasets_(std::move(datasets)), options_(std::move(options)), lists_(rendererLists()) {}
 
-void SceneResolver::frame(const protocol::Scene& scene, ResolvedScene& result) const {
+void SceneResolver::frame(const protocol::Scene& scene, const DatasetFacts& facts,
+                          ResolvedScene& result) const {
   if (result.automatic.framed || (scene.camera.eye && scene.camera.target)) return;
   std::vector<glm::vec3> hull;
   try {
-    hull = visibleHull(*result.dataset->volume, coarse_.at(result.dataset.get()), result.render.channels);
+    hull = visibleHull(facts.volume, facts.coarse, result.render.channels);
   } catch (const Error&) {  // rendering will report the error
   }
   result.automatic.framed = std::make_shared<const std::vector<glm::vec3>>(std::move(hull));
 }
 
-std::array<double, 2> SceneResolver::gradientRange(const ResolvedScene& scene, int channel) const {
+std::array<double, 2> SceneResolver::gradientRange(const VolumeFacts& volume, const ResolvedScene& scene,
+                                                   int channel) const {
   const auto gradients = datasets_->gradients(*scene.dataset, channel);
   if (!gradients)
     throw Unmeasured([store = datasets_, dataset = scene.dataset, channel](const std::stop_token& stop) {
@@ -109,13 +127,14 @@ std::array<double, 2> SceneResolver::gradientRange(const ResolvedScene& scene, i
     });
   double most = 0;
   refuseAt("/channels/" + std::to_string(channel), [&] {
-    most = gradientQuantile(*gradients, scene.dataset->volume->channels()[std::size_t(channel)],
+    most = gradientQuantile(*gradients, volume.channels[std::size_t(channel)],
                             scene.render.channels[std::size_t(channel)], kWithinRange);
   });
   return {0, most > 0 ? most : 1};  // with a gradient of 0, all ranges give the same picture
 }
 
-void SceneResolver::resolveGradientOpacity(protocol::Scene& scene, ResolvedScene& result) const {
+void SceneResolver::resolveGradientOpacity(const VolumeFacts& volume, protocol::Scene& scene,
+                                           ResolvedScene& result) const {
   auto& ranges = result.automatic.gradientRanges;
   ranges.resize(scene.channels.size());
   for (std::size_t i = 0; i < scene.channels.size(); ++i) {
@@ -123,7 +142,7 @@ void SceneResolver::resolveGradientOpacity(protocol::Scene& scene, ResolvedScene
     if (!wire || wire->range) {
       ranges[i].reset();
     } else {
-      if (!ranges[i]) ranges[i] = gradientRange(result, int(i));
+      if (!ranges[i]) ranges[i] = gradientRange(volume, result, int(i));
       wire->range = ranges[i];
     }
     if (!wire) continue;
@@ -142,7 +161,7 @@ std::shared_ptr<const Dataset> SceneResolver::datasetOf(const json& scene) const
   auto dataset = datasets_->find(id->get_ref<const std::string&>());
   if (!dataset) {
     std::string known;
-    for (const auto& one : datasets_->all()) known += (known.empty() ? "" : ", ") + one->id;
+    for (const auto& one : datasets_->all()) known += (known.empty() ? "" : ", ") + one->id();
     const json found = protocol::shortened(id->get_ref<const std::string&>());
     throw ProtocolError(422, "/dataset", "expected one of " + known + ", found " + found.dump());
   }
@@ -150,13 +169,13 @@ std::shared_ptr<const Dataset> SceneResolver::datasetOf(const json& scene) const
 }
 
 SceneResolver::Resolved SceneResolver::replaceNow(const json& scene, std::uint32_t defaultSamples) const {
-  const auto count = datasetOf(scene)->volume->channels().size();
+  const auto count = datasetOf(scene)->headers().channels.size();
   return resolve(SparseScene().patched(scene, count), {}, defaultSamples);
 }
 
 SceneResolver::Resolved SceneResolver::patchNow(const ResolvedScene& base, const json& patch) const {
   const bool namesDataset = patch.is_object() && patch.contains("dataset");
-  const auto count = datasetOf(namesDataset ? patch : base.sparse.rest())->volume->channels().size();
+  const auto count = datasetOf(namesDataset ? patch : base.sparse.rest())->headers().channels.size();
   SparseScene sparse = base.sparse.patched(patch, count);
   AutomaticValues automatic = base.automatic;
   if (resetsView(patch)) automatic.framed.reset();
@@ -203,21 +222,23 @@ SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const Automat
   result->dataset = datasetOf(sparse.rest());
   if (automatic.dataset == result->dataset) result->automatic = automatic;
   result->automatic.dataset = result->dataset;
-  const Volume& volume = *result->dataset->volume;
-  protocol::checkChannelCount(scene, volume.channels().size());
+  protocol::checkChannelCount(scene, result->dataset->headers().channels.size());
+  result->time = timeOf(scene, *result->dataset);
+  const auto facts = factsOf(*result);
+  const VolumeFacts& volume = facts->volume;
   Scene& render = result->render;
   resolveImage(scene, render, options_.maxPixels);
-  scene.dataset = result->dataset->id;
+  scene.dataset = result->dataset->id();
   resolveChannels(scene, render, volume);
   if (const auto reason = tooLarge(render, false)) throw ProtocolError(422, "/image", *reason);
-  frame(scene, *result);
+  frame(scene, *facts, *result);
   const auto& framed = result->automatic.framed;
-  resolveCamera(scene, render, volume.grid(), framed ? *framed : std::span<const glm::vec3>());
+  resolveCamera(scene, render, volume.grid, framed ? *framed : std::span<const glm::vec3>());
   resolveClipping(scene, render, volume);
   resolveLights(scene, render);
   resolveIntegrator(scene, render, volume, options_.maxIntervals);
-  resolveGradientOpacity(scene, *result);  // late, so that refused scenes are not measured
-  refuseAt("", [&] { checkScene(render, volume); });
+  resolveGradientOpacity(volume, scene, *result);  // late, so that refused scenes are not measured
+  refuseAt("", [&] { checkScene(render, volume.channels.size()); });
   if (!scene.stop.samples && !scene.stop.seconds && !scene.stop.error) scene.stop.samples = defaultSamples;
   result->defaultSamples = defaultSamples;
   result->stop = {scene.stop.samples.value_or(0), scene.stop.seconds.value_or(0),

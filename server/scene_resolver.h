@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -43,6 +42,7 @@ struct ResolvedScene {
   Scene render;
   StopRule stop;
   std::shared_ptr<const Dataset> dataset;
+  std::size_t time = 0;                           ///< the step that is shown
   std::uint32_t defaultSamples = kRenderSamples;  ///< of this scene and of those that patches make of it
   AutomaticValues automatic = {};
   MemoryBudget::Share memory = {};
@@ -90,13 +90,13 @@ class SceneResolver {
 
  private:
   Resolved resolve(SparseScene sparse, const AutomaticValues& automatic, std::uint32_t defaultSamples) const;
-  void frame(const protocol::Scene& scene, ResolvedScene& result) const;
-  void resolveGradientOpacity(protocol::Scene& scene, ResolvedScene& result) const;
-  std::array<double, 2> gradientRange(const ResolvedScene& scene, int channel) const;
+  void frame(const protocol::Scene& scene, const DatasetFacts& facts, ResolvedScene& result) const;
+  void resolveGradientOpacity(const VolumeFacts& volume, protocol::Scene& scene, ResolvedScene& result) const;
+  std::array<double, 2> gradientRange(const VolumeFacts& volume, const ResolvedScene& scene,
+                                      int channel) const;
   std::shared_ptr<const Dataset> datasetOf(const nlohmann::json& scene) const;
 
   std::shared_ptr<const DatasetStore> datasets_;
-  std::map<const Dataset*, MacrocellGrid> coarse_;  ///< one for each data set, for frame()
   Options options_;
   protocol::Lists lists_;
 };

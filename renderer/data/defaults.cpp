@@ -16,11 +16,11 @@ constexpr double kBelowOnly = 0.5, kBelowEach = 0.92;
 
 }  // namespace
 
-ValueRange defaultRange(const Volume& volume, int channel) {
-  const Channel& c = volume.channels()[std::size_t(channel)];
+ValueRange defaultRange(const VolumeFacts& volume, int channel) {
+  const ChannelFacts& c = volume.channels[std::size_t(channel)];
   if (c.look.window) return *c.look.window;
   const Histogram& h = c.histogram;
-  double lo = h.quantile(volume.channels().size() == 1 ? kBelowOnly : kBelowEach), hi = h.quantile(0.9995);
+  double lo = h.quantile(volume.channels.size() == 1 ? kBelowOnly : kBelowEach), hi = h.quantile(0.9995);
   if (!(lo < hi)) lo = h.minimum, hi = h.maximum;  // nearly all voxels have one value
   if (lo < hi) return {lo, hi};
   // One value everywhere: visible unless it is zero.
@@ -37,13 +37,13 @@ std::array<std::uint8_t, 3> defaultColor(int index) {
   return kColors[std::size_t(index) % std::size(kColors)];
 }
 
-std::array<std::uint8_t, 3> defaultColor(const Volume& volume, int channel) {
-  const auto& stated = volume.channels()[std::size_t(channel)].look.color;
+std::array<std::uint8_t, 3> defaultColor(const VolumeFacts& volume, int channel) {
+  const auto& stated = volume.channels[std::size_t(channel)].look.color;
   return stated ? *stated : defaultColor(channel);
 }
 
-double defaultDensity(const Volume& volume, int channel) {
-  const Channel& c = volume.channels()[std::size_t(channel)];
+double defaultDensity(const VolumeFacts& volume, int channel) {
+  const ChannelFacts& c = volume.channels[std::size_t(channel)];
   const ValueRange range = defaultRange(volume, channel);
   // Share of the voxels that the ramp makes visible, and their mean opacity.
   constexpr int kSteps = 1024;
@@ -59,8 +59,8 @@ double defaultDensity(const Volume& volume, int channel) {
   const double share = std::max(seen, 1) / double(kSteps);
   const double mean = seen > 0 ? opacity / seen : 0.5;
   // Edge of a cube that the visible voxels would fill: how thick the structures are, roughly.
-  const double thickness = volume.grid().diagonal() / std::sqrt(3.0) * std::cbrt(share);
-  return kStructureDepth / std::sqrt(double(volume.channels().size())) / (mean * thickness);
+  const double thickness = volume.grid.diagonal() / std::sqrt(3.0) * std::cbrt(share);
+  return kStructureDepth / std::sqrt(double(volume.channels.size())) / (mean * thickness);
 }
 
 }  // namespace scolopax

@@ -11,13 +11,13 @@ namespace scolopax {
 namespace {
 
 /// Factor from data units per world unit to stored values per smallest spacing.
-double storedPerSpacing(const Channel& channel, const Grid& grid) {
+double storedPerSpacing(const ChannelFacts& channel, const Grid& grid) {
   return grid.smallestSpacing() / std::abs(channel.slope);
 }
 
 }  // namespace
 
-GradientFactor::GradientFactor(const GradientOpacity& look, const Channel& channel, const Grid& grid)
+GradientFactor::GradientFactor(const GradientOpacity& look, const ChannelFacts& channel, const Grid& grid)
     : curve_(makeCurve(look.factor, "gradientOpacity")),
       optical_(
           makeOpticalCurve(curve_, makeCurve(std::vector<ColorKnot>{{0, {1, 1, 1}}}, "gradientOpacity"))),

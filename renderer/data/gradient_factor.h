@@ -12,7 +12,7 @@ class GradientFactor {
  public:
   /// Throws Error(badInput), naming the fault: no knots, positions that decrease, values out of range, a
   /// range that is not finite.
-  GradientFactor(const GradientOpacity& look, const Channel& channel, const Grid& grid);
+  GradientFactor(const GradientOpacity& look, const ChannelFacts& channel, const Grid& grid);
   /// Valid while this object lives.
   kernel::GradientFactorView view() const;
   /// Largest factor that the kernels can compute where |gradient|, in stored values per smallest spacing, is

@@ -199,7 +199,7 @@ std::shared_ptr<const GradientHistogram> sharedGradientHistogram(
       stop);
 }
 
-double gradientQuantile(const GradientHistogram& histogram, const Channel& channel,
+double gradientQuantile(const GradientHistogram& histogram, const ChannelFacts& channel,
                         const ChannelAppearance& look, double p) {
   ChannelAppearance opacity = look;
   opacity.density = 1;

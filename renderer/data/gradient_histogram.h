@@ -52,7 +52,7 @@ std::shared_ptr<const GradientHistogram> sharedGradientHistogram(
 /// channel's curve; if there is no such bin, if any value in it has; if there is none either, all bins count.
 /// For p > 0 the result is 0 only if all gradients are 0. Throws Error(badInput) for a curve that cannot be
 /// rendered.
-double gradientQuantile(const GradientHistogram& histogram, const Channel& channel,
+double gradientQuantile(const GradientHistogram& histogram, const ChannelFacts& channel,
                         const ChannelAppearance& look, double p);
 
 }  // namespace scolopax

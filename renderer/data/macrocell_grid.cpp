@@ -115,8 +115,8 @@ glm::ivec3 macrocellsOf(glm::ivec3 dims, int size) {
   return glm::max(glm::ivec3(1), (dims - 1 + size - 1) / size);
 }
 
-std::size_t intervalCount(const Volume& volume, int size) {
-  return countOf(macrocellsOf(volume.grid().dims, size)) * volume.channels().size();
+std::size_t intervalCount(glm::ivec3 dims, std::size_t channels, int size) {
+  return countOf(macrocellsOf(dims, size)) * channels;
 }
 
 MacrocellGrid buildMacrocells(const Volume& volume, int size, const std::stop_token& stop) {

@@ -88,7 +88,7 @@ MacrocellGrid buildMacrocells(const Volume& volume, int size, const std::stop_to
 /// cell, too.
 CellColumn buildSplineColumn(const Volume& volume, int channel, int size, const std::stop_token& stop = {});
 
-/// Number of intervals, over all cells and channels, in a grid with cells of this size.
-std::size_t intervalCount(const Volume& volume, int size);
+/// Number of intervals, over all cells and channels, of a volume with these dims in cells of this size.
+std::size_t intervalCount(glm::ivec3 dims, std::size_t channels, int size);
 
 }  // namespace scolopax

@@ -29,7 +29,7 @@ RenderPlan::RenderPlan(std::shared_ptr<const Volume> volume, const Scene& scene,
                        const std::shared_ptr<MemoryBudget>& memory, const std::stop_token& stop)
     : volume_(std::move(volume)), scene_(scene) {
   const auto start = std::chrono::steady_clock::now();
-  checkScene(scene_, *volume_);
+  checkScene(scene_, volume_->channels().size());
   const auto rays = makeCameraRays(scene_.camera, grid(), scene_.width, scene_.height);
   channels_.emplace(volume_, scene_, before ? &*before->channels_ : nullptr, memory, stop, &rebuilt_);
   channelViews_ = channels_->views();

@@ -35,16 +35,16 @@ void checkStep(double step) {
                  shortText(step));
 }
 
-void checkScene(const Scene& scene, const Volume& volume) {
-  if (scene.channels.size() != volume.channels().size())
-    failBadInput("scene: expected " + std::to_string(volume.channels().size()) + " channels, found " +
+void checkScene(const Scene& scene, std::size_t channels) {
+  if (scene.channels.size() != channels)
+    failBadInput("scene: expected " + std::to_string(channels) + " channels, found " +
                  std::to_string(scene.channels.size()));
   checkImageSize(scene);
   if (scene.lights.size() > std::size_t(kernel::kMaxLights))
     failBadInput("lights: expected at most " + std::to_string(kernel::kMaxLights) + ", found " +
                  std::to_string(scene.lights.size()));
   for (const Light& light : scene.lights) checkLight(light);
-  checkClipping(scene.clip, scene.crop, volume.channels().size());
+  checkClipping(scene.clip, scene.crop, channels);
   checkStep(scene.step);
   if (scene.macrocell < 1 || scene.macrocell > kMaxMacrocell)
     failBadInput("integrator.macrocell: expected 1 to " + std::to_string(kMaxMacrocell) + ", found " +

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks of scenes. Cameras and curves are checked where they are converted for the kernels.
 #pragma once
+#include <cstddef>
+
 #include "renderer/data/scene.h"
-#include "renderer/data/volume.h"
 
 namespace scolopax {
 
@@ -15,7 +16,8 @@ void checkImageSize(const Scene& scene);
 void checkLight(const Light& light);
 /// Throws Error(badInput) for a step that Scene::step does not allow.
 void checkStep(double step);
-/// Throws Error(badInput) if RenderPlan would refuse the scene for anything but its camera and curves.
-void checkScene(const Scene& scene, const Volume& volume);
+/// Throws Error(badInput) if RenderPlan would refuse the scene, for a volume of so many channels, for
+/// anything but its camera and curves.
+void checkScene(const Scene& scene, std::size_t channels);
 
 }  // namespace scolopax

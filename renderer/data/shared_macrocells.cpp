@@ -22,7 +22,7 @@ struct KeyLess {
 };
 
 std::size_t cellCount(const Volume& volume, int size) {
-  return intervalCount(volume, size) / volume.channels().size();
+  return countOf(macrocellsOf(volume.grid().dims, size));
 }
 
 }  // namespace
@@ -32,8 +32,9 @@ std::shared_ptr<const MacrocellGrid> sharedMacrocells(const std::shared_ptr<cons
                                                       const std::shared_ptr<MemoryBudget>& memory) {
   static SharedBuilds<Key, MacrocellGrid, KeyLess> builds;
   // While a channel is measured, the ends of its intervals are floats.
-  const std::size_t bytes = intervalCount(*volume, size) * sizeof(kernel::LevelInterval) +
-                            cellCount(*volume, size) * sizeof(ValueInterval);
+  const std::size_t bytes =
+      intervalCount(volume->grid().dims, volume->channels().size(), size) * sizeof(kernel::LevelInterval) +
+      cellCount(*volume, size) * sizeof(ValueInterval);
   return builds.get({volume, size, 0, false},
                     measuring<MacrocellGrid>(memory, bytes,
                                              [volume, size](const std::stop_token& abandoned) {

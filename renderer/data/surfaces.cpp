@@ -37,7 +37,7 @@ std::vector<Peak> peaksOf(const std::vector<OpacityKnot>& curve) {
   return peaks;
 }
 
-Surfaces::Surfaces(const Channel& channel, const ChannelAppearance& appearance, float origin,
+Surfaces::Surfaces(const ChannelFacts& channel, const ChannelAppearance& appearance, float origin,
                    double smallestSpacing) {
   const auto fail = [&](const std::string& what) {
     throw Error(ErrorCode::badInput, "channel '" + channel.name + "': " + what);

@@ -16,7 +16,8 @@ class Surfaces {
   Surfaces() = default;
   /// `origin` is that of the channel's view. Throws Error(badInput), naming the fault: a value that is not
   /// finite, an opacity outside [0,1], more surfaces than kernel::kMaxSurfaces.
-  Surfaces(const Channel& channel, const ChannelAppearance& appearance, float origin, double smallestSpacing);
+  Surfaces(const ChannelFacts& channel, const ChannelAppearance& appearance, float origin,
+           double smallestSpacing);
   bool any() const { return !views_.empty(); }
   /// Adds them to a view of the channel. Valid while this object lives.
   void addTo(kernel::ChannelView& view) const;

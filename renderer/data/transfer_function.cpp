@@ -43,7 +43,7 @@ void setStoredValues(OpticalCurve& curve, const kernel::ChannelView& channel) {
 
 }  // namespace
 
-TransferFunction::TransferFunction(const Channel& channel, const ChannelAppearance& a)
+TransferFunction::TransferFunction(const ChannelFacts& channel, const ChannelAppearance& a)
     : gamma_(float(a.gamma)),
       density_(float(std::min(a.density, 1e30))),
       weight_(float(a.weight)),

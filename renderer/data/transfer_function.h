@@ -11,7 +11,7 @@ namespace scolopax {
 class TransferFunction {
  public:
   /// Throws Error(badInput), naming the fault: no knots, positions that decrease, values out of range.
-  TransferFunction(const Channel& channel, const ChannelAppearance& appearance);
+  TransferFunction(const ChannelFacts& channel, const ChannelAppearance& appearance);
   /// With the voxels of `channel`, interpolated trilinearly. Valid while this object and the voxels live.
   kernel::ChannelView view(const Channel& channel) const;
   /// Least upper bound, in float, of the kernels' extinction over an interval of stored values.

@@ -62,22 +62,22 @@ MacrocellGrid buildCoarseMacrocells(const Volume& volume) {
   return buildMacrocells(volume, std::max(1, (gaps + kMostCells - 1) / kMostCells));
 }
 
-std::vector<glm::vec3> visibleHull(const Volume& volume, const MacrocellGrid& cells,
+std::vector<glm::vec3> visibleHull(const VolumeFacts& volume, const MacrocellGrid& cells,
                                    std::span<const ChannelAppearance> channels) {
   std::vector<kernel::BoundTable> tables;
   bool splines = false;
   for (std::size_t i = 0; i < channels.size(); ++i) {
     if (!channels[i].visible) continue;
     splines = splines || channels[i].interpolation == Interpolation::cubic;
-    const TransferFunction transfer(volume.channels()[i], channels[i]);
+    const TransferFunction transfer(volume.channels[i], channels[i]);
     if (!transfer.invisible()) tables.push_back(buildBounds(cells.levels[i], transfer, int(i)));
-    const Surfaces surfaces(volume.channels()[i], channels[i], transfer.origin(),
-                            volume.grid().smallestSpacing());
+    const Surfaces surfaces(volume.channels[i], channels[i], transfer.origin(),
+                            volume.grid.smallestSpacing());
     if (surfaces.any()) tables.push_back(buildPresence(cells.levels[i], surfaces, int(i)));
   }
   if (tables.empty()) return {};
   const std::vector<Stretch> rows = visibleRows(cells, tables);
-  const glm::ivec3 count = cells.cells, dims = volume.grid().dims;
+  const glm::ivec3 count = cells.cells, dims = volume.grid.dims;
   // For every line of cell edges along x, the outermost corners of the rows that meet there.
   std::vector<glm::vec3> points;
   for (int z = 0; z <= count.z; ++z)

@@ -18,7 +18,7 @@ MacrocellGrid buildCoarseMacrocells(const Volume& volume);
 /// and every surface. The hull reaches beyond these samples by less than a macrocell, a step of its levels
 /// and, with cubic interpolation, a voxel. Empty if nothing is visible. `cells`: macrocells of `volume`;
 /// `channels`: one per channel of the volume. Throws Error(badInput) for a curve that cannot be rendered.
-std::vector<glm::vec3> visibleHull(const Volume& volume, const MacrocellGrid& cells,
+std::vector<glm::vec3> visibleHull(const VolumeFacts& volume, const MacrocellGrid& cells,
                                    std::span<const ChannelAppearance> channels);
 
 }  // namespace scolopax

@@ -172,6 +172,12 @@ void VoxelBuffer::release(std::size_t first, std::size_t last) {
   if (begin < end) ::madvise(bytes_.get() + (begin - start), end - begin, MADV_DONTNEED);
 }
 
+std::uint64_t Volume::sizeBytes() const {
+  std::uint64_t bytes = 0;
+  for (const VoxelBuffer& buffer : buffers_) bytes += buffer.sizeBytes();
+  return bytes;
+}
+
 Volume::Volume(Grid grid, std::vector<ChannelSource> sources, const std::stop_token& stop) : grid_(grid) {
   checkGrid(grid_);
   if (sources.empty() || sources.size() > std::size_t(kMaxChannels))
@@ -197,6 +203,7 @@ Volume::Volume(Grid grid, std::vector<ChannelSource> sources, const std::stop_to
       throw Error(ErrorCode::badInput,
                   "volume: channel '" + channel.name + "' needs values below 1e301, found slope " +
                       shortText(channel.slope) + " and intercept " + shortText(channel.intercept));
+    channel.type = source.voxels.type();
     channel.look = source.look;
     checkStop(stop);
     normalise(source.voxels, channel);

@@ -146,15 +146,25 @@ struct ChannelSource {
   StatedLook look;
 };
 
-/// One channel of a volume, with what was measured once when it was loaded.
-struct Channel {
+/// One channel, with what was measured once when it was loaded, but without its voxels.
+struct ChannelFacts {
   std::string name;
   std::string unit;
-  VoxelView voxels;
+  ScalarType type = ScalarType::u8;
   double slope = 1.0;  ///< data value = slope * stored + intercept; slope != 0
   double intercept = 0.0;
   Histogram histogram;  ///< over data values, finite voxels only
   StatedLook look;
+};
+
+struct Channel : ChannelFacts {
+  VoxelView voxels;
+};
+
+/// What is known of a volume without its voxels: enough to choose how it looks.
+struct VolumeFacts {
+  Grid grid;
+  std::vector<ChannelFacts> channels;
 };
 
 class Volume {
@@ -166,6 +176,9 @@ class Volume {
   Volume(Grid grid, std::vector<ChannelSource> channels, const std::stop_token& stop = {});
   const Grid& grid() const { return grid_; }
   std::span<const Channel> channels() const { return channels_; }
+  VolumeFacts facts() const { return {grid_, {channels_.begin(), channels_.end()}}; }
+  /// Of all voxels.
+  std::uint64_t sizeBytes() const;
 
  private:
   Grid grid_;

@@ -140,7 +140,7 @@ void run(BenchOptions options) {
     checkOutputs({options.json}, options.scene);
   }
   const auto resolved = resolveScene(options.scene);
-  const auto volume = resolved->dataset->volume;
+  const auto volume = resolved->dataset->load(resolved->time);
   Scene scene = resolved->render;
   if (!options.sceneFilter) scene.filter = PixelFilter::point;  // there the reference has no noise
   if (options.macrocells.empty()) options.macrocells = {scene.macrocell};

@@ -69,12 +69,12 @@ void printHeaders(const io::Dataset& dataset) {
   fmt::print("  needs at most {} of memory\n", io::byteCount(io::memoryBytes(dataset)));
 }
 
-void printLoaded(const io::Dataset& dataset, const server::Dataset& loaded) {
+void printLoaded(const io::Dataset& dataset, const io::LoadedDataset& loaded) {
   printHeader(dataset);
   int index = 0;
   for (const Channel& channel : loaded.volume->channels()) {
     const Histogram& h = channel.histogram;
-    printChannel(index++, channel.name, nameOf(channel.voxels.type()));
+    printChannel(index++, channel.name, nameOf(channel.type));
     fmt::print(" {:g} .. {:g}{}{}", h.minimum, h.maximum, channel.unit.empty() ? "" : " ", channel.unit);
     if (h.nonFiniteCount > 0) fmt::print(", {} voxels not finite", h.nonFiniteCount);
     printLook(channel.look);
@@ -91,12 +91,13 @@ void printDatasets(const InfoOptions& options) {
   const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
   const auto opened =
       io::openDatasets(options.paths, {.fourthAxis = fourthAxisOf(options.fourthAxis), .warn = warn});
-  std::vector<server::Dataset> loaded;
+  std::vector<io::LoadedDataset> loaded;
   if (!options.headers) loaded = io::loadDatasets(opened, 0, {.warn = warn});
   nlohmann::json list = nlohmann::json::array();
   for (std::size_t i = 0; i < opened.size(); ++i) {
     if (options.json)
-      list.push_back(options.headers ? server::describeJson(opened[i]) : server::describeJson(loaded[i]));
+      list.push_back(options.headers ? server::describeJson(opened[i])
+                                     : server::describeJson(server::Dataset(std::move(loaded[i]))));
     else if (options.headers)
       printHeaders(opened[i]);
     else

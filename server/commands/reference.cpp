@@ -35,7 +35,8 @@ void renderTruth(const ReferenceArguments& arguments) {
   const auto resolved = resolveScene(arguments.scene);
   reference::ReferenceOptions options = arguments.options;
   options.seed = resolved->render.seed;
-  const auto truth = reference::renderReference(*resolved->dataset->volume, resolved->render, options);
+  const auto truth =
+      reference::renderReference(*resolved->dataset->load(resolved->time), resolved->render, options);
   io::writeImage(arguments.out, truth.image, resolved->render.background);
   fmt::print("largest error of a ray {:.2e}\nnoise of the picture {:.2e} (RMS)\n", truth.maximumRayError,
              rootMeanSquare(truth.standardError));

@@ -137,7 +137,7 @@ void render(const RenderOptions& options) {
   const auto renderer =
       rendererFactory(options.device, options.threads, nullptr, true, [](const std::string& line) {
         fmt::print(stderr, "scolopax: {}\n", line);
-      }).make(resolved->dataset->volume);
+      }).make(resolved->dataset->load(resolved->time));
   if (!options.stats.empty()) renderer->countCosts();
   if (!aovs.empty()) renderer->recordAovs();
   const RebuildStats rebuild = renderer->setScene(scene);

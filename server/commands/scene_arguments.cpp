@@ -54,7 +54,7 @@ void addSceneArguments(CLI::App& command, SceneArguments& arguments) {
   command.add_option("--data", arguments.data, kDataDoc)->required();
   checkFourthAxis(command.add_option("--fourth-axis", arguments.fourthAxis, kFourthAxisDoc))
       ->capture_default_str();
-  command.add_option("--time", arguments.time, "Which time of a time series, from 0")->capture_default_str();
+  command.add_option("--time", arguments.time, "Which time of a time series, from 0: the scene's `time`");
   command
       .add_option(
           "--set", arguments.assignments,
@@ -64,13 +64,14 @@ void addSceneArguments(CLI::App& command, SceneArguments& arguments) {
 
 std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& arguments) {
   std::vector<json> patches;
+  if (arguments.time) patches.push_back({{"time", *arguments.time}});
   for (const std::string& assignment : arguments.assignments) patches.push_back(patchOf(assignment));
   const json scene = readScene(arguments.scene);
   const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
   const auto opened =
       io::openDatasets(arguments.data, {.fourthAxis = fourthAxisOf(arguments.fourthAxis), .warn = warn});
-  const auto store =
-      std::make_shared<server::DatasetStore>(io::loadDatasets(opened, arguments.time, {.warn = warn}));
+  const auto store = std::make_shared<server::DatasetStore>(
+      opened, std::make_shared<server::VolumeCache>(io::defaultMemoryLimitBytes(), warn));
   const server::SceneResolver resolver(store, {.maxPixels = server::Config().maxPixels});
   auto resolved = resolver.replace(scene);
   for (const json& patch : patches) resolved = resolver.patch(*resolved, patch);

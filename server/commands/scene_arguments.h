@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,8 +16,8 @@ struct SceneArguments {
   std::string scene;  ///< a file; "" is {}
   std::vector<std::filesystem::path> data;
   std::string fourthAxis = "auto";
-  std::size_t time = 0;
-  std::vector<std::string> assignments;  ///< "channels.0.density=0.1"
+  std::optional<std::uint32_t> time = {};     ///< replaces the scene's
+  std::vector<std::string> assignments = {};  ///< "channels.0.density=0.1"
 };
 
 /// Adds SCENE, --data, --fourth-axis, --time and --set, which fill `arguments`. `arguments` must live as long

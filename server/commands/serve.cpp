@@ -45,6 +45,7 @@ struct ServeOptions {
   std::string device = "auto", whenDeviceFails = "cpu";
   std::string logLevel = "info";
   double keepSeconds = 300;
+  std::uint64_t memoryMebibytes = io::defaultMemoryLimitBytes() >> 20;
   std::uint64_t maxMemoryMebibytes = io::defaultMemoryLimitBytes() / 2 >> 20;
 };
 
@@ -85,6 +86,23 @@ void waitForSignal() {
   }
 }
 
+/// Logs what is served, and what of it does not fit into the memory.
+void describe(const server::DatasetStore& datasets, spdlog::logger& log) {
+  for (const auto& dataset : datasets.all()) {
+    const auto& dims = dataset->grid().dims;
+    log.info("data set {}: {} x {} x {}, {} channels, {} times", dataset->id(), dims.x, dims.y, dims.z,
+             dataset->headers().channels.size(), dataset->times());
+    const std::uint64_t limit = datasets.cache()->limitBytes();
+    if (dataset->memoryBytes() > limit)
+      log.warn("data set {} needs {} MiB of memory and cannot be shown: --memory is {}", dataset->id(),
+               dataset->memoryBytes() >> 20, limit >> 20);
+    else if (dataset->level() > 0)
+      log.warn(
+          "data set {} is shown at level {}, because its finest level needs {} MiB of memory: --memory is {}",
+          dataset->id(), dataset->level(), io::memoryBytes(dataset->headers()) >> 20, limit >> 20);
+  }
+}
+
 void serve(ServeOptions options) {
   if (options.paths.empty())
     throw CLI::ValidationError(
@@ -111,18 +129,15 @@ void serve(ServeOptions options) {
 
   const auto opened = io::openDatasets(server::pathsBelowRoot(options.paths, options.dataRoot),
                                        {.fourthAxis = fourthAxisOf(options.fourthAxis), .warn = warn});
-  auto datasets = io::loadDatasets(opened, 0, {.warn = warn});
-  for (const auto& dataset : datasets) {
-    const auto& dims = dataset.volume->grid().dims;
-    log->info("data set {}: {} x {} x {}, {} channels", dataset.id, dims.x, dims.y, dims.z,
-              dataset.volume->channels().size());
-  }
   const auto memory = std::make_shared<MemoryBudget>(options.config.maxMemoryBytes);
+  const auto datasets = std::make_shared<const server::DatasetStore>(
+      opened, std::make_shared<server::VolumeCache>(options.memoryMebibytes << 20, warn), memory);
+  describe(*datasets, *log);
   const RendererFactory factory =
       rendererFactory(options.device, config.threads, memory, options.whenDeviceFails == "cpu", warn);
   options.config.backend = factory.backend;
   log->info("rendering on {}", factory.backend);
-  server::Application application(options.config, std::move(datasets), factory.make, memory, warn);
+  server::Application application(options.config, datasets, factory.make, memory, warn);
   catchSignals();
   application.start();
   std::printf("Scolopax is ready: %s\n", application.url().c_str());
@@ -176,6 +191,11 @@ void addServerOptions(CLI::App& command, ServeOptions& options) {
       "What sessions do after a CUDA device has failed: continue on the CPU, or end with the error")
       ->check(CLI::IsMember({"cpu", "end"}));
   add("threads", config.threads, "Threads for rendering; 0: all")->check(CLI::Range(0, 1024))->type_name("N");
+  add("memory", options.memoryMebibytes,
+      "MiB of memory for the voxels of data sets, which are loaded when they are first shown; those least "
+      "recently used give way. Half of the machine's by default")
+      ->check(CLI::Range(std::uint64_t(1), std::uint64_t(1) << 32))
+      ->type_name("N");
   add("log-level", options.logLevel, "Lowest level of the messages that are logged on standard error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "critical", "off"}));
   add("allow-origin", config.allowedOrigins, "Another site whose pages may use this server; can be repeated")

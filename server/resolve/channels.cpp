@@ -23,8 +23,8 @@ std::vector<ColorKnot> knotsOf(const protocol::Colormap& colormap) {
 
 }  // namespace
 
-void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume) {
-  const auto channels = volume.channels();
+void resolveChannels(protocol::Scene& scene, Scene& render, const VolumeFacts& volume) {
+  const auto& channels = volume.channels;
   scene.channels.resize(channels.size());
   for (std::size_t i = 0; i < channels.size(); ++i) {
     protocol::Channel& wire = scene.channels[i];
@@ -57,7 +57,7 @@ void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume
     }
     look.peaks = valueOf<Peaks>(kPeaks, wire.peaks);
     refuseAt("/channels/" + std::to_string(i),
-             [&] { Surfaces(channels[i], look, 0, volume.grid().smallestSpacing()); });
+             [&] { Surfaces(channels[i], look, 0, volume.grid.smallestSpacing()); });
     look.weight = wire.weight;
     look.material = {wire.material.ambient, wire.material.diffuse, wire.material.specular,
                      wire.material.shininess};

@@ -11,8 +11,8 @@ static_assert(std::tuple_size_v<decltype(protocol::Crop::regions)> == std::size_
 
 using protocol::ProtocolError;
 
-void resolveClipping(protocol::Scene& scene, Scene& render, const Volume& volume) {
-  const Grid& grid = volume.grid();
+void resolveClipping(protocol::Scene& scene, Scene& render, const VolumeFacts& volume) {
+  const Grid& grid = volume.grid;
   const glm::dvec3 centre(grid.worldFromVoxel * glm::dvec4(glm::dvec3(grid.dims - 1) * 0.5, 1));
   for (std::size_t i = 0; i < scene.clip.size(); ++i) {
     protocol::ClipPlane& wire = scene.clip[i];
@@ -22,7 +22,7 @@ void resolveClipping(protocol::Scene& scene, Scene& render, const Volume& volume
     if (plane.normal == glm::dvec3(0))
       throw ProtocolError(422, pointer + "/normal", "expected a direction that is not 0");
     if (wire.media) plane.channels.emplace(wire.media->begin(), wire.media->end());
-    refuseAt(pointer, [&] { checkClipping({&plane, 1}, std::nullopt, volume.channels().size()); });
+    refuseAt(pointer, [&] { checkClipping({&plane, 1}, std::nullopt, volume.channels.size()); });
     render.clip.push_back(std::move(plane));
   }
 

@@ -9,8 +9,10 @@ static_assert(protocol::kMaxMacrocellVoxels == std::uint32_t(kMaxMacrocell));
 
 namespace {
 
-void checkMacrocell(int size, const Volume& volume, std::size_t maxIntervals) {
-  const auto tooMany = [&](int one) { return intervalCount(volume, one) > maxIntervals; };
+void checkMacrocell(int size, const VolumeFacts& volume, std::size_t maxIntervals) {
+  const auto tooMany = [&](int one) {
+    return intervalCount(volume.grid.dims, volume.channels.size(), one) > maxIntervals;
+  };
   int least = size;
   while (least < Scene().macrocell && tooMany(least)) ++least;
   if (least == size) return;
@@ -21,7 +23,7 @@ void checkMacrocell(int size, const Volume& volume, std::size_t maxIntervals) {
 
 }  // namespace
 
-void resolveIntegrator(const protocol::Scene& scene, Scene& render, const Volume& volume,
+void resolveIntegrator(const protocol::Scene& scene, Scene& render, const VolumeFacts& volume,
                        std::size_t maxIntervals) {
   const protocol::Integrator& wire = scene.integrator;
   render.blend = valueOf<BlendMode>(kBlendModes, scene.blend.mode);

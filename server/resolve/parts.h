@@ -23,15 +23,15 @@
 namespace scolopax::server {
 
 /// All but gradientOpacity.
-void resolveChannels(protocol::Scene& scene, Scene& render, const Volume& volume);
+void resolveChannels(protocol::Scene& scene, Scene& render, const VolumeFacts& volume);
 /// `seen`: the points that the automatic view frames; empty: the box.
 void resolveCamera(protocol::Scene& scene, Scene& render, const Grid& grid, std::span<const glm::vec3> seen);
 /// Clip planes and crop.
-void resolveClipping(protocol::Scene& scene, Scene& render, const Volume& volume);
+void resolveClipping(protocol::Scene& scene, Scene& render, const VolumeFacts& volume);
 void resolveLights(const protocol::Scene& scene, Scene& render);
 /// Blend mode and integrator. Small macrocells in a large volume cost much and gain little: they are refused
 /// if there would be more than `maxIntervals` macrocells x channels, unless they are of the default size.
-void resolveIntegrator(const protocol::Scene& scene, Scene& render, const Volume& volume,
+void resolveIntegrator(const protocol::Scene& scene, Scene& render, const VolumeFacts& volume,
                        std::size_t maxIntervals);
 /// Size, background and pixel filter. Refuses more than `maxPixels`.
 void resolveImage(const protocol::Scene& scene, Scene& render, std::uint64_t maxPixels);

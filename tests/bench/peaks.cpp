@@ -245,7 +245,7 @@ ordered_json describe(const json& setting, const Data& data, const Drawn& drawn)
 void run(const std::string& sceneFile, const std::string& settingsFile,
          const std::vector<std::filesystem::path>& files) {
   const auto resolved = resolveScene({sceneFile, files, {}});
-  Data data{resolved->dataset->volume, resolved->render};
+  Data data{resolved->dataset->load(resolved->time), resolved->render};
   data.scene.filter = PixelFilter::point;
   const auto held =
       sharedMacrocells(data.volume, data.scene.macrocell);  // keeps them, so that they are built once

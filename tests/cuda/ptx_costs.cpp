@@ -115,7 +115,7 @@ ordered_json costsOf(const std::shared_ptr<const Volume>& volume, const Scene& s
 
 void run(const SceneArguments& arguments) {
   const auto resolved = resolveScene(arguments);
-  const auto& volume = resolved->dataset->volume;
+  const auto volume = resolved->dataset->load(resolved->time);
   Scene scene = resolved->render;
   scene.blend = BlendMode::density;
   const auto held = sharedMacrocells(volume, scene.macrocell);  // for all plans

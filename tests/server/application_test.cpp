@@ -58,7 +58,7 @@ class ApplicationTest : public ::testing::Test {
     config_.port = 0;
     config_.token = kToken;
     config_.maxRenders = 1;
-    std::vector<Dataset> datasets;
+    std::vector<io::LoadedDataset> datasets;
     datasets.push_back({"small", "small.nrrd", {"small.nrrd"}, testing::smallVolume()});
     const auto make = [this](const std::shared_ptr<const Volume>&) {
       const auto control = std::make_shared<testing::FakeControl>();
@@ -71,7 +71,8 @@ class ApplicationTest : public ::testing::Test {
       ++made_;
       return std::make_unique<testing::FakeRenderer>(control);
     };
-    application_.emplace(config_, std::move(datasets), make, memory_, [](const std::string&) {});
+    application_.emplace(config_, std::make_shared<const DatasetStore>(std::move(datasets), memory_), make,
+                         memory_, [](const std::string&) {});
     application_->start();
   }
   static std::string head(const std::string& request) {

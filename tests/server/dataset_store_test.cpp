@@ -33,12 +33,12 @@ TEST(DatasetStore, DescribesWhatTheFilesStateAndNothingThatTheyDoNot) {
   std::vector<ChannelSource> channels(2);
   for (auto& channel : channels) channel.voxels = VoxelBuffer(ScalarType::u8, 1);
   channels[0].look = {.color = {{0, 128, 255}}, .window = ValueRange{-1, 2.5}, .labels = true};
-  const Dataset dataset{"d",
-                        "d",
-                        {},
-                        std::make_shared<const Volume>(Grid{}, std::move(channels)),
-                        {.count = 2, .values = {0, 0.5}, .unit = "s"},
-                        "um"};
+  const Dataset dataset(io::LoadedDataset{"d",
+                                          "d",
+                                          {},
+                                          std::make_shared<const Volume>(Grid{}, std::move(channels)),
+                                          {.count = 2, .values = {0, 0.5}, .unit = "s"},
+                                          "um"});
   const json description = describeJson(dataset);
   EXPECT_EQ(description["worldUnit"], "um");
   EXPECT_EQ(description["times"], json({{"count", 2}, {"values", {0, 0.5}}, {"unit", "s"}}));
@@ -51,14 +51,16 @@ TEST(DatasetStore, DescribesWhatTheFilesStateAndNothingThatTheyDoNot) {
 
 TEST(DatasetStore, FindsById) {
   const auto store = testing::smallStore();
-  EXPECT_EQ(store->find("other")->id, "other");
+  EXPECT_EQ(store->find("other")->id(), "other");
   EXPECT_EQ(store->find("nothing"), nullptr);
 }
 
-TEST(DatasetStore, RefusesToHoldNothing) { EXPECT_THROW(DatasetStore({}), Error); }
+TEST(DatasetStore, RefusesToHoldNothing) {
+  EXPECT_THROW(DatasetStore(std::vector<io::LoadedDataset>()), Error);
+}
 
 TEST(DatasetStore, CountsEveryVoxelOfAChannelOnce) {
-  const json histogram = histogramJson(*testing::smallStore()->first(), 0);
+  const json histogram = histogramJson(testing::smallStore()->first()->facts()->volume, 0);
   std::uint64_t sum = 0;
   for (const json& bin : histogram["bins"]) sum += bin.get<std::uint64_t>();
   EXPECT_EQ(sum, 24u);
@@ -66,8 +68,8 @@ TEST(DatasetStore, CountsEveryVoxelOfAChannelOnce) {
 }
 
 TEST(DatasetStore, RefusesAChannelThatIsNotThere) {
-  EXPECT_THROW(histogramJson(*testing::smallStore()->first(), 2), protocol::ProtocolError);
-  EXPECT_THROW(histogramJson(*testing::smallStore()->first(), -1), protocol::ProtocolError);
+  EXPECT_THROW(histogramJson(testing::smallStore()->first()->facts()->volume, 2), protocol::ProtocolError);
+  EXPECT_THROW(histogramJson(testing::smallStore()->first()->facts()->volume, -1), protocol::ProtocolError);
 }
 
 TEST(DatasetStore, KeepsTheGradientsThatItHasMeasured) {
@@ -92,7 +94,7 @@ TEST(DatasetStore, KeepsTheGradientsThatItHasMeasured) {
 
 TEST(DatasetStore, KeepsOnlyTheGradientsThatWereAskedForLast) {
   const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(1) << 30);
-  std::vector<Dataset> datasets;
+  std::vector<io::LoadedDataset> datasets;
   for (std::size_t i = 0; i <= DatasetStore::kMaxGradients; ++i)
     datasets.push_back({std::to_string(i), "", {}, testing::smallVolume()});
   const DatasetStore store(std::move(datasets), memory);
@@ -108,19 +110,19 @@ TEST(DatasetStore, KeepsOnlyTheGradientsThatWereAskedForLast) {
 }
 
 TEST(DatasetStore, ProbesBetweenVoxelCentres) {
-  const auto dataset = testing::smallStore()->first();
+  const auto volume = testing::smallVolume();
   // Values are the voxel's index, x + 4 y + 12 z: linear, so interpolation is exact.
-  const json inside = probeJson(*dataset, 1.5, 0.25, 0.5);
+  const json inside = probeJson(*volume, 1.5, 0.25, 0.5);
   EXPECT_EQ(inside["inside"], true);
   EXPECT_DOUBLE_EQ(inside["values"][0], 1.5 + 4 * 0.25 + 12 * 0.5);
   EXPECT_DOUBLE_EQ(inside["values"][1], 10 * (1.5 + 4 * 0.25 + 12 * 0.5));
 }
 
 TEST(DatasetStore, ProbesTheOuterHalfVoxelWithTheEdgesValue) {
-  const auto dataset = testing::smallStore()->first();
-  EXPECT_DOUBLE_EQ(probeJson(*dataset, -0.4, 0, 0)["values"][0], 0.0);
-  EXPECT_DOUBLE_EQ(probeJson(*dataset, 3.5, 2.5, 1.5)["values"][0], 23.0);
-  const json outside = probeJson(*dataset, 3.6, 0, 0);
+  const auto volume = testing::smallVolume();
+  EXPECT_DOUBLE_EQ(probeJson(*volume, -0.4, 0, 0)["values"][0], 0.0);
+  EXPECT_DOUBLE_EQ(probeJson(*volume, 3.5, 2.5, 1.5)["values"][0], 23.0);
+  const json outside = probeJson(*volume, 3.6, 0, 0);
   EXPECT_EQ(outside["inside"], false);
   EXPECT_EQ(outside["values"], json({nullptr, nullptr}));
 }
@@ -138,8 +140,7 @@ TEST(DatasetStore, ProbesInWorldUnitsAndDataUnits) {
   channels[0].intercept = 5;
   channels[1].voxels.as<float>()[0] = 1;
   channels[1].voxels.as<float>()[1] = std::numeric_limits<float>::quiet_NaN();
-  const Dataset dataset{"d", "d", {}, std::make_shared<const Volume>(grid, std::move(channels))};
-  const json probe = probeJson(dataset, 105, 0, 0);
+  const json probe = probeJson(Volume(grid, std::move(channels)), 105, 0, 0);
   EXPECT_DOUBLE_EQ(probe["values"][0], 2 * 2 + 5);
   EXPECT_EQ(probe["values"][1], nullptr);
   EXPECT_EQ(probe["voxel"], json({0.5, 0.0, 0.0}));

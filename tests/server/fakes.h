@@ -205,7 +205,7 @@ inline std::shared_ptr<const Volume> smallVolume() {
 }
 
 inline std::shared_ptr<const DatasetStore> smallStore(const std::shared_ptr<MemoryBudget>& memory = nullptr) {
-  std::vector<Dataset> datasets;
+  std::vector<io::LoadedDataset> datasets;
   datasets.push_back({"small", "small.nrrd", {"small.nrrd"}, smallVolume()});
   datasets.push_back({"other", "other.nrrd", {"other.nrrd"}, smallVolume()});
   return std::make_shared<const DatasetStore>(std::move(datasets), memory);

@@ -163,7 +163,7 @@ TEST(SceneResolver, FillsInWhereClippingIs) {
   EXPECT_TRUE(plain->render.clip.empty());
   EXPECT_FALSE(plain->render.crop);
   EXPECT_EQ(resolver.replace(toJson(plain->resolved))->render, plain->render);
-  const auto& grid = plain->dataset->volume->grid();
+  const auto& grid = plain->dataset->grid();
   EXPECT_EQ(toJson(plain->resolved)["crop"]["x"], json({-0.5, grid.dims.x - 0.5}));
   const auto clipped =
       resolver.replace({{"clip", {json::object(), {{"media", {1}}}}}, {"crop", {{"y", {1, 1.5}}}}});
@@ -195,9 +195,10 @@ TEST(SceneResolver, RefusesWhatTheRendererWouldRefuseLater) {
 TEST(SceneResolver, ChecksAPatchAgainstTheDatasetThatItNames) {
   const auto resolve = resolver();
   const auto base = resolve.replace(json::object());
-  EXPECT_EQ(resolve.patch(*base, {{"dataset", "other"}})->dataset->id, "other");
-  EXPECT_EQ(resolve.patch(*resolve.patch(*base, {{"dataset", "other"}}), {{"dataset", nullptr}})->dataset->id,
-            "small");
+  EXPECT_EQ(resolve.patch(*base, {{"dataset", "other"}})->dataset->id(), "other");
+  EXPECT_EQ(
+      resolve.patch(*resolve.patch(*base, {{"dataset", "other"}}), {{"dataset", nullptr}})->dataset->id(),
+      "small");
   EXPECT_THROW(resolve.patch(*base, {{"dataset", "none"}}), ProtocolError);
 }
 
@@ -212,7 +213,7 @@ SceneResolver resolverOfBalls() {
     const double r = glm::length(p - 20.0);
     channels[0].voxels.as<std::uint8_t>()[i] = r <= 6 ? 200 : r <= 16 ? 100 : 0;
   }
-  std::vector<Dataset> datasets;
+  std::vector<io::LoadedDataset> datasets;
   datasets.push_back({"balls", "balls", {}, std::make_shared<const Volume>(grid, std::move(channels))});
   return {std::make_shared<const DatasetStore>(std::move(datasets)), {1'000'000}};
 }
@@ -231,7 +232,7 @@ TEST(SceneResolver, FramesWhatTheCurvesOfTheSceneShow) {
   EXPECT_LT(glm::length(inner->render.camera.target - 20.0), 1.5);
   EXPECT_LT(glm::length(outer->render.camera.target - 20.0), 1.5);
   EXPECT_LT(distanceOf(*inner), 0.6 * distanceOf(*outer));
-  EXPECT_EQ(nothing->render.camera, framingCamera(nothing->dataset->volume->grid(), 35, 1));
+  EXPECT_EQ(nothing->render.camera, framingCamera(nothing->dataset->grid(), 35, 1));
   EXPECT_EQ(resolve.replace(rangeFrom(150))->resolved, inner->resolved);
 }
 
@@ -272,7 +273,7 @@ TEST(SceneResolver, TakesColoursAndWindowsThatTheFileStatesAsDefaults) {
       channel.voxels.as<std::uint8_t>()[0] = 7;
     }
     channels[0].look = {.color = {{0, 128, 255}}, .window = ValueRange{-1, 2.5}};
-    std::vector<Dataset> datasets;
+    std::vector<io::LoadedDataset> datasets;
     datasets.push_back({"d", "d", {}, std::make_shared<const Volume>(Grid{}, std::move(channels))});
     return SceneResolver(std::make_shared<const DatasetStore>(std::move(datasets)), {1'000'000});
   };
@@ -295,7 +296,7 @@ SceneResolver resolverOfSquares() {
   Grid grid;
   grid.dims = {5, 1, 1};
   grid.worldFromVoxel[0][0] = 2;
-  std::vector<Dataset> datasets;
+  std::vector<io::LoadedDataset> datasets;
   for (const char* id : {"squares", "flat"}) {
     std::vector<ChannelSource> channels(2);
     for (ChannelSource& channel : channels) {

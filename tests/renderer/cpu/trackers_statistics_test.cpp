@@ -73,10 +73,10 @@ void paintPrimaries(Scene& scene) {
 void useDefaults(const Volume& volume, Scene& scene) {
   scene.channels.resize(volume.channels().size());
   for (std::size_t i = 0; i < scene.channels.size(); ++i) {
-    const ValueRange range = defaultRange(volume, int(i));
+    const ValueRange range = defaultRange(volume.facts(), int(i));
     scene.channels[i].rangeLo = range.lo;
     scene.channels[i].rangeHi = range.hi;
-    scene.channels[i].density = defaultDensity(volume, int(i));
+    scene.channels[i].density = defaultDensity(volume.facts(), int(i));
   }
   scene.camera = framingCamera(volume.grid(), 35, double(scene.width) / scene.height);
   paintPrimaries(scene);

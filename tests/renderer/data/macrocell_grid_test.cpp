@@ -143,7 +143,7 @@ TEST(MacrocellGrid, IsSharedByVolumeAndSizeWhileItIsHeld) {
   const auto memory = std::make_shared<MemoryBudget>(std::uint64_t(16) << 20);
   {
     const auto grid = sharedMacrocells(volume, 4, {}, memory);
-    EXPECT_EQ(grid->intervals.size(), intervalCount(*volume, 4));
+    EXPECT_EQ(grid->intervals.size(), intervalCount(volume->grid().dims, volume->channels().size(), 4));
     EXPECT_EQ(memory->used(MemoryUse::grids), grid->sizeBytes());
     EXPECT_EQ(sharedMacrocells(volume, 4, {}, memory), grid);
     EXPECT_NE(sharedMacrocells(volume, 5, {}, memory), grid);

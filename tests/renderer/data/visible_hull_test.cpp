@@ -27,7 +27,7 @@ double placeInFrame(const Camera& camera, const Grid& grid, glm::dvec3 voxel) {
 }
 
 Camera cameraFor(const Volume& volume, const std::vector<ChannelAppearance>& channels) {
-  const auto hull = visibleHull(volume, buildCoarseMacrocells(volume), channels);
+  const auto hull = visibleHull(volume.facts(), buildCoarseMacrocells(volume), channels);
   return framingCamera(volume.grid(), kFovY, kAspect, hull);
 }
 
@@ -154,7 +154,7 @@ TEST(VisibleHull, HoldsTheSplineOfAVoxel) {
   for (const Interpolation how : {Interpolation::trilinear, Interpolation::cubic}) {
     look.interpolation = how;
     const double reach = how == Interpolation::cubic ? 1.9 : 0.9;
-    const auto hull = visibleHull(*made, buildCoarseMacrocells(*made), std::vector{look});
+    const auto hull = visibleHull(made->facts(), buildCoarseMacrocells(*made), std::vector{look});
     glm::vec3 low(1e9f), high(-1e9f);
     for (const glm::vec3& point : hull) low = glm::min(low, point), high = glm::max(high, point);
     for (int axis = 0; axis < 3; ++axis) {
@@ -168,7 +168,7 @@ TEST(VisibleHull, HoldsTheSplineOfAVoxel) {
 TEST(VisibleHull, IsEmptyWhereNothingCanBeSeenAndThenTheBoxIsFramed) {
   const auto made = test::volumeOf(test::gridOf(kBallDims), ball<std::uint8_t>({60, 45, 35}, 8));
   const Volume& volume = *made;
-  EXPECT_TRUE(visibleHull(volume, buildCoarseMacrocells(volume), std::vector{above(220)}).empty());
+  EXPECT_TRUE(visibleHull(volume.facts(), buildCoarseMacrocells(volume), std::vector{above(220)}).empty());
   EXPECT_EQ(cameraFor(volume, {above(220)}), framingCamera(volume.grid(), kFovY, kAspect));
 }
 

@@ -386,7 +386,7 @@ RandomScene drawScene(std::uint64_t number) {
   RandomScene drawn{number, drawVolume(number), nullptr, {}, {}};
   drawn.volume = std::make_shared<const Volume>(drawn.source.grid, copyOf(drawn.source.channels));
   drawn.wire = drawWire(number, drawn.source);
-  std::vector<server::Dataset> datasets(1);
+  std::vector<io::LoadedDataset> datasets(1);
   datasets[0].id = "random";
   datasets[0].volume = drawn.volume;
   const server::SceneResolver resolver(std::make_shared<server::DatasetStore>(std::move(datasets)),

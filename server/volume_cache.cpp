@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/volume_cache.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "renderer/core/error.h"
+
+namespace scolopax::server {
+namespace {
+
+/// A `since` that lets every volume give way that nobody holds.
+constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
+
+}  // namespace
+
+VolumeCache::Room::~Room() {
+  const std::lock_guard lock(cache->mutex_);
+  cache->promised_ -= bytes;
+}
+
+std::shared_ptr<const Volume> VolumeCache::find(const Key& key) {
+  const std::lock_guard lock(mutex_);
+  const auto entry = entries_.find(key);
+  if (entry == entries_.end()) return nullptr;
+  entry->second.lastUse = ++uses_;
+  return entry->second.volume;
+}
+
+bool VolumeCache::holds(const Key& key) const {
+  const std::lock_guard lock(mutex_);
+  return entries_.contains(key);
+}
+
+std::shared_ptr<const Volume> VolumeCache::get(const Wanted& wanted, const std::stop_token& stop) {
+  if (auto volume = find(wanted.key)) return volume;
+  return builds_.get(
+      wanted.key, [this, wanted](const std::stop_token& abandoned) { return load(wanted, kAny, abandoned); },
+      stop);
+}
+
+std::shared_ptr<const Volume> VolumeCache::getIfRoom(const Wanted& wanted, std::uint64_t since,
+                                                     const std::stop_token& stop) {
+  if (auto volume = find(wanted.key)) return volume;
+  try {
+    return builds_.get(
+        wanted.key,
+        [this, wanted, since](const std::stop_token& abandoned) { return load(wanted, since, abandoned); },
+        stop);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::busy) throw;
+    return nullptr;
+  }
+}
+
+std::shared_ptr<const Volume> VolumeCache::load(const Wanted& wanted, std::uint64_t since,
+                                                const std::stop_token& stop) {
+  if (auto volume = find(wanted.key)) return volume;
+  const auto room = roomFor(wanted, since);
+  struct Shown {
+    VolumeCache& cache;
+    const Key& key;
+    Shown(VolumeCache& owner, const Key& shown) : cache(owner), key(shown) {
+      const std::lock_guard lock(cache.mutex_);
+      cache.loads_[key] = {key.time, "reading", 0, 0};
+    }
+    Shown(const Shown&) = delete;
+    Shown& operator=(const Shown&) = delete;
+    ~Shown() {
+      const std::lock_guard lock(cache.mutex_);
+      cache.loads_.erase(key);
+    }
+  };
+  const Shown shown(*this, wanted.key);
+  const auto report = [&](const io::Progress& now) {
+    const std::lock_guard lock(mutex_);
+    loads_[wanted.key] = {wanted.key.time, std::string(now.stage), now.doneBytes, now.allBytes};
+  };
+  auto volume = wanted.load({.memoryLimitBytes = limit_, .warn = warn_, .progress = report, .stop = stop});
+  const std::lock_guard lock(mutex_);
+  entries_[wanted.key] = {volume, volume->sizeBytes(), ++uses_};
+  return volume;
+}
+
+std::unique_ptr<VolumeCache::Room> VolumeCache::roomFor(const Wanted& wanted, std::uint64_t since) {
+  if (wanted.bytes > limit_)
+    throw Error(ErrorCode::tooLarge, wanted.title + ": needs " + io::byteCount(wanted.bytes) +
+                                         " of memory, expected at most " + io::byteCount(limit_) +
+                                         " (--memory)");
+  for (;;) {
+    std::function<bool()> release;
+    {
+      const std::lock_guard lock(mutex_);
+      if (makeRoom(wanted.bytes, since)) {
+        promised_ += wanted.bytes;
+        return std::make_unique<Room>(this, wanted.bytes);
+      }
+      if (since == kAny) release = release_;
+    }
+    if (!release || !release())
+      throw Error(ErrorCode::busy, wanted.title + ": needs " + io::byteCount(wanted.bytes) +
+                                       " of memory; others use " + io::byteCount(usedBytes()) + " of the " +
+                                       io::byteCount(limit_) + " for voxels (--memory)");
+  }
+}
+
+/// Drops volumes until so many bytes are free; false, with nothing dropped, if that is impossible. Requires
+/// the mutex.
+bool VolumeCache::makeRoom(std::uint64_t bytes, std::uint64_t since) {
+  std::uint64_t held = this->held();
+  std::vector<std::map<Key, Entry>::iterator> victims;
+  for (auto entry = entries_.begin(); entry != entries_.end(); ++entry)
+    // Only the cache holds it, and only the cache gives it away.
+    if (entry->second.volume.use_count() == 1 && entry->second.lastUse < since) victims.push_back(entry);
+  std::ranges::sort(victims, {}, [](const auto& entry) { return entry->second.lastUse; });
+  auto end = victims.begin();
+  for (; held + bytes > limit_ && end != victims.end(); ++end) held -= (*end)->second.bytes;
+  if (held + bytes > limit_) return false;
+  std::for_each(victims.begin(), end, [&](const auto& entry) { entries_.erase(entry); });
+  return true;
+}
+
+/// Requires the mutex.
+std::uint64_t VolumeCache::held() const {
+  std::uint64_t bytes = promised_;
+  for (const auto& [key, entry] : entries_) bytes += entry.bytes;
+  return bytes;
+}
+
+std::uint64_t VolumeCache::usedBytes() const {
+  const std::lock_guard lock(mutex_);
+  return held();
+}
+
+std::uint64_t VolumeCache::uses() const {
+  const std::lock_guard lock(mutex_);
+  return uses_;
+}
+
+void VolumeCache::attach(const Key& key, std::shared_ptr<const void> what) {
+  const std::lock_guard lock(mutex_);
+  const auto entry = entries_.find(key);
+  if (entry != entries_.end()) entry->second.attached = std::move(what);
+}
+
+std::optional<LoadProgress> VolumeCache::progress(const void* dataset) const {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [key, load] : loads_)
+    if (key.dataset == dataset) return load;
+  return std::nullopt;
+}
+
+void VolumeCache::setRelease(std::function<bool()> release) {
+  const std::lock_guard lock(mutex_);
+  release_ = std::move(release);
+}
+
+}  // namespace scolopax::server

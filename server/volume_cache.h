@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// The voxels of data sets in memory. They are loaded when they are first asked for. When the memory is needed
+// for others, the volumes that nobody uses are dropped, the least recently used first.
+#pragma once
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "renderer/core/shared_builds.h"
+#include "renderer/data/volume.h"
+#include "renderer/io/loading.h"
+
+namespace scolopax::server {
+
+/// A load that is running.
+struct LoadProgress {
+  std::size_t time = 0;  ///< the step that is loaded
+  std::string stage;     ///< "reading", then "measuring"
+  std::uint64_t doneBytes = 0, allBytes = 0;
+};
+
+/// Every function may be called from any thread.
+class VolumeCache {
+ public:
+  struct Key {
+    const void* dataset;
+    std::size_t time;
+    auto operator<=>(const Key&) const = default;
+  };
+  using Load = std::function<std::shared_ptr<const Volume>(const io::LoadOptions&)>;
+  /// A volume that is asked for, and how to load it.
+  struct Wanted {
+    Key key;
+    std::string title;    ///< begins error messages
+    std::uint64_t bytes;  ///< of memory that its voxels need, at most
+    Load load;
+  };
+
+  /// `limitBytes`: of all voxels together, also while they are loaded.
+  explicit VolumeCache(std::uint64_t limitBytes, io::Warn warn = {})
+      : limit_(limitBytes), warn_(std::move(warn)) {}
+
+  /// The volume if it is in memory, else nullptr. Counts as a use.
+  std::shared_ptr<const Volume> find(const Key& key);
+  /// Whether it is in memory.
+  bool holds(const Key& key) const;
+  /// The volume. Waits until it has been loaded; several callers share one load, which is cancelled when none
+  /// of them waits any more. Throws Error: tooLarge if it can never fit into the memory, busy if others use
+  /// the memory now, both before anything is read; cancelled once `stop` is requested; what `load` throws.
+  std::shared_ptr<const Volume> get(const Wanted& wanted, const std::stop_token& stop);
+  /// Loads the volume if no use since `since` has to give way to it; otherwise returns nullptr. Throws as
+  /// get(), except busy.
+  std::shared_ptr<const Volume> getIfRoom(const Wanted& wanted, std::uint64_t since,
+                                          const std::stop_token& stop);
+  /// The number of uses so far: for getIfRoom().
+  std::uint64_t uses() const;
+  /// Keeps something alive as long as the volume is in memory.
+  void attach(const Key& key, std::shared_ptr<const void> what);
+
+  /// The load of this data set that is running, if any.
+  std::optional<LoadProgress> progress(const void* dataset) const;
+  std::uint64_t limitBytes() const { return limit_; }
+  /// Of the volumes that are in memory or being loaded.
+  std::uint64_t usedBytes() const;
+  /// Before a load is refused because all volumes are in use, `release` is called, with no lock held. It
+  /// returns whether it has released a volume.
+  void setRelease(std::function<bool()> release);
+
+ private:
+  struct Entry {
+    std::shared_ptr<const Volume> volume;
+    std::uint64_t bytes = 0, lastUse = 0;
+    std::shared_ptr<const void> attached = nullptr;
+  };
+  /// Memory that a load has been promised.
+  struct Room {
+    VolumeCache* cache;
+    std::uint64_t bytes;
+    Room(VolumeCache* owner, std::uint64_t size) : cache(owner), bytes(size) {}
+    Room(const Room&) = delete;
+    Room& operator=(const Room&) = delete;
+    ~Room();
+  };
+
+  std::unique_ptr<Room> roomFor(const Wanted& wanted, std::uint64_t since);
+  bool makeRoom(std::uint64_t bytes, std::uint64_t since);
+  std::uint64_t held() const;
+  std::shared_ptr<const Volume> load(const Wanted& wanted, std::uint64_t since, const std::stop_token& stop);
+
+  const std::uint64_t limit_;
+  const io::Warn warn_;
+  mutable std::mutex mutex_;  ///< never held while loading
+  std::map<Key, Entry> entries_;
+  std::map<Key, LoadProgress> loads_;
+  std::uint64_t promised_ = 0;  ///< bytes of all Rooms
+  std::uint64_t uses_ = 0;
+  std::function<bool()> release_;
+  SharedBuilds<Key, Volume> builds_;  // declared last: its threads use the other members
+};
+
+}  // namespace scolopax::server
