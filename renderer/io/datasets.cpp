@@ -6,7 +6,9 @@
 
 #include "renderer/core/error.h"
 #include "renderer/io/channel_names.h"
+#include "renderer/io/folder.h"
 #include "renderer/io/formats.h"
+#include "renderer/io/series.h"
 #include "renderer/io/text.h"
 
 namespace scolopax::io {
@@ -40,12 +42,13 @@ std::string fullName(const VolumeInfo& volume, const ChannelInfo& channel) {
   return volume.path.empty() ? channel.name : volume.path + "/" + channel.name;
 }
 
-/// One of the names that a user gave, opened.
+/// One of the names that a user gave, or a file in a folder that a user named, opened.
 struct Opened {
   DataName name;
-  std::shared_ptr<const VolumeFile> file;
-  std::vector<std::string> warnings;
-  std::optional<Error> error;
+  bool inFolder = false;
+  std::shared_ptr<const VolumeFile> file = {};
+  std::vector<std::string> warnings = {};
+  std::optional<Error> error = {};
   bool dropped = false;  ///< read through another file
 };
 
@@ -54,12 +57,39 @@ bool isSameFile(const fs::path& a, const fs::path& b) {
   return fs::equivalent(a, b, ignored);
 }
 
+/// The names, with the volumes of a folder in its place unless it is a volume itself.
+std::vector<Opened> listAll(std::span<const fs::path> names, const OpenOptions& options) {
+  std::vector<Opened> all;
+  for (const fs::path& given : names) {
+    const DataName name = splitName(given);
+    std::error_code ignored;
+    if (!name.inner.empty() || !fs::is_directory(name.path, ignored) || findFormat(name.path)) {
+      all.push_back({name});
+      continue;
+    }
+    const auto files = volumesIn(name.path, options);
+    if (files.empty())
+      throw Error(ErrorCode::notFound,
+                  shown(name.path) + ": expected volume files in this folder, found none");
+    for (const fs::path& file : files) all.push_back({{file}, true});
+  }
+  return all;
+}
+
+/// Numbered files of whole volumes become one file with several steps.
+void joinAllSeries(std::vector<Opened>& all) {
+  std::vector<std::shared_ptr<const VolumeFile>> files;
+  for (const Opened& one : all)
+    if (one.file && one.name.inner.empty()) files.push_back(one.file);
+  for (const auto& series : joinSeries(files))
+    for (Opened& one : all)
+      if (one.file && one.file->path == series->path && one.name.inner.empty()) one.file = series;
+}
+
 /// Opens all files. One that fails may be the data file of a header among the others, so its error waits.
 std::vector<Opened> openAll(std::span<const fs::path> names, const OpenOptions& options) {
-  std::vector<Opened> all(names.size());
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    Opened& one = all[i];
-    one.name = splitName(names[i]);
+  std::vector<Opened> all = listAll(names, options);
+  for (Opened& one : all) {
     OpenOptions own = options;
     own.warn = [&one](const std::string& line) { one.warnings.push_back(line); };
     try {
@@ -69,6 +99,7 @@ std::vector<Opened> openAll(std::span<const fs::path> names, const OpenOptions& 
       one.error = error;
     }
   }
+  if (options.fourthAxis != FourthAxis::channel) joinAllSeries(all);
   for (const Opened& header : all) {
     if (!header.file || header.dropped) continue;
     for (Opened& other : all)
@@ -79,15 +110,26 @@ std::vector<Opened> openAll(std::span<const fs::path> names, const OpenOptions& 
   }
   std::erase_if(all, [](const Opened& one) { return one.dropped; });
   for (const Opened& one : all) {
-    if (one.error) throw *one.error;
-    if (options.warn) std::ranges::for_each(one.warnings, options.warn);
+    if (one.error && !one.inFolder) throw *one.error;
+    if (!options.warn) continue;
+    std::ranges::for_each(one.warnings, options.warn);
+    if (one.error) options.warn(std::string(one.error->what()) + "; left out");
   }
+  std::erase_if(all, [](const Opened& one) { return one.error.has_value(); });
   return all;
 }
 
 bool agree(const Dataset& dataset, const VolumeInfo& volume) {
   const std::size_t a = dataset.times.count, b = volume.times.count;
   return sameGrid(dataset.levels[0], volume.levels[0]) && (a == b || a == 1 || b == 1);
+}
+
+/// Whether a part of a file in a folder may join: the data set is of the same folder and has room.
+bool fits(const Dataset& dataset, const Opened& opened, const Part& part) {
+  const VolumeInfo& volume = opened.file->volumes[part.volume];
+  const std::size_t more = part.channels.empty() ? volume.channels.size() : part.channels.size();
+  return dataset.files[0].parent_path() == opened.name.path.parent_path() &&
+         dataset.channels.size() + more <= std::size_t(kMaxChannels);
 }
 
 void add(Dataset& dataset, const Opened& opened, const Part& part) {
@@ -199,7 +241,9 @@ std::vector<Dataset> openDatasets(std::span<const fs::path> names, const OpenOpt
   for (const Opened& opened : openAll(names, options)) {
     for (const Part& part : partsOf(*opened.file, opened.name.inner)) {
       const VolumeInfo& volume = opened.file->volumes[part.volume];
-      auto dataset = std::ranges::find_if(datasets, [&](const Dataset& d) { return agree(d, volume); });
+      auto dataset = std::ranges::find_if(datasets, [&](const Dataset& d) {
+        return agree(d, volume) && (!opened.inFolder || fits(d, opened, part));
+      });
       if (dataset == datasets.end()) {
         dataset = datasets.insert(datasets.end(), Dataset{.levels = volume.levels});
         inners.push_back(opened.name.inner);

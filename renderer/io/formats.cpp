@@ -51,15 +51,19 @@ std::string knownFormats() {
   return known;
 }
 
-const Format& formatOf(const fs::path& path) {
-  const FileStart start = startOf(path);
+const Format* matchOf(const FileStart& start) {
   const Format* byName = nullptr;
   for (const Format& format : kFormats) {
     const Match match = format.match(start);
-    if (match == Match::content) return format;
+    if (match == Match::content) return &format;
     if (match == Match::name && !byName) byName = &format;
   }
-  if (byName) return *byName;
+  return byName;
+}
+
+const Format& formatOf(const fs::path& path) {
+  const FileStart start = startOf(path);
+  if (const Format* format = matchOf(start)) return *format;
   throw Error(ErrorCode::unsupported, shown(path) + ": expected " +
                                           (start.folder ? "a file, or a folder of " : "") + "one of " +
                                           knownFormats());
@@ -117,6 +121,14 @@ bool FileStart::contains(std::string_view entry) const {
 }
 
 std::span<const Format> formats() { return kFormats; }
+
+const Format* findFormat(const fs::path& path) {
+  try {
+    return matchOf(startOf(path));
+  } catch (const Error&) {  // cannot be read
+    return nullptr;
+  }
+}
 
 std::shared_ptr<const VolumeFile> openFile(const Format& format, const fs::path& path,
                                            const OpenOptions& options) {

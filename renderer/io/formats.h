@@ -61,6 +61,9 @@ SCOLOPAX_FORMATS(X)
 
 std::span<const Format> formats();
 
+/// The format that matches a file or folder best; nullptr if none does or if it cannot be read.
+const Format* findFormat(const std::filesystem::path& path);
+
 /// Opens a file or folder with the format that matches it best. Never waits for a pipe. Names are clean text
 /// in what it returns. Throws Error: unsupported, naming the known formats, if none matches, and naming the
 /// library if that is missing; badInput unless it is a regular file or a folder of a format, or if it holds
