@@ -294,7 +294,8 @@ struct Table<Scene> {
       field(
           "time", &Scene::time,
           "Step of a time series, from 0; nothing is interpolated. A data set of one step is the same at all "
-          "times."),
+          "times.",
+          {.atLeast = 0, .atMost = 4294967295.0}),
       field("channels", &Scene::channels,
             "Entry i is the i-th channel of the data set; missing entries have the defaults.",
             {.maxItems = kMaxChannelItems}),

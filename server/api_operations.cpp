@@ -46,6 +46,7 @@ std::vector<Route> operationRoutes(ApiContext& context) {
          context.metrics.setUnreadTextBytes(context.unreadTextBytes());
          context.metrics.setRequestBodyBytes(context.requestBodyBytes());
          if (context.memory) context.metrics.setMemory(*context.memory);
+         if (context.datasets.cache()) context.metrics.setVolumes(*context.datasets.cache());
          return net::Response{200, "text/plain; version=0.0.4; charset=utf-8", context.metrics.text(), {}};
        }},
       {"GET",

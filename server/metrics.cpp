@@ -49,6 +49,8 @@ struct Metrics::Impl {
                                           .Name("scolopax_memory_bytes")
                                           .Help("Memory that requests use, by kind of use")
                                           .Register(registry);
+  Gauge& voxels = gauge("scolopax_voxel_bytes", "Memory of voxels, loaded or being loaded");
+  Gauge& voxelLimit = gauge("scolopax_voxel_limit_bytes", "Limit on the memory of voxels");
 };
 
 Metrics::Metrics() : impl_(std::make_unique<Impl>()) {}
@@ -85,6 +87,11 @@ void Metrics::setMemory(const MemoryBudget& memory) {
   impl_->memoryLimit.Set(double(memory.limit()));
   for (std::size_t i = 0; i < std::size(kMemoryUses); ++i)
     impl_->memory.Add({{"use", std::string(kMemoryUses[i])}}).Set(double(memory.used(MemoryUse(i))));
+}
+
+void Metrics::setVolumes(const VolumeCache& volumes) {
+  impl_->voxels.Set(double(volumes.usedBytes()));
+  impl_->voxelLimit.Set(double(volumes.limitBytes()));
 }
 
 std::string Metrics::text() const {

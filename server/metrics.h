@@ -6,6 +6,7 @@
 #include <string>
 
 #include "server/progressive_render.h"
+#include "server/volume_cache.h"
 
 namespace scolopax::server {
 
@@ -22,6 +23,7 @@ class Metrics {
   void setUnreadTextBytes(std::size_t bytes);
   void setRequestBodyBytes(std::size_t bytes);
   void setMemory(const MemoryBudget& memory);
+  void setVolumes(const VolumeCache& volumes);
   std::string text() const;
 
  private:

@@ -66,7 +66,7 @@ TEST(ParseScene, GivesAnEmptyChannelTheDefaultsOfTheDesign) {
 
 TEST(ParseScene, ReadsEveryField) {
   const json document = json::parse(R"({
-    "dataset": "mri",
+    "dataset": "mri", "time": 7,
     "channels": [{"name": "T1", "visible": false, "range": [10, -2.5], "color": "#Ff8000",
                   "opacity": [[0, 0], [0.5, 0], [0.5, 1]], "gamma": 2, "density": 0, "weight": 0.5,
                   "gradientOpacity": {"range": [3, 0.5], "points": [[0.25, 1], [0.75, 0]]},
