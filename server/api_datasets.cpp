@@ -54,7 +54,7 @@ net::Response probeAnswer(const ApiContext& context, const net::Request& request
   const std::size_t time = queryUnsigned(request, "time", 0);
   if (dataset->times() > 1 && time >= dataset->times())
     throw protocol::ProtocolError(422, "/time",
-                                  "/time: expected a step from 0 to " + std::to_string(dataset->times() - 1) +
+                                  "time: expected 0 to " + std::to_string(dataset->times() - 1) +
                                       ", found " + std::to_string(time));
   auto volume = dataset->loaded(time);
   if (!volume)

@@ -77,7 +77,7 @@ protocol::Scene pictureOf(protocol::Scene resolved) {
 std::size_t timeOf(const protocol::Scene& scene, const Dataset& dataset) {
   if (dataset.times() > 1 && scene.time >= dataset.times())
     throw ProtocolError(422, "/time",
-                        "expected a step from 0 to " + std::to_string(dataset.times() - 1) + ", found " +
+                        "time: expected 0 to " + std::to_string(dataset.times() - 1) + ", found " +
                             std::to_string(scene.time));
   return dataset.times() > 1 ? scene.time : 0;
 }

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/commands/data_options.h"
+#include "server/commands/load_bar.h"
 #include "server/commands/render_device.h"
 #include "server/dataset_store.h"
 #include "server/hex_color.h"
@@ -92,7 +93,11 @@ void printDatasets(const InfoOptions& options) {
   const auto opened =
       io::openDatasets(options.paths, {.fourthAxis = fourthAxisOf(options.fourthAxis), .warn = warn});
   std::vector<io::LoadedDataset> loaded;
-  if (!options.headers) loaded = io::loadDatasets(opened, 0, {.warn = warn});
+  if (!options.headers) {
+    LoadBar bar;
+    const auto show = [&bar](const io::Progress& now) { bar.show(now.stage, now.doneBytes, now.allBytes); };
+    loaded = io::loadDatasets(opened, 0, {.warn = warn, .progress = show});
+  }
   nlohmann::json list = nlohmann::json::array();
   for (std::size_t i = 0; i < opened.size(); ++i) {
     if (options.json)

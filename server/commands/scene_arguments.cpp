@@ -11,6 +11,7 @@
 #include "protocol/json_text.h"
 #include "renderer/core/error.h"
 #include "server/commands/data_options.h"
+#include "server/commands/load_bar.h"
 #include "server/config.h"
 #include "server/dataset_store.h"
 
@@ -72,6 +73,8 @@ std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& 
       io::openDatasets(arguments.data, {.fourthAxis = fourthAxisOf(arguments.fourthAxis), .warn = warn});
   const auto store = std::make_shared<server::DatasetStore>(
       opened, std::make_shared<server::VolumeCache>(io::defaultMemoryLimitBytes(), warn));
+  LoadBar bar;
+  bar.follow(store);
   const server::SceneResolver resolver(store, {.maxPixels = server::Config().maxPixels});
   auto resolved = resolver.replace(scene);
   for (const json& patch : patches) resolved = resolver.patch(*resolved, patch);

@@ -113,7 +113,7 @@ TEST_F(TimeSeries, HasNoOtherStepsThanItsOwn) {
   } catch (const protocol::ProtocolError& error) {
     EXPECT_EQ(error.status, 422);
     EXPECT_EQ(error.pointer, "/time");
-    EXPECT_STREQ(error.what(), "expected a step from 0 to 5, found 6");
+    EXPECT_STREQ(error.what(), "time: expected 0 to 5, found 6");
   }
 }
 

@@ -81,7 +81,7 @@ class Data(unittest.TestCase):
         server = self.serve(paths=[nrrd(self.path("series.nrrd"), 8, [0, 1, 2]), nrrd(self.path("one.nrrd"), 8, [0])])
         status, problem = server.json("POST", "/api/v1/render", {**SCENE, "time": 3})
         self.assertEqual((status, problem["pointer"], problem["detail"]),
-                         (422, "/time", "expected a step from 0 to 2, found 3"))
+                         (422, "/time", "time: expected 0 to 2, found 3"))
         for value in (-1, 0.5, "1", 1 << 40):
             status, problem = server.json("POST", "/api/v1/render", {**SCENE, "time": value})
             self.assertEqual((status, problem["pointer"]), (422, "/time"), value)
