@@ -18,7 +18,8 @@
   X(Raw, "raw", "name_XxYxZ_type.raw, .dat, .ivf", "")                                               \
   X(Nifti, "NIfTI", ".nii, .nii.gz, .hdr + .img", "")                                                \
   X(Nrrd, "NRRD", ".nrrd, .nhdr", "")                                                                \
-  X(Tiff, "TIFF", ".tif, .tiff", "")
+  X(Tiff, "TIFF", ".tif, .tiff", "")                                                                 \
+  X(Zarr, "OME-Zarr", "folders .zarr", "")
 // clang-format on
 
 namespace scolopax::io {

@@ -26,7 +26,7 @@ FORBIDDEN = [
 ]
 # Libraries kept behind one folder or file (prefix of the including file).
 LIBRARIES = [
-    (r"boost/", ["server/net/"]),
+    (r"boost/(?!crc\.hpp)", ["server/net/"]),
     (r"httplib\.h", ["server/net/"]),
     (r"OpenImageIO/", ["renderer/io/", "renderer/data/colormap.cpp"]),
     (r"nifti|teem/", ["renderer/io/"]),
