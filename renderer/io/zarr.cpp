@@ -126,14 +126,22 @@ class ZarrSearch {
   std::size_t nodes_ = 0;
 };
 
-std::unique_ptr<ZarrStore> openZarrStore(const fs::path& path) { return openZarrFolder(path); }
+bool isZarrZip(const fs::path& path) { return hasEnding(path, ".zarr.zip") || hasEnding(path, ".ozx"); }
+
+std::unique_ptr<ZarrStore> openZarrStore(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored)) return openZarrFolder(path);
+  return openZarrZip(path);
+}
 
 }  // namespace
 
 Match matchZarr(const FileStart& start) {
   for (const char* document : {"zarr.json", ".zgroup", ".zarray", ".zattrs"})
     if (start.contains(document)) return Match::content;
-  return start.folder && start.hasEnding(".zarr") ? Match::name : Match::no;
+  if (start.folder) return start.hasEnding(".zarr") ? Match::name : Match::no;
+  if (!isZarrZip(start.path)) return Match::no;
+  return start.bytes.starts_with("PK") ? Match::content : Match::name;
 }
 
 VolumeFile openZarr(const fs::path& path, const OpenOptions& options) {

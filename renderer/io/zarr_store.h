@@ -52,4 +52,8 @@ std::optional<std::string> cleanZarrPath(std::string_view path);
 /// A folder. Links that lead out of it are refused.
 std::unique_ptr<ZarrStore> openZarrFolder(const std::filesystem::path& folder);
 
+/// A ZIP archive of stored or deflated entries, whose root or only folder is the root. Throws Error: badInput
+/// for a damaged archive, unsupported if the build lacks libzip.
+std::unique_ptr<ZarrStore> openZarrZip(const std::filesystem::path& path);
+
 }  // namespace scolopax::io
