@@ -12,6 +12,7 @@
 #include "protocol/problem.h"
 #include "renderer/core/error.h"
 #include "renderer/data/field_view.h"
+#include "renderer/io/formats.h"
 #include "server/hex_color.h"
 
 namespace scolopax::server {
@@ -129,6 +130,10 @@ std::vector<std::filesystem::path> pathsBelowRoot(const std::vector<std::filesys
   if (error) throw Error(ErrorCode::notFound, "--data-root " + root.string() + ": " + error.message());
   std::vector<std::filesystem::path> below;
   for (const auto& path : paths) {
+    if (io::isUrl(path)) {
+      below.push_back(path);
+      continue;
+    }
     // Symbolic links are resolved first, so that none leads outside.
     const auto [file, inner] = io::splitName(base / path);
     const auto whole = std::filesystem::weakly_canonical(file);

@@ -196,6 +196,11 @@ DataName splitName(const fs::path& name) {
   std::error_code ignored;
   std::string text = name.string();
   while (text.size() > 1 && text.ends_with('/')) text.pop_back();  // a folder's name is that before the slash
+  if (isUrl(text)) {                                               // the port's colon is not meant
+    const std::size_t start = text.find('/', text.find("://") + 3);
+    const std::size_t colon = start == std::string::npos ? start : text.find(':', start);
+    return {text.substr(0, colon), colon == std::string::npos ? "" : text.substr(colon + 1)};
+  }
   if (fs::exists(text, ignored)) return {text};
   for (std::size_t colon = text.find(':'); colon != std::string::npos; colon = text.find(':', colon + 1)) {
     const fs::path path = text.substr(0, colon);

@@ -20,7 +20,7 @@ struct DataName {
 };
 
 /// Splits at the first colon before which a file or folder exists. A path that exists as it stands is not
-/// split, nor is one of which no part exists.
+/// split, nor is one of which no part exists. URLs are split at the first colon behind the host.
 DataName splitName(const std::filesystem::path& name);
 
 /// What `inner` selects of a file: the volume with this path, or all below it, or channels of this name; ""

@@ -30,6 +30,7 @@ std::string firstBytes(const fs::path& path, ByteStream::Encoding encoding) {
 
 FileStart startOf(const fs::path& path) {
   FileStart start{path};
+  if (isUrl(path)) return start;
   std::error_code ignored;
   start.folder = fs::is_directory(path, ignored);
   if (start.folder) return start;
@@ -104,6 +105,11 @@ void complete(VolumeFile& file) {
 }
 
 }  // namespace
+
+bool isUrl(const fs::path& path) {
+  const std::string start = lowerCase(path.string().substr(0, 8));
+  return start.starts_with("http://") || start == "https://";
+}
 
 bool FileStart::hasEnding(std::string_view ending) const { return io::hasEnding(path, ending); }
 

@@ -19,12 +19,12 @@
   X(Nifti, "NIfTI", ".nii, .nii.gz, .hdr + .img", "")                                                \
   X(Nrrd, "NRRD", ".nrrd, .nhdr", "")                                                                \
   X(Tiff, "TIFF", ".tif, .tiff", "")                                                                 \
-  X(Zarr, "OME-Zarr", "folders .zarr", "")
+  X(Zarr, "OME-Zarr", "folders .zarr, .zarr.zip, .ozx, http(s)://", "")
 // clang-format on
 
 namespace scolopax::io {
 
-/// The beginning of a file, or a folder.
+/// The beginning of a file, or a folder, or a URL, of which nothing is known.
 struct FileStart {
   std::filesystem::path path;
   bool folder = false;
@@ -38,6 +38,9 @@ struct FileStart {
   /// Whether it is a folder that holds an entry of this name.
   bool contains(std::string_view entry) const;
 };
+
+/// Whether the path is that of something on a server: "http://..." or "https://...".
+bool isUrl(const std::filesystem::path& path);
 
 /// How well a file matches a format. What it contains takes precedence over its name.
 enum class Match { no, name, content };
@@ -65,10 +68,10 @@ std::span<const Format> formats();
 /// The format that matches a file or folder best; nullptr if none does or if it cannot be read.
 const Format* findFormat(const std::filesystem::path& path);
 
-/// Opens a file or folder with the format that matches it best. Never waits for a pipe. Names are clean text
-/// in what it returns. Throws Error: unsupported, naming the known formats, if none matches, and naming the
-/// library if that is missing; badInput unless it is a regular file or a folder of a format, or if it holds
-/// no volume; and what the reader throws.
+/// Opens a file, folder or URL with the format that matches it best. Never waits for a pipe. Names are clean
+/// text in what it returns. Throws Error: unsupported, naming the known formats, if none matches, and naming
+/// the library if that is missing; badInput unless it is a regular file or a folder of a format, or if it
+/// holds no volume; and what the reader throws.
 std::shared_ptr<const VolumeFile> openFile(const std::filesystem::path& path,
                                            const OpenOptions& options = {});
 /// The same with a given format.

@@ -54,6 +54,8 @@ struct OpenOptions {
   FourthAxis fourthAxis = FourthAxis::automatic;  ///< for formats that do not say what the axis is
   Warn warn = {};                                 ///< never empty where a reader gets it
   std::stop_token stop = {};                      ///< for readers that look at many files
+  /// Servers that may be asked by HTTP: "host", for the usual ports, or "host:port".
+  std::vector<std::string> allowedHosts = {};
 };
 
 /// A file or folder whose headers have been read. It keeps neither voxels nor an open file.

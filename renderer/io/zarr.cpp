@@ -128,8 +128,10 @@ class ZarrSearch {
 
 bool isZarrZip(const fs::path& path) { return hasEnding(path, ".zarr.zip") || hasEnding(path, ".ozx"); }
 
-std::unique_ptr<ZarrStore> openZarrStore(const fs::path& path) {
+std::unique_ptr<ZarrStore> openZarrStore(const fs::path& path, const std::vector<std::string>& allowedHosts,
+                                         const std::stop_token& stop) {
   std::error_code ignored;
+  if (isUrl(path)) return openZarrHttp(path.string(), allowedHosts, stop);
   if (fs::is_directory(path, ignored)) return openZarrFolder(path);
   return openZarrZip(path);
 }
@@ -139,6 +141,7 @@ std::unique_ptr<ZarrStore> openZarrStore(const fs::path& path) {
 Match matchZarr(const FileStart& start) {
   for (const char* document : {"zarr.json", ".zgroup", ".zarray", ".zattrs"})
     if (start.contains(document)) return Match::content;
+  if (isUrl(start.path)) return Match::content;
   if (start.folder) return start.hasEnding(".zarr") ? Match::name : Match::no;
   if (!isZarrZip(start.path)) return Match::no;
   return start.bytes.starts_with("PK") ? Match::content : Match::name;
@@ -146,15 +149,16 @@ Match matchZarr(const FileStart& start) {
 
 VolumeFile openZarr(const fs::path& path, const OpenOptions& options) {
   std::vector<ZarrVolume> volumes =
-      ZarrSearch(*openZarrStore(path), options).all();
+      ZarrSearch(*openZarrStore(path, options.allowedHosts, options.stop), options).all();
   VolumeFile file{path};
   auto levels = std::make_shared<std::vector<std::vector<ZarrLevel>>>();
   for (ZarrVolume& volume : volumes) {
     file.volumes.push_back(std::move(volume.info));
     levels->push_back(std::move(volume.levels));
   }
-  file.read = [path, levels](const VolumeInfo& volume, const Part& part, Loading& loading) {
-    const auto store = openZarrStore(path);
+  file.read = [path, levels, hosts = options.allowedHosts](const VolumeInfo& volume, const Part& part,
+                                                           Loading& loading) {
+    const auto store = openZarrStore(path, hosts, loading.stop());
     auto writers = makeWriters(shown(path), volume, part, loading);
     const ZarrLevel& level = levels->at(part.volume).at(part.level);
     readZarrChunks(*store, level.array, level.axes, part.time, part.channels, writers, loading);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -55,5 +56,12 @@ std::unique_ptr<ZarrStore> openZarrFolder(const std::filesystem::path& folder);
 /// A ZIP archive of stored or deflated entries, whose root or only folder is the root. Throws Error: badInput
 /// for a damaged archive, unsupported if the build lacks libzip.
 std::unique_ptr<ZarrStore> openZarrZip(const std::filesystem::path& path);
+
+/// A server: "https://host/a.zarr". Hosts other than the allowed ones ("host", for the usual port, or
+/// "host:port") are not asked, and redirections only followed on the same host. Throws Error: badInput for
+/// other URLs, unsupported for other hosts or if the build lacks libcurl. Its functions throw also io for
+/// what fails or takes longer than five minutes, and cancelled.
+std::unique_ptr<ZarrStore> openZarrHttp(const std::string& url, const std::vector<std::string>& allowedHosts,
+                                        std::stop_token stop);
 
 }  // namespace scolopax::io

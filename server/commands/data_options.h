@@ -2,7 +2,9 @@
 // Options for opening volume files, the same in several commands.
 #pragma once
 #include <CLI/CLI.hpp>
+#include <functional>
 #include <string>
+#include <vector>
 
 #include "renderer/io/volume_file.h"
 
@@ -10,16 +12,17 @@ namespace scolopax {
 
 inline constexpr const char* kDataDoc =
     "Volume files or folders; FILE:NAME is one data set or channel of a file. Those with the same grid form "
-    "one data "
-    "set";
-inline constexpr const char* kFourthAxisDoc =
-    "What a fourth axis of NIfTI and NRRD files is; auto: as the header says, otherwise channels if it has a "
-    "length of "
-    "3, and times if not";
+    "one data set";
 
-/// Restricts an option to the names of FourthAxis.
-CLI::Option* checkFourthAxis(CLI::Option* option);
-/// `name` must have passed the check.
-io::FourthAxis fourthAxisOf(const std::string& name);
+struct DataOptions {
+  std::string fourthAxis = "auto";
+  std::vector<std::string> allowedHosts = {};
+};
+
+/// Adds the options that set `options`, which must live as long as the command. `added` is called for each,
+/// if given.
+void addDataOptions(CLI::App& command, DataOptions& options,
+                    const std::function<void(CLI::Option&)>& added = {});
+io::OpenOptions openOptionsOf(const DataOptions& options, io::Warn warn);
 
 }  // namespace scolopax

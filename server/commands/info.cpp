@@ -84,14 +84,13 @@ void printLoaded(const io::Dataset& dataset, const io::LoadedDataset& loaded) {
 
 struct InfoOptions {
   std::vector<std::filesystem::path> paths;
-  std::string fourthAxis = "auto";
+  DataOptions data;
   bool json = false, devices = false, headers = false;
 };
 
 void printDatasets(const InfoOptions& options) {
   const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
-  const auto opened =
-      io::openDatasets(options.paths, {.fourthAxis = fourthAxisOf(options.fourthAxis), .warn = warn});
+  const auto opened = io::openDatasets(options.paths, openOptionsOf(options.data, warn));
   std::vector<io::LoadedDataset> loaded;
   if (!options.headers) {
     LoadBar bar;
@@ -119,8 +118,7 @@ CLI::App* addInfoCommand(CLI::App& root) {
                                           "times, and each channel's name, type and range");
   const auto options = std::make_shared<InfoOptions>();
   command->add_option("PATH", options->paths, kDataDoc);
-  checkFourthAxis(command->add_option("--fourth-axis", options->fourthAxis, kFourthAxisDoc))
-      ->capture_default_str();
+  addDataOptions(*command, options->data);
   command->add_flag(
       "--headers", options->headers,
       "Read the headers only, which is quick: types as in the files, and no ranges, for which all voxels "

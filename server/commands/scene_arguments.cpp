@@ -10,7 +10,6 @@
 
 #include "protocol/json_text.h"
 #include "renderer/core/error.h"
-#include "server/commands/data_options.h"
 #include "server/commands/load_bar.h"
 #include "server/config.h"
 #include "server/dataset_store.h"
@@ -53,8 +52,7 @@ void addSceneArguments(CLI::App& command, SceneArguments& arguments) {
   command.add_option("SCENE", arguments.scene,
                      "Scene file (JSON, see PROTOCOL.md); by default, all values are chosen automatically");
   command.add_option("--data", arguments.data, kDataDoc)->required();
-  checkFourthAxis(command.add_option("--fourth-axis", arguments.fourthAxis, kFourthAxisDoc))
-      ->capture_default_str();
+  addDataOptions(command, arguments.dataOptions);
   command.add_option("--time", arguments.time, "Which time of a time series, from 0: the scene's `time`");
   command
       .add_option(
@@ -69,8 +67,7 @@ std::shared_ptr<const server::ResolvedScene> resolveScene(const SceneArguments& 
   for (const std::string& assignment : arguments.assignments) patches.push_back(patchOf(assignment));
   const json scene = readScene(arguments.scene);
   const auto warn = [](const std::string& line) { fmt::print(stderr, "scolopax: {}\n", line); };
-  const auto opened =
-      io::openDatasets(arguments.data, {.fourthAxis = fourthAxisOf(arguments.fourthAxis), .warn = warn});
+  const auto opened = io::openDatasets(arguments.data, openOptionsOf(arguments.dataOptions, warn));
   const auto store = std::make_shared<server::DatasetStore>(
       opened, std::make_shared<server::VolumeCache>(io::defaultMemoryLimitBytes(), warn));
   LoadBar bar;

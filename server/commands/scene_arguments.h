@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "server/commands/data_options.h"
 #include "server/scene_resolver.h"
 
 namespace scolopax {
@@ -15,13 +16,13 @@ namespace scolopax {
 struct SceneArguments {
   std::string scene;  ///< a file; "" is {}
   std::vector<std::filesystem::path> data;
-  std::string fourthAxis = "auto";
+  DataOptions dataOptions = {};
   std::optional<std::uint32_t> time = {};     ///< replaces the scene's
   std::vector<std::string> assignments = {};  ///< "channels.0.density=0.1"
 };
 
-/// Adds SCENE, --data, --fourth-axis, --time and --set, which fill `arguments`. `arguments` must live as long
-/// as the command.
+/// Adds SCENE, --data, --fourth-axis, --allow-host, --time and --set, which fill `arguments`. `arguments` must
+/// live as long as the command.
 void addSceneArguments(CLI::App& command, SceneArguments& arguments);
 
 /// Loads the data, reads the scene and applies the assignments in order. Throws Error or ProtocolError.

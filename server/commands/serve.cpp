@@ -39,7 +39,7 @@ struct ServeOptions {
   server::Config config;
   std::vector<std::filesystem::path> paths;
   std::filesystem::path dataRoot;
-  std::string fourthAxis = "auto";
+  DataOptions data;
   std::string tokenFile;
   std::string configFile;
   std::string device = "auto", whenDeviceFails = "cpu";
@@ -128,7 +128,7 @@ void serve(ServeOptions options) {
     log->warn("{} can be reached from other machines, and the traffic is not encrypted", config.host);
 
   const auto opened = io::openDatasets(server::pathsBelowRoot(options.paths, options.dataRoot),
-                                       {.fourthAxis = fourthAxisOf(options.fourthAxis), .warn = warn});
+                                       openOptionsOf(options.data, warn));
   const auto memory = std::make_shared<MemoryBudget>(options.config.maxMemoryBytes);
   const auto datasets = std::make_shared<const server::DatasetStore>(
       opened, std::make_shared<server::VolumeCache>(options.memoryMebibytes << 20, warn), memory);
@@ -147,12 +147,17 @@ void serve(ServeOptions options) {
   application.stop();
 }
 
-/// Adds the option --`name`, which can also be set in the environment.
+/// The environment variable that sets the option: SCOLOPAX_MAX_BODY for --max-body.
+std::string variableOf(const std::string& option) {
+  std::string variable = "SCOLOPAX_";
+  for (const char c : option.substr(2))
+    variable += c == '-' ? '_' : char(std::toupper(static_cast<unsigned char>(c)));
+  return variable;
+}
+
 template <class Value>
 CLI::Option* addOption(CLI::App& command, const std::string& name, Value& value, const std::string& doc) {
-  std::string variable = "SCOLOPAX_";
-  for (const char c : name) variable += c == '-' ? '_' : char(std::toupper(static_cast<unsigned char>(c)));
-  return command.add_option("--" + name, value, doc)->envname(variable)->capture_default_str();
+  return command.add_option("--" + name, value, doc)->envname(variableOf("--" + name))->capture_default_str();
 }
 
 /// Accepts an IP address, in its usual form.
@@ -172,7 +177,7 @@ void addServerOptions(CLI::App& command, ServeOptions& options) {
     return addOption(command, name, value, doc);
   };
   command.add_option("PATH", options.paths, kDataDoc);
-  checkFourthAxis(add("fourth-axis", options.fourthAxis, kFourthAxisDoc));
+  addDataOptions(command, options.data, [](CLI::Option& option) { option.envname(variableOf(option.get_name())); });
   add("host", config.host, "Address to listen on; 0.0.0.0: all addresses of this machine")
       ->type_name("ADDRESS");
   add("port", config.port, "Port to listen on; 0: any free one")->type_name("PORT");
