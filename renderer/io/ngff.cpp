@@ -131,7 +131,9 @@ std::optional<NgffImage> ngffImageOf(const ZarrNode& group, const Warn& warn) {
     if (!path) dataset["path"].refuse("a path inside of the group");
     NgffLevel level{joinZarrPath(group.path, *path), {}};
     addTransformations(dataset["coordinateTransformations"], image.axes.size(), level.transform);
+    const bool translated = level.transform.translated;
     addTransformations(first["coordinateTransformations"], image.axes.size(), level.transform);
+    level.transform.translated = translated;
     image.levels.push_back(std::move(level));
   }
   if (image.levels.empty()) first["datasets"].refuse("at least one level");

@@ -21,7 +21,7 @@ struct NgffAxis {
 /// World coordinate along each axis = scale * index + translation.
 struct NgffTransform {
   std::vector<double> scale, translation;  ///< one for each axis; both empty if none is stated
-  bool translated = false;                 ///< whether a translation is stated
+  bool translated = false;                 ///< whether a translation of this level alone is stated
 };
 
 struct NgffLevel {

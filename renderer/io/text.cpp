@@ -93,7 +93,7 @@ bool hasEnding(const std::filesystem::path& path, std::string_view ending) {
 
 std::string stemOf(const std::filesystem::path& path) {
   std::filesystem::path name = path.filename();
-  if (hasEnding(name, ".gz")) name = name.stem();
+  if (hasEnding(name, ".gz") || hasEnding(name, ".zarr.zip")) name = name.stem();
   name = name.stem();
   if (hasEnding(name, ".ome")) name = name.stem();
   return cleanText(name.string());

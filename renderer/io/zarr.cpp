@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // OME-Zarr (NGFF 0.1 to 0.5) and plain Zarr, versions 2 and 3: https://ngff.openmicroscopy.org
 #include <algorithm>
+#include <set>
 
 #include "renderer/core/error.h"
 #include "renderer/io/formats.h"
@@ -56,8 +57,30 @@ class ZarrSearch {
     const ZarrField attributes = ngffAttributes(node);
     if (attributes["plate"].isObject()) return visitPlate(node.path, attributes["plate"]);
     if (attributes["bioformats2raw.layout"].exists()) return visitSeries(node.path);
-    for (const std::string& name : store_.list(node.path))
+    std::vector<std::string> names = store_.list(node.path);
+    if (names.empty() && depth == 0) readConsolidated(node);
+    if (names.empty()) names = consolidatedNames(node.path);
+    for (const std::string& name : names)
       if (!name.starts_with('.')) visit(joinZarrPath(node.path, name), depth + 1);
+  }
+
+  /// What lies directly in a group, by the copy of all documents that writers put beside those of the root.
+  std::vector<std::string> consolidatedNames(const std::string& group) {
+    std::set<std::string> names;
+    const std::string folder = group.empty() ? "" : group + "/";
+    for (const std::string& key : consolidated_)
+      if (key.starts_with(folder))
+        names.insert(key.substr(folder.size(), key.find('/', folder.size()) - folder.size()));
+    return {names.begin(), names.end()};
+  }
+
+  void readConsolidated(const ZarrNode& root) {
+    const auto copy = root.format == 2 ? readZarrJson(store_, ".zmetadata") : std::nullopt;
+    const ZarrField document =
+        copy ? ZarrField(*copy, root.documentName) : root.field()["consolidated_metadata"];
+    if (!document.isObject() || !document["metadata"].isObject()) return;
+    for (const auto& [key, value] : document["metadata"].value().items())
+      if (const auto path = cleanZarrPath(key); path && !path->empty()) consolidated_.push_back(*path);
   }
 
   void add(const NgffImage& image, const std::string& path) {
@@ -123,6 +146,7 @@ class ZarrSearch {
   const OpenOptions& options_;
   std::vector<ZarrVolume> volumes_;
   std::vector<Error> errors_;
+  std::vector<std::string> consolidated_;  ///< paths of documents, if the store cannot list groups
   std::size_t nodes_ = 0;
 };
 

@@ -73,7 +73,7 @@ class ZarrChunkReader {
   }
 
   void read() {
-    constexpr std::uint64_t kMostChunks = std::uint64_t(1) << 20;
+    constexpr std::uint64_t kMostChunks = std::uint64_t(1) << 18;
     const std::uint64_t count = chunkCountOf(wanted_, array_.chunks);
     if (count > kMostChunks)
       throw Error(ErrorCode::unsupported, name("") + ": chunks: expected at most " +
@@ -88,6 +88,7 @@ class ZarrChunkReader {
       else
         readChunk(key, box);
     });
+    if (!found_) loading_.warn(name("") + ": no chunk is there, so that every voxel has the fill value");
   }
 
  private:
@@ -130,6 +131,7 @@ class ZarrChunkReader {
     const std::uint64_t size = chunkBytes(box.size);
     auto packed = store_.get(key, std::min(largestPackedZarrChunk(size), loading_.memoryLimitBytes()));
     if (!packed) return fill(box);
+    found_ = true;
     checkChunkMemory(key, box.size);
     write(box, unpackZarrChunk(name(key), std::move(*packed), array_.codecs.packings, size), array_.codecs);
   }
@@ -139,6 +141,7 @@ class ZarrChunkReader {
     constexpr std::uint64_t kMissing = ~std::uint64_t(0);
     const auto index = readShardIndex(key, shard);
     if (index.empty()) return fill(shard);
+    found_ = true;
     checkChunkMemory(key, sharding.chunks);
     const std::uint64_t size = chunkBytes(sharding.chunks);
     forEachChunk(wantedIn(shard), sharding.chunks, [&](const ZarrIndex& at, const ZarrBox& relative) {
@@ -240,7 +243,8 @@ class ZarrChunkReader {
   const std::vector<std::size_t>& channels_;
   std::vector<ChannelWriter>& writers_;
   Loading& loading_;
-  ZarrBox wanted_;  ///< the smallest box that holds all that is to be read
+  bool found_ = false;  ///< a chunk or shard
+  ZarrBox wanted_;      ///< the smallest box that holds all that is to be read
 };
 
 }  // namespace

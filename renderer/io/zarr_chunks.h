@@ -19,7 +19,7 @@ struct ZarrAxes {
 };
 
 /// Writes channels[i] at `time` with writers[i]; missing chunks have the fill value. Throws Error(badInput)
-/// for damaged chunks, unsupported for more than 2^20 chunks, tooLarge if the memory limit does not allow a
+/// for damaged chunks, unsupported for more than 2^18 chunks, tooLarge if the memory limit does not allow a
 /// chunk, and as the store and the writers.
 void readZarrChunks(const ZarrStore& store, const ZarrArray& array, const ZarrAxes& axes, std::size_t time,
                     const std::vector<std::size_t>& channels, std::vector<ChannelWriter>& writers,

@@ -13,7 +13,11 @@ namespace {
 
 class ZarrFolder : public ZarrStore {
  public:
-  explicit ZarrFolder(const fs::path& folder) : ZarrStore(shown(folder)), root_(fs::canonical(folder)) {}
+  explicit ZarrFolder(const fs::path& folder) : ZarrStore(shown(folder)) {
+    std::error_code failed;
+    root_ = fs::canonical(folder, failed);
+    if (failed) throw Error(ErrorCode::io, shownKey("") + ": " + failed.message());
+  }
 
   std::optional<std::vector<std::byte>> get(const std::string& key, std::uint64_t most) const override {
     const auto path = resolve(key);

@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """scolopax info, and how the command line names what is in a file."""
+import functools
+import http.server
 import json
 import os
 import sys
+import threading
 import unittest
 
 sys.path.insert(0, os.path.dirname(__file__))
@@ -69,6 +72,24 @@ class Info(Series):
         result = self.run_command("info", path + ":what")
         self.assertEqual(result.returncode, 1)
         self.assertIn('run_s.nrrd: expected one of run_s after the colon, found "what"', result.stderr)
+
+    def test_a_url_is_read_from_an_allowed_host_only(self):
+        folder = self.path("a.zarr")
+        os.mkdir(folder)
+        array = {"zarr_format": 2, "shape": [1, 1, 2], "chunks": [1, 1, 2], "dtype": "|u1", "fill_value": 0,
+                 "compressor": None, "filters": None, "order": "C"}
+        self.write("a.zarr/.zarray", json.dumps(array).encode())
+        self.write("a.zarr/0.0.0", b"\x03\x07")
+        handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=os.path.dirname(folder))
+        with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+            threading.Thread(target=server.serve_forever, daemon=True).start()
+            host = f"127.0.0.1:{server.server_port}"
+            result = self.run_command("info", f"http://{host}/a.zarr")
+            self.assertEqual(result.returncode, 1)
+            self.assertIn("--allow-host", result.stderr)
+            told = json.loads(self.info("--json", "--allow-host", host, f"http://{host}/a.zarr"))[0]
+            server.shutdown()
+        self.assertEqual([(c["minimum"], c["maximum"]) for c in told["channels"]], [(3, 7)])
 
     def test_an_unknown_file_is_refused_with_the_known_formats(self):
         result = self.run_command("info", self.write("a.what", b"x"))

@@ -66,6 +66,7 @@ TEST_F(Ngff, TransformationsOfTheWholeImageFollowThoseOfALevel) {
   EXPECT_EQ(volume.levels[0].spacing(), glm::dvec3(1, 1, 30));
   EXPECT_EQ(originOf(volume.levels[0]), glm::dvec3(104, 2, 30));
   EXPECT_EQ(volume.levels[1].spacing(), glm::dvec3(2, 2, 30));
+  EXPECT_EQ(originOf(volume.levels[1]), glm::dvec3(104.5, 2.5, 30)) << "the corner of the finest level";
 }
 
 TEST_F(Ngff, UnitsAreShownShortAndBroughtTogether) {

@@ -211,7 +211,7 @@ TEST(Zarr3Arrays, WrongDocumentsAreRefusedWithTheField) {
   EXPECT_THAT(with([](json& d) {
                 d["shape"] = {1000, 1000, 100}, d["chunk_grid"]["configuration"]["chunk_shape"] = {1, 1, 1};
               }),
-              HasSubstr("chunks: expected at most 1048576 in a volume, found 100000000"));
+              HasSubstr("chunks: expected at most 262144 in a volume, found 100000000"));
   EXPECT_THAT(with([](json& d) { d["data_type"] = "complex64"; }), HasSubstr("data_type: expected bool"));
   EXPECT_THAT(with([](json& d) { d["data_type"] = {{"name", "x"}}; }), HasSubstr("data_type: expected bool"));
   EXPECT_THAT(with([](json& d) { d["chunk_grid"]["name"] = "rectilinear"; }),

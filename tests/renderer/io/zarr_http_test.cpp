@@ -88,6 +88,21 @@ TEST_F(ZarrHttpTest, MissingChunksHaveTheFillValue) {
   EXPECT_EQ(values(url()), expected);
 }
 
+TEST_F(ZarrHttpTest, GroupsAreListedByTheirCopyOfAllDocuments) {
+  const std::string array = array2({1, 1, 2}, {1, 1, 2}, "|u1").dump();
+  values_ = {{".zgroup", kGroup2}, {"a/.zarray", array}, {"g/.zgroup", kGroup2}, {"g/b/.zarray", array}};
+  EXPECT_THAT(error(), HasSubstr("expected a volume, found none"));
+  values_[".zmetadata"] = R"({"metadata": {".zgroup": {}, "a/.zarray": {}, "g/b/.zarray": {}, "../x": {}}})";
+  const auto file = openFile(url(), {.allowedHosts = {host()}});
+  ASSERT_EQ(file->volumes.size(), 2u);
+  EXPECT_EQ(file->volumes[0].path, "a");
+  EXPECT_EQ(file->volumes[1].path, "g/b");
+  values_ = {{"zarr.json", R"({"zarr_format": 3, "node_type": "group",
+                              "consolidated_metadata": {"metadata": {"a": {}}}})"},
+             {"a/.zarray", array}};
+  EXPECT_EQ(openFile(url(), {.allowedHosts = {host()}})->volumes.size(), 1u);
+}
+
 TEST_F(ZarrHttpTest, OnlyAllowedHostsAreAsked) {
   const std::string refusal =
       "expected a host that --allow-host names, found \"127.0.0.1:" + std::to_string(port_) + "\"";
@@ -176,6 +191,39 @@ TEST_F(ZarrHttpTest, ShardsAreReadByRanges) {
     };
     EXPECT_NE(error(), "") << place;
   }
+}
+
+TEST_F(ZarrHttpTest, ACancelledLoadDoesNotWaitForTheServer) {
+  using std::chrono::steady_clock;
+  std::stop_source stop;
+  std::atomic<bool> ended = false;
+  answer_ = [&](const std::string& key, const httplib::Request&, httplib::Response&) {
+    if (key != "0/0.0.0") return false;
+    stop.request_stop();
+    for (const auto start = steady_clock::now();
+         !ended && steady_clock::now() - start < std::chrono::seconds(20);)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    return false;
+  };
+  const auto file = openFile(url(), {.allowedHosts = {host()}});
+  const auto start = steady_clock::now();
+  EXPECT_THAT(errorOf([&] { load(*file, {}, LoadOptions{.stop = stop.get_token()}); }),
+              HasSubstr("cancelled"));
+  ended = true;
+  EXPECT_LT(steady_clock::now() - start, std::chrono::seconds(15));
+}
+
+TEST(ZarrUrls, TheColonOfThePortDoesNotSplit) {
+  const auto split = [](const char* name) {
+    const DataName parts = splitName(name);
+    return parts.path.string() + " " + parts.inner;
+  };
+  EXPECT_EQ(split("http://h:80/a.zarr"), "http://h:80/a.zarr ");
+  EXPECT_EQ(split("https://h:80/a.zarr:labels/n"), "https://h:80/a.zarr labels/n");
+  EXPECT_EQ(split("HTTP://h/a.zarr/:0"), "HTTP://h/a.zarr/ 0");
+  EXPECT_EQ(split("http://h:80"), "http://h:80 ");
+  EXPECT_FALSE(isUrl("https:/h"));
+  EXPECT_FALSE(isUrl("file:///h"));
 }
 
 TEST_F(ZarrHttpTest, AServerThatIsGoneIsAnError) {

@@ -8,7 +8,7 @@
 namespace scolopax::io {
 namespace {
 
-using testing::AllOf;
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -234,6 +234,10 @@ TEST(ZarrFiles, MissingChunksHaveTheFillValue) {
   EXPECT_THAT(errorFor("<i8", 1e30), HasSubstr("fill_value"));
   EXPECT_THAT(errorFor("<f4", "none"), HasSubstr("fill_value: expected a number"));
 
+  valueOf("<u2", 7);
+  std::vector<std::string> warnings;
+  loadFile(folder / "a.zarr", kTestLimit, [&](const std::string& line) { warnings.push_back(line); });
+  EXPECT_THAT(warnings, Contains(HasSubstr("no chunk is there")));
   auto document = array2({2, 1, 3}, {1, 1, 2}, "<u2");
   document["fill_value"] = 9;
   const auto path = writeZarr(folder / "b.zarr",

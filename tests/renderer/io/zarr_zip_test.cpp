@@ -47,6 +47,7 @@ TEST(ZarrZip, StoredAndDeflatedEntriesLoad) {
       const auto file = openFile(path);
       ASSERT_EQ(file->volumes.size(), 1u);
       EXPECT_EQ(file->volumes[0].levels.size(), 2u);
+      EXPECT_EQ(file->volumes[0].channels[0].name, "a");
       EXPECT_EQ(zarrValues(path), rampUpTo(60)) << name << method;
     }
 }
