@@ -20,6 +20,7 @@
   X(Nrrd, "NRRD", ".nrrd, .nhdr", "")                                                                \
   X(Tiff, "TIFF", ".tif, .tiff", "")                                                                 \
   X(Zarr, "OME-Zarr", "folders .zarr, .zarr.zip, .ozx, http(s)://", "")
+  X(MetaImage, "MetaImage", ".mha, .mhd", "")
 // clang-format on
 
 namespace scolopax::io {
