@@ -21,6 +21,9 @@
   X(Tiff, "TIFF", ".tif, .tiff", "")                                                                 \
   X(Zarr, "OME-Zarr", "folders .zarr, .zarr.zip, .ozx, http(s)://", "")
   X(MetaImage, "MetaImage", ".mha, .mhd", "")
+  X(MetaImage, "MetaImage", ".mha, .mhd", "")                                                        \
+  X(Npy, "NumPy array", ".npy", "")                                                                  \
+  X(Npz, "NumPy archive", ".npz", SCOLOPAX_LACKS_ZIP)
 // clang-format on
 
 namespace scolopax::io {
