@@ -23,7 +23,8 @@
   X(MetaImage, "MetaImage", ".mha, .mhd", "")
   X(MetaImage, "MetaImage", ".mha, .mhd", "")                                                        \
   X(Npy, "NumPy array", ".npy", "")                                                                  \
-  X(Npz, "NumPy archive", ".npz", SCOLOPAX_LACKS_ZIP)
+  X(Npz, "NumPy archive", ".npz", SCOLOPAX_LACKS_ZIP)                                                \
+  X(Slc, "SLC", ".slc", "")
 // clang-format on
 
 namespace scolopax::io {
