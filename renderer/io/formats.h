@@ -25,6 +25,7 @@
   X(Npy, "NumPy array", ".npy", "")                                                                  \
   X(Npz, "NumPy archive", ".npz", SCOLOPAX_LACKS_ZIP)                                                \
   X(Slc, "SLC", ".slc", "")
+  X(VtkXml, "VTK XML", ".vti, .vtr, .pvti, .pvtr", "")
 // clang-format on
 
 namespace scolopax::io {
