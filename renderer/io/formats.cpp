@@ -75,7 +75,7 @@ void complete(VolumeFile& file) {
   const std::string name = shown(file.path);
   if (file.volumes.empty()) throw Error(ErrorCode::badInput, name + ": expected a volume, found none");
   for (VolumeInfo& volume : file.volumes) {
-    const std::string where = name + (volume.path.empty() ? "" : ":" + cleanText(volume.path));
+    const std::string where = volume.path.empty() ? name : name + ":" + cleanText(volume.path);
     if (volume.levels.empty() || volume.channels.empty() || volume.times.count == 0)
       throw Error(ErrorCode::badInput, where + ": expected levels, channels and times, found none");
     for (const Grid& grid : volume.levels) {

@@ -26,6 +26,7 @@
   X(Npz, "NumPy archive", ".npz", SCOLOPAX_LACKS_ZIP)                                                \
   X(Slc, "SLC", ".slc", "")
   X(VtkXml, "VTK XML", ".vti, .vtr, .pvti, .pvtr", "")
+  X(Hdf5, "HDF5", ".h5, .hdf5, .hdf", SCOLOPAX_LACKS_HDF5)
 // clang-format on
 
 namespace scolopax::io {
