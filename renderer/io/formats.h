@@ -15,18 +15,17 @@
 /// the build has all that it needs. tests/CMakeLists.txt makes a fuzz target of every line.
 // clang-format off
 #define SCOLOPAX_FORMATS(X)                                                                         \
-  X(Raw, "raw", "name_XxYxZ_type.raw, .dat, .ivf", "")                                               \
-  X(Nifti, "NIfTI", ".nii, .nii.gz, .hdr + .img", "")                                                \
-  X(Nrrd, "NRRD", ".nrrd, .nhdr", "")                                                                \
-  X(Tiff, "TIFF", ".tif, .tiff", "")                                                                 \
-  X(Zarr, "OME-Zarr", "folders .zarr, .zarr.zip, .ozx, http(s)://", "")
-  X(MetaImage, "MetaImage", ".mha, .mhd", "")
-  X(MetaImage, "MetaImage", ".mha, .mhd", "")                                                        \
-  X(Npy, "NumPy array", ".npy", "")                                                                  \
-  X(Npz, "NumPy archive", ".npz", SCOLOPAX_LACKS_ZIP)                                                \
+  X(Raw, "raw", "name_XxYxZ_type.raw, .dat, .ivf", "")                                              \
+  X(Nifti, "NIfTI", ".nii, .nii.gz, .hdr + .img", "")                                               \
+  X(Nrrd, "NRRD", ".nrrd, .nhdr", "")                                                               \
+  X(MetaImage, "MetaImage", ".mha, .mhd", "")                                                       \
+  X(Tiff, "TIFF", ".tif, .tiff", "")                                                                \
+  X(Zarr, "OME-Zarr", "folders .zarr, .zarr.zip, .ozx, http(s)://", "")                             \
+  X(Hdf5, "HDF5", ".h5, .hdf5, .hdf", SCOLOPAX_LACKS_HDF5)                                          \
+  X(VtkXml, "VTK XML", ".vti, .vtr, .pvti, .pvtr", "")                                              \
+  X(Npy, "NumPy array", ".npy", "")                                                                 \
+  X(Npz, "NumPy archive", ".npz", SCOLOPAX_LACKS_ZIP)                                               \
   X(Slc, "SLC", ".slc", "")
-  X(VtkXml, "VTK XML", ".vti, .vtr, .pvti, .pvtr", "")
-  X(Hdf5, "HDF5", ".h5, .hdf5, .hdf", SCOLOPAX_LACKS_HDF5)
 // clang-format on
 
 namespace scolopax::io {
