@@ -57,7 +57,8 @@ DeviceBytes DeviceVolume::uploadOne(int channel, const std::function<bool()>& st
 }
 
 void DeviceVolume::continueUpload(int channel, const std::function<bool()>& stop, Plane& plane) {
-  const VoxelView& voxels = volume_->channels()[std::size_t(channel)].voxels;
+  const auto volume = volume_.lock();
+  const VoxelView& voxels = volume->channels()[std::size_t(channel)].voxels;
   if (!plane.memory) {
     const std::size_t bytes = voxels.count() * sizeBytes(voxels.type());
     plane.memory = memory_.allocate(bytes);

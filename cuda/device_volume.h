@@ -24,16 +24,15 @@ class DeviceVolume {
   /// channel. They stay on the device while somebody holds them.
   using Planes = std::vector<DeviceBytes>;
 
-  DeviceVolume(std::shared_ptr<const Volume> volume, DeviceMemory& memory, Uploader& uploader)
-      : volume_(std::move(volume)),
-        memory_(memory),
-        uploader_(uploader),
-        channels_(volume_->channels().size()) {}
+  /// Does not keep the volume in memory.
+  DeviceVolume(const std::shared_ptr<const Volume>& volume, DeviceMemory& memory, Uploader& uploader)
+      : volume_(volume), memory_(memory), uploader_(uploader), channels_(volume->channels().size()) {}
 
-  const std::shared_ptr<const Volume>& volume() const { return volume_; }
-  /// Uploads those of the channels that are not on the device yet, and returns the voxels of all of them, in
-  /// this order. Ends early once `stop` returns true, and returns nothing; the next call continues there.
-  /// Throws Error(tooLarge).
+  /// Null once nobody holds it any more.
+  std::shared_ptr<const Volume> volume() const { return volume_.lock(); }
+  /// The volume must be held by somebody. Uploads those of the channels that are not on the device yet, and
+  /// returns the voxels of all of them, in this order. Ends early once `stop` returns true, and returns
+  /// nothing; the next call continues there. Throws Error(tooLarge).
   std::optional<Planes> upload(std::span<const int> channels, const std::function<bool()>& stop);
   /// Whether a channel has been uploaded.
   bool has(int channel) const;
@@ -54,7 +53,7 @@ class DeviceVolume {
   DeviceBytes uploadOne(int channel, const std::function<bool()>& stop);
   void continueUpload(int channel, const std::function<bool()>& stop, Plane& plane);
 
-  const std::shared_ptr<const Volume> volume_;
+  const std::weak_ptr<const Volume> volume_;
   DeviceMemory& memory_;
   Uploader& uploader_;
   mutable std::mutex mutex_;      // never held for long: not while copying, allocating or freeing

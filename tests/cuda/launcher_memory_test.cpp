@@ -90,6 +90,18 @@ TEST_F(CudaLauncher, MakesRoomByForgettingVolumesThatNobodyRenders) {
   }
 }
 
+TEST_F(CudaLauncher, KeepsNoVoxelsInTheMemoryOfTheHost) {
+  auto volume = mixedVolume();
+  const std::weak_ptr<const Volume> held = volume;
+  const Scene scene = smallScene(*volume);
+  const auto devices = cuda::openDevices({0});
+  rendered(*makeCudaRenderer(volume, devices), scene, 1);
+  volume.reset();
+  EXPECT_TRUE(held.expired()) << "though its channels stay on the device while there is memory";
+  const auto again = mixedVolume();
+  expectSamePicture(rendered(*makeCudaRenderer(again, devices), scene), pictureOfTheCpu(again, scene));
+}
+
 TEST_F(CudaLauncher, ForgetsHiddenChannelsWhenMemoryIsShort) {
   const auto volume = volumeOf(gridOf(kDims), channel(0), channel(1), channel(2));
   Scene scene = obliqueScene(*volume, 16, 16);
@@ -165,7 +177,8 @@ bool endsMeanwhile(std::future<void>& call, F&& f) {
 TEST_F(CudaLauncher, DoesNotWaitForTheUploadOfAnotherSession) {
   const auto memory = std::make_shared<cuda::DeviceMemory>([] { return false; });
   cuda::Uploader uploader;
-  cuda::DeviceVolume volume(volumeOf(gridOf(kDims), channel(0), channel(1)), *memory, uploader);
+  const auto voxels = volumeOf(gridOf(kDims), channel(0), channel(1));
+  cuda::DeviceVolume volume(voxels, *memory, uploader);
   const int channels[] = {0, 1};
   const auto never = [] { return false; };
   ASSERT_TRUE(volume.upload({channels, 1}, never));
@@ -189,7 +202,8 @@ TEST_F(CudaLauncher, DoesNotWaitForTheUploadOfAnotherSession) {
 TEST_F(CudaLauncher, KeepsChannelsThatSomebodyHolds) {
   const auto memory = std::make_shared<cuda::DeviceMemory>([] { return false; });
   cuda::Uploader uploader;
-  cuda::DeviceVolume volume(volumeOf(gridOf(kDims), channel(0), channel(1)), *memory, uploader);
+  const auto voxels = volumeOf(gridOf(kDims), channel(0), channel(1));
+  cuda::DeviceVolume volume(voxels, *memory, uploader);
   const int channels[] = {0, 1};
   auto planes = volume.upload(channels, [] { return false; });
   ASSERT_TRUE(planes);
