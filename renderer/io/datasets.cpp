@@ -6,6 +6,7 @@
 
 #include "renderer/core/error.h"
 #include "renderer/io/channel_names.h"
+#include "renderer/io/ensemble.h"
 #include "renderer/io/folder.h"
 #include "renderer/io/formats.h"
 #include "renderer/io/series.h"
@@ -91,6 +92,7 @@ std::vector<Opened> openAll(std::span<const fs::path> names, const OpenOptions& 
   std::vector<Opened> all = listAll(names, options);
   for (Opened& one : all) {
     OpenOptions own = options;
+    if (own.fourthAxis == FourthAxis::member) own.fourthAxis = FourthAxis::time;
     own.warn = [&one](const std::string& line) { one.warnings.push_back(line); };
     try {
       one.file = openFile(one.name.path, own);
@@ -100,6 +102,9 @@ std::vector<Opened> openAll(std::span<const fs::path> names, const OpenOptions& 
     }
   }
   if (options.fourthAxis != FourthAxis::channel) joinAllSeries(all);
+  if (options.fourthAxis == FourthAxis::member)
+    for (Opened& one : all)
+      if (one.file) one.file = withStatistics(one.file);
   for (const Opened& header : all) {
     if (!header.file || header.dropped) continue;
     for (Opened& other : all)
@@ -121,6 +126,8 @@ std::vector<Opened> openAll(std::span<const fs::path> names, const OpenOptions& 
 
 bool agree(const Dataset& dataset, const VolumeInfo& volume) {
   const std::size_t a = dataset.times.count, b = volume.times.count;
+  const Dataset::Source& first = dataset.sources.front();
+  if (first.file->volumes[first.part.volume].derived != volume.derived) return false;
   return sameGrid(dataset.levels[0], volume.levels[0]) && (a == b || a == 1 || b == 1);
 }
 
@@ -251,7 +258,7 @@ std::vector<Dataset> openDatasets(std::span<const fs::path> names, const OpenOpt
       });
       if (dataset == datasets.end()) {
         dataset = datasets.insert(datasets.end(), Dataset{.levels = volume.levels});
-        inners.push_back(opened.name.inner);
+        inners.push_back(volume.derived && opened.name.inner.empty() ? volume.path : opened.name.inner);
       }
       add(*dataset, opened, part);
     }

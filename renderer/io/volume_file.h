@@ -39,6 +39,7 @@ struct VolumeInfo {
   Times times = {};
   std::vector<ChannelInfo> channels = {};  ///< at least one; there may be more than a Volume can have
   std::string worldUnit = {};              ///< "mm", "um", ...; "" if unknown
+  bool derived = false;                    ///< computed from others: only derived volumes join it
 };
 
 /// What of a file is to be read.
@@ -47,8 +48,8 @@ struct Part {
   std::vector<std::size_t> channels = {};       ///< indices, ascending; readers get at least one. Empty: all
 };
 
-/// How to see an axis of a file that is neither x, y nor z.
-enum class FourthAxis { automatic, time, channel };
+/// How to see an axis of a file that is neither x, y nor z. Readers get members as times.
+enum class FourthAxis { automatic, time, channel, member };
 
 struct OpenOptions {
   FourthAxis fourthAxis = FourthAxis::automatic;  ///< for formats that do not say what the axis is
