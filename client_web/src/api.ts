@@ -25,6 +25,28 @@ export function isNamedList(member: unknown): member is Named[] {
 export interface ChannelInfo {
   name: string;
   unit?: string;
+  /** Of the voxels: in the file, or in memory once the data set has been loaded. */
+  type?: string;
+  /** Of the finite values; absent until the data set has been loaded. */
+  minimum?: number;
+  maximum?: number;
+}
+
+/** A load that is running. */
+export interface LoadInfo {
+  /** The step that is loaded. */
+  time: number;
+  stage: string;
+  doneBytes: number;
+  /** 0 while it is not known. */
+  allBytes: number;
+}
+
+export interface TimesInfo {
+  count: number;
+  /** One for each step, or none. */
+  values: number[];
+  unit: string;
 }
 
 export interface DatasetInfo {
@@ -36,7 +58,18 @@ export interface DatasetInfo {
   spacing: [number, number, number];
   /** Length of the box's diagonal, world units. */
   diagonal: number;
+  /** Name of the world unit; empty if the files do not tell. */
+  worldUnit: string;
   channels: ChannelInfo[];
+  times: TimesInfo;
+  state: 'stored' | 'loading' | 'loaded';
+  /** Only while the state is `loading`. */
+  loading?: LoadInfo;
+  /** Memory that the voxels of one time need. */
+  memoryBytes: number;
+  /** The resolution that is shown, among those in the files; the finest is 0. */
+  level: number;
+  levels: { dims: [number, number, number] }[];
 }
 
 export interface SessionInfo {
@@ -87,9 +120,11 @@ export const api = {
     const path = `datasets/${seg(id)}/gradient-histogram?channel=${channel}`;
     return { minimum: 0, ...(await call<Omit<Histogram, 'minimum'>>(path, { signal })) };
   },
-  createSession: (scene?: JsonObject) =>
+  /** Waits until the scene's data set has been loaded, which aborting `stop` also ends. */
+  createSession: (scene?: JsonObject, stop?: AbortSignal) =>
     call<SessionInfo>('sessions', {
       method: 'POST',
+      signal: stop,
       headers: { 'content-type': 'application/json' },
       body: JSON.stringify(scene ? { scene } : {}),
     }),

@@ -7,7 +7,11 @@ import type { Picked } from './pointer-pick';
 
 export type ConnectionState =
   | { kind: 'connecting' }
+  /** The server creates the session, which takes as long as loading its data set. */
+  | { kind: 'creating' }
   | { kind: 'connected' }
+  /** There is no session, because its data set cannot be loaded or is not wanted: create() begins one with another. */
+  | { kind: 'choosing' }
   /** `gone`: the server did not answer at the last attempt. `retryAt` is in Date.now() milliseconds. */
   | { kind: 'waiting'; gone: boolean; retryAt: number }
   /** The token is not, or no longer, valid: retrying cannot help. */
@@ -32,6 +36,8 @@ export interface ConnectionEvents {
 const kFirstDelayMs = 250;
 const kLongestDelayMs = 8000;
 const kPingMs = 5000;
+/** Answers to the creation of a session that are the same at the next attempt: the data set cannot be loaded. */
+const kHopeless = [413, 422, 500];
 const kSilenceMs = 15_000; // three unanswered pings: the connection is dead although it was never closed
 
 export const retryDelay = (attempt: number) => Math.min(kLongestDelayMs, kFirstDelayMs * 2 ** attempt);
@@ -43,6 +49,8 @@ export class Connection {
   private lastHeard = 0;
   private attempt = 0;
   private stopped = false;
+  private turn = 0;
+  private creation: AbortController | undefined;
 
   constructor(
     private readonly events: ConnectionEvents,
@@ -50,28 +58,58 @@ export class Connection {
   ) {}
 
   /** Connects now, without waiting for the next scheduled attempt. */
-  async open(): Promise<void> {
+  open(): Promise<void> {
+    return this.openWith(() => this.findSession());
+  }
+
+  /** Begins a new session with this scene and opens its stream. */
+  create(scene: JsonObject): Promise<void> {
+    this.session = undefined;
+    return this.openWith(() => this.newSession((stop) => api.createSession(scene, stop)));
+  }
+
+  /** Ends the creation of a session, if there is one: the state becomes `choosing`. */
+  cancelCreation(): void {
+    this.creation?.abort();
+  }
+
+  private async openWith(find: () => Promise<{ session: SessionInfo; fresh: boolean }>): Promise<void> {
+    const turn = ++this.turn; // a later call takes over
     clearTimeout(this.timer);
     this.close();
+    this.endCreation();
     this.stopped = false;
     this.events.onState({ kind: 'connecting' });
     try {
-      const { session, fresh } = await this.findSession();
-      if (!this.stopped) this.openStream(session, fresh);
+      const { session, fresh } = await find();
+      if (!this.stopped && turn === this.turn) this.openStream(session, fresh);
     } catch (error) {
-      if (error instanceof ApiError && (error.status === 401 || error.status === 403)) {
-        this.events.onState({ kind: 'refused' });
-      } else {
-        if (error instanceof ApiError) this.events.onProblem({ ...error.problem, detail: error.message });
-        this.retryLater(!(error instanceof ApiError));
-      }
+      if (turn === this.turn) this.openFailed(error);
     }
+  }
+
+  private endCreation(): void {
+    this.creation?.abort();
+    this.creation = undefined;
+  }
+
+  private openFailed(error: unknown): void {
+    const cancelled = this.creation?.signal.aborted;
+    const creating = this.creation !== undefined;
+    this.creation = undefined;
+    if (cancelled) return this.events.onState({ kind: 'choosing' });
+    if (!(error instanceof ApiError)) return this.retryLater(true);
+    if (error.status === 401 || error.status === 403) return this.events.onState({ kind: 'refused' });
+    this.events.onProblem({ ...error.problem, detail: error.message });
+    if (creating && kHopeless.includes(error.status)) this.events.onState({ kind: 'choosing' });
+    else this.retryLater(false);
   }
 
   /** Ends the stream for good. */
   stop(): void {
     this.stopped = true;
     clearTimeout(this.timer);
+    this.endCreation();
     this.close();
   }
 
@@ -99,22 +137,33 @@ export class Connection {
         this.session = undefined;
       }
     }
-    this.session = await this.createSession();
-    return { session: this.session, fresh: true };
+    return this.newSession((stop) => this.createSession(stop));
+  }
+
+  private async newSession(make: (stop: AbortSignal) => Promise<SessionInfo>) {
+    const creation = new AbortController();
+    this.creation = creation;
+    this.events.onState({ kind: 'creating' });
+    const session = await make(creation.signal);
+    if (this.creation === creation) {
+      this.creation = undefined;
+      this.session = session;
+    }
+    return { session, fresh: true };
   }
 
   /** Creates a session with the scene on screen, or with the default if the server refuses that scene. */
-  private async createSession(): Promise<SessionInfo> {
+  private async createSession(stop: AbortSignal): Promise<SessionInfo> {
     const scene = this.events.currentScene();
     if (scene) {
       try {
-        return await api.createSession(scene);
+        return await api.createSession(scene, stop);
       } catch (error) {
         if (!(error instanceof ApiError && [400, 404, 422].includes(error.status))) throw error;
         this.events.onProblem({ ...error.problem, detail: `The scene was reset: ${error.message}` });
       }
     }
-    return api.createSession();
+    return api.createSession(undefined, stop);
   }
 
   private openStream(session: SessionInfo, fresh: boolean): void {

@@ -25,8 +25,8 @@ export class Edits {
   private scheduled = false;
   private lastId = 0;
   private readonly inFlight = new Map<number, JsonObject>();
-  /** Time of sending of each patch that no picture has shown yet. */
-  private readonly sentAt = new Map<number, number>();
+  /** Each patch that has been sent and that no picture has shown yet, with the time of sending. */
+  private readonly unseen = new Map<number, { patch: JsonObject; sentAt: number }>();
 
   /** `send` returns false while there is no stream. */
   constructor(
@@ -49,7 +49,7 @@ export class Edits {
     while (this.waiting[0] && this.inFlight.size < kMostInFlight && this.send(this.lastId + 1, this.waiting[0])) {
       this.lastId += 1;
       this.inFlight.set(this.lastId, this.waiting[0]);
-      this.sentAt.set(this.lastId, this.now());
+      this.unseen.set(this.lastId, { patch: this.waiting[0], sentAt: this.now() });
       this.waiting.shift();
     }
   }
@@ -63,22 +63,28 @@ export class Edits {
   /** A picture that contains patches up to `id` has arrived. Returns the age of patch `id` in ms when first shown. */
   seen(id: number): number | undefined {
     this.answered(id);
-    const sent = this.sentAt.get(id);
-    for (const known of this.sentAt.keys()) if (known <= id) this.sentAt.delete(known);
-    return sent === undefined ? undefined : this.now() - sent;
+    const sent = this.unseen.get(id);
+    for (const known of this.unseen.keys()) if (known <= id) this.unseen.delete(known);
+    return sent && this.now() - sent.sentAt;
   }
 
   /** The server has refused the patch with this id: no picture will show it. */
   refused(id: number): void {
     this.inFlight.delete(id); // earlier ones may still wait
-    this.sentAt.delete(id);
+    this.unseen.delete(id);
     if (!this.scheduled) this.flush();
   }
 
   /** How long the oldest patch that no picture has shown yet has waited; undefined if there is none. */
   get waitedMs(): number | undefined {
-    const [oldest] = this.sentAt.values();
-    return oldest === undefined ? undefined : this.now() - oldest;
+    const [oldest] = this.unseen.values();
+    return oldest && this.now() - oldest.sentAt;
+  }
+
+  /** Whether an edit of this member of the scene waits to be shown in a picture. */
+  awaitsPicture(member: string): boolean {
+    const sent = [...this.unseen.values()].map(({ patch }) => patch);
+    return [...this.waiting, ...sent].some((patch) => member in patch);
   }
 
   /** Id of the newest patch sent; 0 for none. */
@@ -100,7 +106,7 @@ export class Edits {
   resend(): void {
     this.waiting = this.unconfirmed;
     this.inFlight.clear();
-    this.sentAt.clear();
+    this.unseen.clear();
     this.flush();
   }
 
@@ -108,6 +114,6 @@ export class Edits {
   forget(): void {
     this.waiting = [];
     this.inFlight.clear();
-    this.sentAt.clear();
+    this.unseen.clear();
   }
 }

@@ -12,7 +12,7 @@ const kFirst = [
   { path: ['image', 'background'], label: 'Background' },
 ];
 /** Fields not under "More settings": edited elsewhere, set from the window's size, or listed in kFirst. */
-const kElsewhere = new Set(['dataset', 'image.width', 'image.height', ...kFirst.map(({ path }) => path.join('.'))]);
+const kElsewhere = new Set(['dataset', 'time', 'image.width', 'image.height', ...kFirst.map(({ path }) => path.join('.'))]);
 
 const isList = (path: Path) => fieldAt(path).kind === 'list';
 

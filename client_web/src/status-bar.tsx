@@ -2,6 +2,8 @@
 // State of the connection and of the picture, along the lower edge.
 import { useEffect, useState } from 'preact/hooks';
 import type { ConnectionState } from './connection';
+import { stepOf } from './dataset-choice';
+import { percentOf } from './load-words';
 import { choicesOf } from './schema';
 import type { Store } from './store';
 
@@ -9,14 +11,27 @@ import type { Store } from './store';
 export function stateWords(state: ConnectionState): string {
   switch (state.kind) {
     case 'connecting':
+    case 'creating':
       return 'Connecting';
     case 'connected':
       return 'Connected';
+    case 'choosing':
+      return 'No data set is shown';
     case 'waiting':
       return state.gone ? 'Server unreachable' : 'Connection lost';
     case 'refused':
       return 'Not authorised: open the address that the server printed';
   }
+}
+
+/** What the server does with an edit that no picture shows yet. */
+function waitWords(store: Store): string {
+  if (store.choice.loading.value) return ''; // said by LoadCard
+  const dataset = store.datasets.find(store.scene.value?.dataset);
+  const load = dataset?.loading;
+  if (!load || load.time !== stepOf(dataset, store.scene.value)) return 'Rendering …';
+  const percent = percentOf(load);
+  return `Loading step ${load.time + 1}${percent === undefined ? '' : `, ${percent} %`} …`;
 }
 
 /** Seconds until the next attempt, counted down. */
@@ -71,7 +86,7 @@ export function StatusBar({ store }: { store: Store }) {
         )}
       </span>
       <span class="rendering" aria-live="polite">
-        {state.kind === 'connected' && store.wait.shown.value ? 'Rendering …' : ''}
+        {state.kind === 'connected' && store.wait.shown.value ? waitWords(store) : ''}
       </span>
       {frame && (
         <>

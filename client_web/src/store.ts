@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page's state as signals, and the only way to change the scene. It lies between the stream (connection.ts) and
 // the components, which read signals and call edit().
-import { batch, computed, signal } from '@preact/signals';
+import { batch, computed, effect, signal } from '@preact/signals';
 import { ApiError, api, type Capabilities, type Problem, type SessionInfo } from './api';
 import { applyEdit } from './apply-edit';
 import { Connection, type ConnectionState } from './connection';
+import { DatasetChoice } from './dataset-choice';
 import { DatasetList } from './dataset-list';
 import { Edits } from './edits';
 import { EditWait } from './edit-wait';
@@ -17,6 +18,7 @@ import { cameraPatch, type Camera } from './orbit-camera';
 import type { Scene } from './scene.generated';
 import { PointerPick } from './pointer-pick';
 import { sayPointer, type Path } from './schema';
+import { TimePlayer } from './time-player';
 import { ToastList } from './toast-list';
 
 const kSettleMs = 250;
@@ -51,6 +53,21 @@ export class Store {
   readonly wait = new EditWait(() => this.edits.waitedMs);
   /** What is visible under the pointer. */
   readonly pick = new PointerPick((id, { x, y }) => void this.link.send({ type: 'pick', id, x, y }));
+  readonly choice = new DatasetChoice(this.datasets, {
+    scene: () => this.scene.value,
+    state: () => this.connection.value,
+    edit: (patch) => this.edit(patch),
+    unanswered: () => this.edits.unconfirmed.some((patch) => 'dataset' in patch),
+    takeBack: (then) => this.takeBack(then),
+    create: (scene) => void this.link.create(scene),
+    cancelCreation: () => this.link.cancelCreation(),
+  });
+  readonly player = new TimePlayer({
+    count: () => this.datasets.shown.value?.times.count ?? 1,
+    step: () => this.scene.value?.time ?? 0,
+    arrived: () => !this.edits.awaitsPicture('time'),
+    go: (time) => this.edit({ time }),
+  });
   private readonly link: Connection;
   private revision = 0;
   private settleTimer: ReturnType<typeof setTimeout> | undefined;
@@ -60,7 +77,7 @@ export class Store {
   constructor(private readonly onFrame: (message: ArrayBuffer) => void) {
     this.link = new Connection(
       {
-        onState: (state) => (this.connection.value = state),
+        onState: (state) => this.receiveState(state),
         onHello: (session, capabilities, fresh) => void this.begin(session, capabilities, fresh),
         onFrame: (message) => this.onFrame(message),
         onScene: (revision, patch) => this.receiveScene(revision, patch),
@@ -72,6 +89,9 @@ export class Store {
       },
       this.remembered(),
     );
+    effect(() => {
+      if (this.wait.shown.value && this.player.isSeries) this.choice.watch(); // perhaps a step is loaded
+    });
   }
 
   start(): void {
@@ -125,7 +145,9 @@ export class Store {
       this.frame.value = header;
       this.meter.drawn(this.edits.seen(header.patch));
       this.wait.update();
+      if (!this.edits.awaitsPicture('dataset')) this.choice.settled();
     });
+    this.player.update();
   }
 
   retryNow(): void {
@@ -133,6 +155,13 @@ export class Store {
   }
 
   // --- the stream ---
+
+  private receiveState(state: ConnectionState): void {
+    this.connection.value = state;
+    if (state.kind === 'creating') this.choice.awaitFirst();
+    if (state.kind === 'choosing' || state.kind === 'refused') this.choice.settled();
+    if (state.kind === 'choosing') this.choice.watch();
+  }
 
   private async begin(session: SessionInfo, capabilities: Capabilities, fresh: boolean): Promise<void> {
     sessionStorage.setItem(kMemory, JSON.stringify(session));
@@ -146,6 +175,7 @@ export class Store {
     try {
       if (fresh || !this.datasets.shown.peek()) await this.datasets.load();
       await this.refresh();
+      if (!this.frame.peek()) this.choice.awaitFirst();
       this.applySize();
     } catch {
       // The stream is lost again; Connection reports that.
@@ -159,11 +189,16 @@ export class Store {
 
   private receiveScene(revision: number, patch: Json): void {
     this.revision = Math.max(this.revision, revision);
-    if (isObject(patch)) this.showScene(applyEdit(this.scene.peek() as Json | undefined, patch));
+    if (!isObject(patch)) return;
+    this.showScene(applyEdit(this.scene.peek() as Json | undefined, patch));
+    if ('dataset' in patch) void this.refresh();
   }
 
   private receiveProblem(problem: Problem, patch?: number): void {
     if (patch) this.edits.refused(patch);
+    this.player.stop();
+    const connected = this.connection.peek().kind === 'connected';
+    if (connected && !this.edits.awaitsPicture('dataset')) this.choice.settled();
     this.wait.update();
     const { detail, title, pointer = '' } = problem;
     const text = detail ?? title ?? 'The server reports an error.';
@@ -183,6 +218,7 @@ export class Store {
     if (!id) return;
     try {
       const { revision, scene } = await api.scene(id);
+      await this.datasets.measured(scene.dataset);
       if (revision < this.revision || !this.edits.settled) return this.refreshLater(); // an edit overtook the answer
       this.revision = revision;
       this.datasets.show(scene.dataset);
@@ -193,6 +229,13 @@ export class Store {
       // Connection reports a lost server.
       if (error instanceof ApiError) this.toasts.say(error.message);
     }
+  }
+
+  /** Takes back the edits that wait on the server, by leaving the stream on which they wait. */
+  private takeBack(then?: () => void): void {
+    this.edits.forget();
+    this.onRefreshed = then;
+    void this.link.open();
   }
 
   /** After a pause in edits, pings the server; receivePong() then learns that it has processed them. */

@@ -37,10 +37,12 @@ class FakeSocket {
 }
 
 /** A server as fetch sees it. */
-const server = { up: true, status: 0, sessions: new Set<string>(), created: [] as unknown[], refuseScene: false };
+const server = { up: true, status: 0, loads: false, sessions: new Set<string>(), created: [] as unknown[], refuseScene: false };
 
 async function fakeFetch(path: string, init?: RequestInit): Promise<Response> {
   if (!server.up) throw new TypeError('fetch failed');
+  if (init?.method === 'POST' && server.loads)
+    return new Promise((_, fail) => init.signal?.addEventListener('abort', () => fail(new DOMException('', 'AbortError'))));
   const answer = (status: number, body: unknown) => new Response(JSON.stringify(body), { status });
   if (server.status) return answer(server.status, { detail: 'no' });
   if (init?.method === 'POST') {
@@ -82,7 +84,7 @@ beforeEach(() => {
   vi.stubGlobal('WebSocket', FakeSocket);
   vi.stubGlobal('fetch', fakeFetch);
   vi.stubGlobal('document', { baseURI: 'https://host.example/prefix/' });
-  Object.assign(server, { up: true, status: 0, sessions: new Set(), created: [], refuseScene: false });
+  Object.assign(server, { up: true, status: 0, loads: false, sessions: new Set(), created: [], refuseScene: false });
   states.length = hellos.length = problems.length = FakeSocket.all.length = 0;
   scene = undefined;
 });
@@ -201,6 +203,46 @@ describe('the connection', () => {
     await settle();
     expect(lastState()).toEqual({ kind: 'refused' });
     await vi.advanceTimersByTimeAsync(60_000);
-    expect(states).toHaveLength(2);
+    expect(states.map(({ kind }) => kind)).toEqual(['connecting', 'creating', 'refused']);
+  });
+
+  it('lets the creation of a session be cancelled, and begins one with another scene', async () => {
+    server.loads = true;
+    const connection = connect();
+    void connection.open();
+    await settle();
+    expect(lastState()).toEqual({ kind: 'creating' });
+    connection.cancelCreation();
+    await settle();
+    expect(lastState()).toEqual({ kind: 'choosing' });
+    server.loads = false;
+    void connection.create({ dataset: 'b' });
+    await settle();
+    FakeSocket.last.hello('s1');
+    expect(server.created).toEqual([{ scene: { dataset: 'b' } }]);
+    expect(lastState()).toEqual({ kind: 'connected' });
+    expect(hellos).toEqual([{ id: 's1', fresh: true }]);
+  });
+
+  it('lets another scene be chosen while a session is being created', async () => {
+    server.loads = true;
+    const connection = connect();
+    void connection.open();
+    await settle();
+    server.loads = false;
+    void connection.create({ dataset: 'b' });
+    await settle();
+    FakeSocket.last.hello('s1');
+    expect(states.map(({ kind }) => kind)).toEqual(['connecting', 'creating', 'connecting', 'creating', 'connected']);
+  });
+
+  it('does not try again to load what cannot be loaded', async () => {
+    server.status = 413;
+    void connect().open();
+    await settle();
+    expect(problems).toEqual(['no']);
+    expect(lastState()).toEqual({ kind: 'choosing' });
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect(problems).toHaveLength(1);
   });
 });

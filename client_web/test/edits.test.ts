@@ -93,4 +93,20 @@ describe('edits', () => {
     edits.resend();
     expect(sent[2]).toEqual({ id: 3, patch: { b: 1 } });
   });
+
+  it('are known to wait for a picture, by the member that they change', () => {
+    const { edits, animationFrame } = setUp();
+    edits.push({ time: 1 });
+    expect(edits.awaitsPicture('time')).toBe(true);
+    animationFrame();
+    edits.push({ dataset: 'b' });
+    animationFrame();
+    edits.answered(2);
+    expect(edits.awaitsPicture('time')).toBe(true);
+    edits.seen(1);
+    expect(edits.awaitsPicture('time')).toBe(false);
+    expect(edits.awaitsPicture('dataset')).toBe(true);
+    edits.refused(2);
+    expect(edits.awaitsPicture('dataset')).toBe(false);
+  });
 });

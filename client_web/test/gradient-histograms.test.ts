@@ -1,17 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 import { describe, expect, it, vi } from 'vitest';
-import { ApiError, type DatasetInfo } from '../src/api';
+import { ApiError } from '../src/api';
 import { GradientHistograms } from '../src/gradient-histograms';
 import type { Histogram } from '../src/histogram';
+import { datasetInfo } from './dataset-info';
 
-const datasetOf = (id: string): DatasetInfo => ({
-  id,
-  title: id,
-  dims: [2, 2, 2],
-  spacing: [1, 1, 1],
-  diagonal: 3,
-  channels: [{ name: 'a' }, { name: 'b' }],
-});
+const datasetOf = (id: string) => datasetInfo(id, { channels: [{ name: 'a' }, { name: 'b' }] });
 const kHistogram: Histogram = { minimum: 0, maximum: 8, bins: [3, 1] };
 
 interface Question {

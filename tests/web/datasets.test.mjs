@@ -23,12 +23,17 @@ test('choosing another data set shows it', async () => {
   const four = await channels.count();
   assert.equal(four, 4);
   await page.locator('input[type=color].swatch').first().fill('#00ff00');
-  await page.getByRole('combobox', { name: 'Data set' }).selectOption('pair');
+  const list = page.getByRole('region', { name: 'Data set' }).getByRole('listitem');
+  assert.match(await list.nth(0).textContent(), /orbitals.*in memory.*48 × 48 × 48, 4 channels/);
+  assert.match(await list.nth(1).textContent(), /pair.*not loaded.*32 × 32 × 32, 2 channels/);
+  await list.nth(1).getByRole('button').click();
   await eventually(async () => (await channels.count()) === 2, 'the channels of the pair are not shown');
   assert.match(await page.locator('.dataset').textContent(), /32 × 32 × 32 voxels/);
   const second = await steadyPicture(page, 4);
   assert.ok(Math.max(...second.blocks) > 30, 'the pair is dark');
   assert.ok(difference(first, second) > 8, 'the picture is still the first');
   assert.notEqual(await page.locator('input[type=color].swatch').first().inputValue(), '#00ff00');
+  await eventually(async () => /in memory/.test(await list.nth(1).textContent()), 'the pair is not said to be loaded');
+  assert.equal(await list.nth(1).getByRole('button').getAttribute('aria-current'), 'true');
   assert.deepEqual(faults, []);
 });

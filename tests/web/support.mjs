@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shared by the browser tests: a server on a free port, a browser, and functions that analyse the picture.
 import { spawn, spawnSync } from 'node:child_process';
-import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
@@ -26,6 +26,35 @@ export function generateOrbitals(folder, name = 'orbitals.nrrd', options = ['--s
   const file = path.join(folder, name);
   const made = spawnSync(program, ['generate', 'orbitals', file, ...options], { encoding: 'utf8' });
   if (made.status !== 0) throw new Error(`generate ended with ${made.status}: ${made.stderr}`);
+  return file;
+}
+
+/** Writes a time series of cubes of `size` voxels: a ball that moves along x and grows. Returns the file. */
+export function writeSeries(folder, times = 6, size = 24, name = 'series.nrrd') {
+  const header = [
+    'NRRD0004',
+    'type: uint8',
+    'dimension: 4',
+    `sizes: ${size} ${size} ${size} ${times}`,
+    'kinds: domain domain domain time',
+    'spacings: 1 1 1 0.5',
+    'units: "mm" "mm" "mm" "s"',
+    'encoding: raw',
+  ];
+  const voxels = Buffer.alloc(size ** 3 * times);
+  for (let time = 0, at = 0; time < times; ++time) {
+    const share = times > 1 ? time / (times - 1) : 0;
+    const centre = size * (0.3 + 0.4 * share);
+    const radius = size * (0.15 + 0.13 * share);
+    for (let z = 0; z < size; ++z)
+      for (let y = 0; y < size; ++y)
+        for (let x = 0; x < size; ++x, ++at) {
+          const distance = Math.hypot(x - centre, y - size / 2, z - size / 2);
+          voxels[at] = Math.round(255 * Math.max(0, Math.min(1, radius + 1 - distance)));
+        }
+  }
+  const file = path.join(folder, name);
+  writeFileSync(file, Buffer.concat([Buffer.from(`${header.join('\n')}\n\n`, 'latin1'), voxels]));
   return file;
 }
 
