@@ -26,6 +26,12 @@
   X(Npy, "NumPy array", ".npy", "")                                                                 \
   X(Npz, "NumPy archive", ".npz", SCOLOPAX_LACKS_ZIP)                                               \
   X(Slc, "SLC", ".slc", "")
+  X(Raw, "raw", "name_XxYxZ_type.raw, .dat, .ivf", "")                                               \
+  X(Nifti, "NIfTI", ".nii, .nii.gz, .hdr + .img", "")                                                \
+  X(Nrrd, "NRRD", ".nrrd, .nhdr", "")                                                                \
+  X(Tiff, "TIFF", ".tif, .tiff", "")                                                                 \
+  X(VtkXml, "VTK XML", ".vti, .vtr, .pvti, .pvtr", "")                                               \
+  X(VtkLegacy, "VTK legacy", ".vtk", "")
 // clang-format on
 
 namespace scolopax::io {

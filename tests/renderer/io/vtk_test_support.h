@@ -109,4 +109,24 @@ inline VtkValues vtkRamp(int first, int count, int step = 1) {
   return values;
 }
 
+inline std::string vtkFileText(const std::string& type, const std::string& attributes,
+                               const std::string& inside, const std::string& behind = "") {
+  return "<?xml version=\"1.0\"?>\n<!-- a > b's -->\n<VTKFile type=\"" + type + "\" version=\"1.0\"" +
+         attributes + ">\n" + inside + behind + "</VTKFile>\n";
+}
+
+inline std::string vtkArrayText(const std::string& type, const std::string& name, const std::string& more,
+                                const std::string& text = "") {
+  return "<DataArray type=\"" + type + "\" Name=\"" + name + "\" " + more + ">\n  " + text +
+         "\n</DataArray>\n";
+}
+
+/// An image of 2x3x2 points, whose arrays are `points` and `cells`.
+inline std::string vtkImageText(const std::string& points, const std::string& cells = "",
+                                const std::string& attributes = "") {
+  return "<ImageData WholeExtent=\"0 1 0 2 0 1\" " + attributes +
+         "><Piece Extent=\"0 1 0 2 0 1\"><PointData>" + points + "</PointData><CellData>" + cells +
+         "</CellData></Piece></ImageData>";
+}
+
 }  // namespace scolopax::io
