@@ -29,6 +29,7 @@
   X(Raw, "raw", "name_XxYxZ_type.raw, .dat, .ivf", "")                                               \
   X(Nifti, "NIfTI", ".nii, .nii.gz, .hdr + .img", "")                                                \
   X(Nrrd, "NRRD", ".nrrd, .nhdr", "")                                                                \
+  X(Dicom, "DICOM", ".dcm, a folder of such files", SCOLOPAX_LACKS_GDCM)                             \
   X(Tiff, "TIFF", ".tif, .tiff", "")                                                                 \
   X(VtkXml, "VTK XML", ".vti, .vtr, .pvti, .pvtr", "")                                               \
   X(VtkLegacy, "VTK legacy", ".vtk", "")
