@@ -19,20 +19,15 @@
   X(Nifti, "NIfTI", ".nii, .nii.gz, .hdr + .img", "")                                               \
   X(Nrrd, "NRRD", ".nrrd, .nhdr", "")                                                               \
   X(MetaImage, "MetaImage", ".mha, .mhd", "")                                                       \
+  X(Dicom, "DICOM", ".dcm, a folder of such files", SCOLOPAX_LACKS_GDCM)                            \
   X(Tiff, "TIFF", ".tif, .tiff", "")                                                                \
   X(Zarr, "OME-Zarr", "folders .zarr, .zarr.zip, .ozx, http(s)://", "")                             \
   X(Hdf5, "HDF5", ".h5, .hdf5, .hdf", SCOLOPAX_LACKS_HDF5)                                          \
   X(VtkXml, "VTK XML", ".vti, .vtr, .pvti, .pvtr", "")                                              \
+  X(VtkLegacy, "VTK legacy", ".vtk", "")                                                            \
   X(Npy, "NumPy array", ".npy", "")                                                                 \
   X(Npz, "NumPy archive", ".npz", SCOLOPAX_LACKS_ZIP)                                               \
   X(Slc, "SLC", ".slc", "")
-  X(Raw, "raw", "name_XxYxZ_type.raw, .dat, .ivf", "")                                               \
-  X(Nifti, "NIfTI", ".nii, .nii.gz, .hdr + .img", "")                                                \
-  X(Nrrd, "NRRD", ".nrrd, .nhdr", "")                                                                \
-  X(Dicom, "DICOM", ".dcm, a folder of such files", SCOLOPAX_LACKS_GDCM)                             \
-  X(Tiff, "TIFF", ".tif, .tiff", "")                                                                 \
-  X(VtkXml, "VTK XML", ".vti, .vtr, .pvti, .pvtr", "")                                               \
-  X(VtkLegacy, "VTK legacy", ".vtk", "")
 // clang-format on
 
 namespace scolopax::io {
