@@ -69,7 +69,7 @@ class ZarrZip : public ZarrStore {
       if (!first.empty() && (names.empty() || names.back() != first)) names.emplace_back(first);
     });
     std::ranges::sort(names);
-    names.erase(std::ranges::unique(names).begin(), names.end());
+    names.erase(std::unique(names.begin(), names.end()), names.end());
     return names;
   }
 

@@ -130,7 +130,7 @@ TEST(Zarr3Files, AxesThatTheMetadataForgotAreTakenFromTheArray) {
   EXPECT_EQ(volume.levels[1].spacing(), glm::dvec3(20));
   EXPECT_EQ(volume.worldUnit, "nm");
   constexpr double kSums[] = {2140879, 2140689, 0};
-  for (const std::size_t time : {0, 1, 6}) {
+  for (const std::size_t time : {0u, 1u, 6u}) {
     const LoadedPart part = load(*file, {.level = 1, .time = time}, kZarr3Load);
     double sum = 0;
     for (const std::int16_t voxel : part.channels[0].voxels.as<std::int16_t>()) sum += voxel;

@@ -84,7 +84,7 @@ TEST_F(ZarrHttpTest, AnImageLoads) {
 TEST_F(ZarrHttpTest, MissingChunksHaveTheFillValue) {
   values_.erase("0/1.0.1");
   auto expected = rampUpTo(60);
-  for (const std::size_t i : {43, 44, 48, 49, 53, 54, 58, 59}) expected[i] = 0;
+  for (const std::size_t i : {43u, 44u, 48u, 49u, 53u, 54u, 58u, 59u}) expected[i] = 0;
   EXPECT_EQ(values(url()), expected);
 }
 
