@@ -12,39 +12,41 @@ namespace scolopax::io {
 namespace fs = std::filesystem;
 namespace {
 
-using Extent = std::vector<std::uint64_t>;
+using ArrayExtent = std::vector<std::uint64_t>;
 
-constexpr std::uint64_t kPieceBytes = std::uint64_t(16) << 20;
+constexpr std::uint64_t kArrayPieceBytes = std::uint64_t(16) << 20;
 
-std::uint64_t productOf(const Extent& extent, std::uint64_t bytes) {
+std::uint64_t arrayProduct(const ArrayExtent& extent, std::uint64_t bytes) {
   for (const std::uint64_t side : extent) bytes = saturatingProduct(bytes, side);
   return bytes;
 }
 
 /// Whole chunks, as many as fit in a piece, the fastest dimensions first.
-Extent blockShape(const Extent& count, const Extent& chunk, std::uint64_t numberBytes) {
-  Extent shape(count.size());
+ArrayExtent arrayBlock(const ArrayExtent& count, const ArrayExtent& chunk, std::uint64_t numberBytes) {
+  ArrayExtent shape(count.size());
   for (std::size_t d = 0; d < count.size(); ++d) shape[d] = std::clamp<std::uint64_t>(chunk[d], 1, count[d]);
   for (std::size_t d = count.size(); d-- > 0;) {
-    const std::uint64_t times = std::max<std::uint64_t>(1, kPieceBytes / productOf(shape, numberBytes));
+    const std::uint64_t times =
+        std::max<std::uint64_t>(1, kArrayPieceBytes / arrayProduct(shape, numberBytes));
     shape[d] = std::min(count[d], saturatingProduct(shape[d], times));
   }
   return shape;
 }
 
 /// The same, cut along the slowest dimensions until it is a piece: for large chunks.
-Extent pieceShape(Extent shape, std::uint64_t numberBytes) {
+ArrayExtent arrayPiece(ArrayExtent shape, std::uint64_t numberBytes) {
   for (std::uint64_t& side : shape) {
-    const std::uint64_t rowBytes = productOf(shape, numberBytes) / side;
-    side = std::clamp<std::uint64_t>(kPieceBytes / rowBytes, 1, side);
+    const std::uint64_t rowBytes = arrayProduct(shape, numberBytes) / side;
+    side = std::clamp<std::uint64_t>(kArrayPieceBytes / rowBytes, 1, side);
   }
   return shape;
 }
 
 /// Calls use(first, count) for every box of `shape` in a region, the last dimension fastest.
 template <class Use>
-void forEachBox(const Extent& regionFirst, const Extent& regionCount, const Extent& shape, Use&& use) {
-  Extent at(shape.size(), 0), first(shape.size()), count(shape.size());
+void forEachArrayBox(const ArrayExtent& regionFirst, const ArrayExtent& regionCount, const ArrayExtent& shape,
+                     Use&& use) {
+  ArrayExtent at(shape.size(), 0), first(shape.size()), count(shape.size());
   for (;;) {
     for (std::size_t d = 0; d < shape.size(); ++d) {
       first[d] = regionFirst[d] + at[d];
@@ -60,24 +62,36 @@ void forEachBox(const Extent& regionFirst, const Extent& regionCount, const Exte
   }
 }
 
+/// What must be unpacked for a slab, at most: chunks may reach into times and channels that are not wanted.
+std::uint64_t arrayUnpackedBytes(const ArraySlab& slab) {
+  constexpr std::uint64_t kMostTimes = 64;
+  std::uint64_t times = 1;
+  for (std::size_t d = 0; d < slab.dims.size(); ++d)
+    if (slab.count[d] == 1) times = saturatingProduct(times, slab.dims[d]);
+  return saturatingProduct(arrayProduct(slab.count, sizeBytes(slab.type)), std::min(times, kMostTimes));
+}
+
 /// In the child: sends an index, the box's first and count, and its numbers.
-void sendSlab(const Sender& sender, std::uint64_t index, const ArraySlab& slab, const OpenArray& array) {
+void sendArraySlab(const Sender& sender, std::uint64_t index, const ArraySlab& slab, const OpenArray& array) {
   const std::uint64_t numberBytes = sizeBytes(slab.type);
-  const Extent block = blockShape(slab.count, array.chunk, numberBytes);
-  const Extent piece = pieceShape(block, numberBytes);
-  std::vector<std::byte> bytes(std::size_t(productOf(piece, numberBytes)));
-  forEachBox(slab.first, slab.count, block, [&](const Extent& blockFirst, const Extent& blockCount) {
-    forEachBox(blockFirst, blockCount, piece, [&](const Extent& first, const Extent& count) {
-      array.read(first, count, bytes.data());
-      sender.send({std::as_bytes(std::span(&index, 1)), std::as_bytes(std::span(first)),
+  const ArrayExtent block = arrayBlock(slab.count, array.chunk, numberBytes);
+  const ArrayExtent piece = arrayPiece(block, numberBytes);
+  std::vector<std::byte> bytes(std::size_t(arrayProduct(piece, numberBytes)));
+  forEachArrayBox(
+      slab.first, slab.count, block, [&](const ArrayExtent& blockFirst, const ArrayExtent& blockCount) {
+        forEachArrayBox(
+            blockFirst, blockCount, piece, [&](const ArrayExtent& first, const ArrayExtent& count) {
+              array.read(first, count, bytes.data());
+              sender.send(
+                  {std::as_bytes(std::span(&index, 1)), std::as_bytes(std::span(first)),
                    std::as_bytes(std::span(count)),
-                   std::span<const std::byte>(bytes).first(std::size_t(productOf(count, numberBytes)))});
-    });
-  });
+                   std::span<const std::byte>(bytes).first(std::size_t(arrayProduct(count, numberBytes)))});
+            });
+      });
 }
 
 /// Takes one number off the front of a message.
-std::uint64_t takeNumber(std::span<const std::byte>& bytes) {
+std::uint64_t takeArrayNumber(std::span<const std::byte>& bytes) {
   std::uint64_t number = 0;
   if (bytes.size() < sizeof(number)) failBadInput("expected more bytes from the library's process");
   std::memcpy(&number, bytes.data(), sizeof(number));
@@ -86,11 +100,11 @@ std::uint64_t takeNumber(std::span<const std::byte>& bytes) {
 }
 
 /// The box of a message that follows the slab's index. The child may be damaged, so all is checked.
-ArrayBox boxOf(const std::string& file, const ArraySlab& slab, std::span<const std::byte> message) {
+ArrayBox arrayBoxOf(const std::string& file, const ArraySlab& slab, std::span<const std::byte> message) {
   const std::size_t rank = slab.dims.size();
-  Extent first(rank), count(rank);
-  for (std::uint64_t& value : first) value = takeNumber(message);
-  for (std::uint64_t& value : count) value = takeNumber(message);
+  ArrayExtent first(rank), count(rank);
+  for (std::uint64_t& value : first) value = takeArrayNumber(message);
+  for (std::uint64_t& value : count) value = takeArrayNumber(message);
   std::uint64_t bytes = sizeBytes(slab.type);
   std::vector<std::ptrdiff_t> strides(rank);
   for (std::size_t d = rank; d-- > 0;) {
@@ -145,21 +159,21 @@ void readSlabs(const OpenArrayFile& open, const fs::path& path, const std::vecto
   std::uint64_t chunkBytes = 0, bytes = 0;
   for (const ArraySlab& slab : slabs) {
     chunkBytes = std::max(chunkBytes, slab.chunkBytes);
-    bytes = saturatingSum(bytes, productOf(slab.count, sizeBytes(slab.type)));
+    bytes = saturatingSum(bytes, arrayUnpackedBytes(slab));
   }
   // Unpacked, and once more while it is unpacked.
   loading.checkMemory(file + ": a chunk", saturatingProduct(2, chunkBytes));
   ApartLimits limits;
   limits.memoryBytes = saturatingSum(limits.memoryBytes, saturatingProduct(3, chunkBytes));
-  limits.computing += std::chrono::seconds(std::min<std::uint64_t>(bytes >> 20, 1'000'000));  // 1 MiB/s
+  limits.computing = std::chrono::seconds(8 + std::min<std::uint64_t>(bytes >> 23, 1'000'000));  // 8 MiB/s
   const auto work = [&](const Sender& sender) {
     const OpenArrays openArray = open(path);
-    for (std::size_t i = 0; i < slabs.size(); ++i) sendSlab(sender, i, slabs[i], openArray(slabs[i]));
+    for (std::size_t i = 0; i < slabs.size(); ++i) sendArraySlab(sender, i, slabs[i], openArray(slabs[i]));
   };
   const auto receive = [&](std::span<const std::byte> message) {
-    const std::uint64_t index = takeNumber(message);
+    const std::uint64_t index = takeArrayNumber(message);
     if (index >= slabs.size()) failBadInput(file + ": is damaged (its library crashed)");
-    take(std::size_t(index), boxOf(file, slabs[std::size_t(index)], message));
+    take(std::size_t(index), arrayBoxOf(file, slabs[std::size_t(index)], message));
   };
   runApart(file, limits, loading.stop(), work,
            {receive, [&](const std::string& line) { loading.warn(line); }});

@@ -16,7 +16,7 @@ constexpr std::size_t kMostArrayNodes = 200'000;
 constexpr std::uint64_t kMostArrayTreeBytes = std::uint64_t(256) << 20;
 
 /// Turns plain values, texts, vectors and what has parts into bytes.
-struct Packer {
+struct ArrayPacker {
   std::vector<std::byte> bytes = {};
 
   template <class T>
@@ -30,12 +30,12 @@ struct Packer {
   void operator()(Sequence& sequence) {
     std::uint64_t count = sequence.size();
     (*this)(count);
-    for (auto& item : sequence) visit(*this, item);
+    for (auto& item : sequence) visitArray(*this, item);
   }
 };
 
 /// The reverse. The bytes come from a process in which a library may have overwritten anything.
-struct Unpacker {
+struct ArrayUnpacker {
   std::span<const std::byte> bytes;
 
   template <class T>
@@ -55,22 +55,22 @@ struct Unpacker {
     (*this)(count);
     if (count > bytes.size()) failBadInput("expected more bytes from the library's process");
     sequence.resize(std::size_t(count));
-    for (auto& item : sequence) visit(*this, item);
+    for (auto& item : sequence) visitArray(*this, item);
   }
 };
 
 template <class Archive, class T>
-void visit(Archive& archive, T& value) {
+void visitArray(Archive& archive, T& value) {
   archive(value);
 }
 template <class Archive>
-void visit(Archive& archive, ArrayAttribute& attribute) {
+void visitArray(Archive& archive, ArrayAttribute& attribute) {
   archive(attribute.name);
   archive(attribute.numbers);
   archive(attribute.texts);
 }
 template <class Archive>
-void visit(Archive& archive, ArrayNode& node) {
+void visitArray(Archive& archive, ArrayNode& node) {
   archive(node.path);
   archive(node.isGroup);
   archive(node.dims);
@@ -127,9 +127,9 @@ std::string parentOf(const std::string& path) {
 std::string lastOf(const std::string& path) { return path.substr(path.rfind('/') + 1); }
 
 void sendNode(const Sender& sender, const ArrayNode& node) {
-  Packer packer;
+  ArrayPacker packer;
   ArrayNode copy = node;
-  visit(packer, copy);
+  visitArray(packer, copy);
   sender.send({packer.bytes});
 }
 
@@ -144,11 +144,12 @@ ArrayTree scanApart(const std::filesystem::path& path, const Warn& warn, const s
       throw Error(ErrorCode::tooLarge, file + ": expected at most " + std::to_string(kMostArrayNodes) +
                                            " groups and arrays with " + byteCount(kMostArrayTreeBytes) +
                                            " of attributes, found more");
-    Unpacker unpacker{bytes};
-    visit(unpacker, tree.nodes.emplace_back());
+    ArrayUnpacker unpacker{bytes};
+    visitArray(unpacker, tree.nodes.emplace_back());
     tree.byPath.emplace(tree.nodes.back().path, tree.nodes.size() - 1);
   };
-  runApart(file, {}, stop, scan, {receive, warn});
+  // In which a hundred thousand arrays can be found.
+  runApart(file, {.computing = std::chrono::seconds(8)}, stop, scan, {receive, warn});
   return tree;
 }
 

@@ -22,6 +22,7 @@
   X(Dicom, "DICOM", ".dcm, a folder of such files", SCOLOPAX_LACKS_GDCM)                            \
   X(Tiff, "TIFF", ".tif, .tiff", "")                                                                \
   X(Zarr, "OME-Zarr", "folders .zarr, .zarr.zip, .ozx, http(s)://", "")                             \
+  X(Imaris, "Imaris", ".ims", SCOLOPAX_LACKS_HDF5)                                                  \
   X(Hdf5, "HDF5", ".h5, .hdf5, .hdf", SCOLOPAX_LACKS_HDF5)                                          \
   X(VtkXml, "VTK XML", ".vti, .vtr, .pvti, .pvtr", "")                                              \
   X(VtkLegacy, "VTK legacy", ".vtk", "")                                                            \

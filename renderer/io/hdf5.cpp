@@ -36,7 +36,7 @@ namespace {
 constexpr std::uint64_t kMostHdf5Channels = 4096, kMostHdf5Times = 1 << 24;
 
 /// The letters x, y, z, t and c that the file gives the dimensions, one each; "" if it does not.
-std::string statedRoles(const ArrayNode& node) {
+std::string statedHdf5Roles(const ArrayNode& node) {
   std::string roles;
   if (const ArrayAttribute* labels = node.find("DIMENSION_LABELS"))
     for (const std::string& label : labels->texts) roles += lowerCase(label.substr(0, 1));
@@ -55,8 +55,8 @@ std::string statedRoles(const ArrayNode& node) {
 }
 
 /// What each dimension is; "" if the array cannot be a volume. docs/files.md states the rule.
-std::string rolesOf(const ArrayNode& node, FourthAxis fourthAxis) {
-  if (std::string stated = statedRoles(node); !stated.empty()) return stated;
+std::string hdf5Roles(const ArrayNode& node, FourthAxis fourthAxis) {
+  if (std::string stated = statedHdf5Roles(node); !stated.empty()) return stated;
   if (node.dims.size() == 2) return "yx";
   if (node.dims.size() == 3) return "zyx";
   if (node.dims.size() != 4) return "";
@@ -74,7 +74,7 @@ struct Hdf5Spacing {
 };
 
 /// What a node itself says of its voxels' sizes.
-Hdf5Spacing spacingAt(const ArrayNode& node) {
+Hdf5Spacing hdf5SpacingAt(const ArrayNode& node) {
   static constexpr std::pair<const char*, const char*> kNames[] = {{"element_size_um", "um"},
                                                                    {"voxel_size_um", "um"},
                                                                    {"voxel_size", ""},
@@ -93,7 +93,7 @@ class Hdf5Spacings {
  public:
   explicit Hdf5Spacings(const ArrayTree& tree) {
     for (const ArrayNode& node : tree.nodes) {
-      Hdf5Spacing spacing = spacingAt(node);
+      Hdf5Spacing spacing = hdf5SpacingAt(node);
       if (!spacing.sizes.empty())
         known_.emplace(node.isGroup ? Key(node.path, {}) : Key(parentOf(node.path), node.dims), spacing);
     }
@@ -101,7 +101,7 @@ class Hdf5Spacings {
   /// That of the array, else of an array of the same size in its group (a label map's image), else of the
   /// group.
   Hdf5Spacing of(const ArrayNode& node) const {
-    Hdf5Spacing spacing = spacingAt(node);
+    Hdf5Spacing spacing = hdf5SpacingAt(node);
     const std::string group = parentOf(node.path);
     for (const Key& key : {Key(group, node.dims), Key(group, {})})
       if (const auto found = known_.find(key); spacing.sizes.empty() && found != known_.end())
@@ -115,7 +115,7 @@ class Hdf5Spacings {
 };
 
 /// The sizes are those of all dimensions, or of the spatial ones alone.
-glm::dvec3 spacingAlong(std::string_view roles, const std::vector<double>& sizes) {
+glm::dvec3 hdf5SpacingAlong(std::string_view roles, const std::vector<double>& sizes) {
   std::string axes(roles);
   if (sizes.size() != axes.size()) std::erase_if(axes, [](char role) { return role == 't' || role == 'c'; });
   glm::dvec3 spacing(1);
@@ -129,7 +129,7 @@ glm::dvec3 spacingAlong(std::string_view roles, const std::vector<double>& sizes
   return spacing;
 }
 
-bool isLabelMap(const ArrayNode& node) {
+bool isHdf5LabelMap(const ArrayNode& node) {
   const std::string name = lowerCase(lastOf(node.path));
   const bool integer = node.type != StoredType::f32 && node.type != StoredType::f64;
   return integer && (name == "label" || name == "labels" || name == "segmentation");
@@ -140,7 +140,7 @@ VolumeInfo describeHdf5(const Hdf5File& file, const ArrayNode& node, const std::
   const std::string where = file.name + ":" + cleanText(node.path);
   VolumeInfo volume{.path = node.path};
   Grid grid{dimsOf(where, node, roles)};
-  const glm::dvec3 sizes = spacingAlong(roles, spacing.sizes);
+  const glm::dvec3 sizes = hdf5SpacingAlong(roles, spacing.sizes);
   for (int axis = 0; axis < 3; ++axis) grid.worldFromVoxel[axis][axis] = sizes[axis];
   volume.levels = {grid};
   volume.worldUnit = spacing.unit;
@@ -152,7 +152,7 @@ VolumeInfo describeHdf5(const Hdf5File& file, const ArrayNode& node, const std::
                                             std::to_string(times));
   volume.times.count = std::size_t(times);
   ChannelInfo channel{.type = *node.type};
-  channel.look.labels = isLabelMap(node);
+  channel.look.labels = isHdf5LabelMap(node);
   volume.channels.assign(std::size_t(channels), channel);
   return volume;
 }
@@ -185,7 +185,7 @@ class Hdf5Volumes {
   void add(const ArrayNode& node) {
     constexpr std::size_t kMostVolumes = 4096, kMostRefused = 16;
     const bool empty = std::ranges::find(node.dims, 0U) != node.dims.end();
-    const std::string roles = node.type && !empty ? rolesOf(node, file_.options.fourthAxis) : "";
+    const std::string roles = node.type && !empty ? hdf5Roles(node, file_.options.fourthAxis) : "";
     try {
       const std::string where = file_.name + ":" + cleanText(node.path);
       if (!node.problem.empty() && node.dims.size() != 1)
@@ -229,6 +229,8 @@ VolumeFile openHdf5(const fs::path& path, const OpenOptions& options) {
   requireRegularFile(path);
   const auto scan = [&](const Sender& sender) { scanHdf5(path, sender); };
   const Hdf5File file{path, shown(path), scanApart(path, options.warn, options.stop, scan), options};
+  for (const auto& openLayout : {openImarisLayout})
+    if (auto volumes = openLayout(file)) return std::move(*volumes);
   return openPlainHdf5(file);
 }
 #endif
