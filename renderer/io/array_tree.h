@@ -34,7 +34,7 @@ struct ArrayNode {
   std::optional<StoredType> type = {};     ///< none if it is not numbers
   std::uint64_t chunkBytes = 0;            ///< of an unpacked chunk; 0 if it is not in chunks
   std::string problem = {};                ///< why its values cannot be had, after its path; "" if they can
-  std::vector<double> values = {};         ///< NetCDF only: of a coordinate
+  std::vector<double> values = {};         ///< only of coordinates and scales
   std::vector<ArrayAttribute> attributes = {};
 
   const ArrayAttribute* find(std::string_view attribute) const;

@@ -24,6 +24,7 @@
   X(Zarr, "OME-Zarr", "folders .zarr, .zarr.zip, .ozx, http(s)://", "")                             \
   X(Imaris, "Imaris", ".ims", SCOLOPAX_LACKS_HDF5)                                                  \
   X(OpenPmd, "openPMD", ".h5", SCOLOPAX_LACKS_HDF5)                                                 \
+  X(Minc, "MINC", ".mnc", SCOLOPAX_LACKS_HDF5)                                                      \
   X(Netcdf, "NetCDF", ".nc, .nc4, .cdf", SCOLOPAX_LACKS_NETCDF)                                     \
   X(Hdf5, "HDF5", ".h5, .hdf5, .hdf", SCOLOPAX_LACKS_HDF5)                                          \
   X(VtkXml, "VTK XML", ".vti, .vtr, .pvti, .pvtr", "")                                              \

@@ -229,7 +229,7 @@ VolumeFile openHdf5(const fs::path& path, const OpenOptions& options) {
   requireRegularFile(path);
   const auto scan = [&](const Sender& sender) { scanHdf5(path, sender); };
   const Hdf5File file{path, shown(path), scanApart(path, options.warn, options.stop, scan), options};
-  for (const auto& openLayout : {openImarisLayout, openPmdLayout})
+  for (const auto& openLayout : {openImarisLayout, openPmdLayout, openMincLayout})
     if (auto volumes = openLayout(file)) return std::move(*volumes);
   return openPlainHdf5(file);
 }

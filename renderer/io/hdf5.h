@@ -27,5 +27,6 @@ struct Hdf5File {
 /// None if the layout is another.
 std::optional<VolumeFile> openImarisLayout(const Hdf5File& file);
 std::optional<VolumeFile> openPmdLayout(const Hdf5File& file);
+std::optional<VolumeFile> openMincLayout(const Hdf5File& file);
 
 }  // namespace scolopax::io

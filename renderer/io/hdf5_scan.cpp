@@ -88,6 +88,19 @@ herr_t addHdf5Link(hid_t, const char* name, const H5L_info_t* info, void* entrie
   return 0;
 }
 
+/// The values of the small arrays by which MINC scales an image.
+std::vector<double> hdf5Values(hid_t dataset, const ArrayNode& node) {
+  constexpr std::uint64_t kMostValues = 1 << 16;
+  const std::string name = lastOf(node.path);
+  if ((name != "image-min" && name != "image-max") || !node.type || !node.problem.empty()) return {};
+  std::uint64_t count = 1;
+  for (const std::uint64_t side : node.dims) count = saturatingProduct(count, side);
+  if (count > kMostValues || node.chunkBytes > kMostHdf5AttributeBytes) return {};
+  std::vector<double> values(static_cast<std::size_t>(count));
+  const bool read = H5Dread(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) >= 0;
+  return read ? values : std::vector<double>();
+}
+
 void describeHdf5Dataset(hid_t dataset, ArrayNode& node) {
   const Hdf5Id space(H5Dget_space(dataset)), type(H5Dget_type(dataset));
   const Hdf5Id creation(H5Dget_create_plist(dataset));
@@ -96,11 +109,13 @@ void describeHdf5Dataset(hid_t dataset, ArrayNode& node) {
   if (rank > 0) node.dims.assign(dims.begin(), dims.begin() + rank);
   node.type = hdf5StoredType(type);
   node.problem = hdf5Problem(dataset);
-  if (H5Pget_layout(creation) != H5D_CHUNKED) return;
-  node.chunkBytes = H5Tget_size(type);
-  const int chunkRank = H5Pget_chunk(creation, H5S_MAX_RANK, chunk.data());
-  for (int d = 0; d < chunkRank; ++d)
-    node.chunkBytes = saturatingProduct(node.chunkBytes, chunk[std::size_t(d)]);
+  if (H5Pget_layout(creation) == H5D_CHUNKED) {
+    node.chunkBytes = H5Tget_size(type);
+    const int chunkRank = H5Pget_chunk(creation, H5S_MAX_RANK, chunk.data());
+    for (int d = 0; d < chunkRank; ++d)
+      node.chunkBytes = saturatingProduct(node.chunkBytes, chunk[std::size_t(d)]);
+  }
+  node.values = hdf5Values(dataset, node);
 }
 
 /// Where the object lies in the file, so that it is seen once.
