@@ -51,20 +51,27 @@ export function App({ store, attach }: { store: Store; attach(view: FrameView): 
       </main>
       <aside id="panel" class="panel" hidden={!panel} aria-label="Settings">
         <DatasetPanel store={store} />
-        <section class="group" aria-labelledby="channels-title">
-          <h3 id="channels-title">Channels</h3>
-          {channels.map((_, index) => (
-            <ChannelCard
-              key={`${key} ${index}`}
-              store={store}
-              index={index}
-              open={channels.length <= kOpenChannels || index === 0}
-            />
-          ))}
-        </section>
-        <SettingsPanel store={store} />
-        <CameraPanel store={store} />
-        <ListSections store={store} />
+        {store.scene.value && (
+          <>
+            <section class="group" aria-labelledby="channels-title">
+              <h3 id="channels-title">Channels</h3>
+              {channels.length === 0 && store.choice.loading.value && (
+                <p class="note">They are shown when the data set has been loaded.</p>
+              )}
+              {channels.map((_, index) => (
+                <ChannelCard
+                  key={`${key} ${index}`}
+                  store={store}
+                  index={index}
+                  open={channels.length <= kOpenChannels || index === 0}
+                />
+              ))}
+            </section>
+            <SettingsPanel store={store} />
+            <CameraPanel store={store} />
+            <ListSections store={store} />
+          </>
+        )}
       </aside>
     </div>
   );

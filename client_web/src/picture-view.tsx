@@ -53,7 +53,9 @@ export function PictureView({ store, attach }: { store: Store; attach(view: Fram
       style={{ background: store.scene.value?.image?.background ?? '#000' }}
     >
       <canvas ref={canvas} width={1} height={1} />
-      {!store.frame.value && store.connection.value.kind !== 'choosing' && <p class="picture-wait">Waiting for the first picture …</p>}
+      {!store.frame.value && !store.choice.loading.value && store.connection.value.kind !== 'choosing' && (
+        <p class="picture-wait">Waiting for the first picture …</p>
+      )}
     </div>
   );
 }

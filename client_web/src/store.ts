@@ -56,7 +56,10 @@ export class Store {
   readonly choice = new DatasetChoice(this.datasets, {
     scene: () => this.scene.value,
     state: () => this.connection.value,
-    edit: (patch) => this.edit(patch),
+    edit: (patch) => {
+      this.player.stop();
+      this.edit(patch);
+    },
     unanswered: () => this.edits.unconfirmed.some((patch) => 'dataset' in patch),
     takeBack: (then) => this.takeBack(then),
     create: (scene) => void this.link.create(scene),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Below the picture of a time series: which step is shown, and the controls that play it.
-import { useEffect } from 'preact/hooks';
+import { useEffect, useRef } from 'preact/hooks';
 import { shortNumber } from './controls';
 import { kRates } from './time-player';
 import type { Store } from './store';
@@ -33,17 +33,19 @@ interface IconButtonProps {
   icon: keyof typeof kIcons;
   label: string;
   onClick(): void;
+  disabled?: boolean;
   pressed?: boolean;
   keys?: string;
 }
 
-function IconButton({ icon, label, onClick, pressed, keys }: IconButtonProps) {
+function IconButton({ icon, label, onClick, disabled, pressed, keys }: IconButtonProps) {
   return (
     <button
       type="button"
       aria-label={label}
       aria-pressed={pressed}
       aria-keyshortcuts={keys}
+      disabled={disabled}
       title={keys ? `${label} (${keys})` : label}
       onClick={onClick}
     >
@@ -60,26 +62,38 @@ export function TimePanel({ store }: { store: Store }) {
 
 function TimeControls({ store }: { store: Store }) {
   const { player } = store;
-  const { count, step } = player;
-  const { values = [], unit = '' } = store.datasets.shown.value?.times ?? {};
+  const { count } = player;
+  const shown = store.datasets.shown.value;
+  // While another data set is loaded, the picture stays, and with it the step.
+  const disabled = store.scene.value?.dataset !== shown?.id;
+  const last = useRef(player.step);
+  if (!disabled) last.current = player.step;
+  const step = Math.min(last.current, count - 1);
+  const { values = [], unit = '' } = shown?.times ?? {};
   const time = timeText(values, unit, step);
   const playing = player.playing.value;
 
   useEffect(() => {
+    if (disabled) return undefined;
     const onKey = (event: KeyboardEvent) => {
       const by = stepOfKey(event);
       if (by) player.move(by);
     };
     window.addEventListener('keydown', onKey);
     return () => window.removeEventListener('keydown', onKey);
-  }, [player]);
+  }, [player, disabled]);
 
   return (
     <section class="time" aria-label="Time">
       <div class="time-buttons">
-        <IconButton icon="back" label="Step back" keys="[" onClick={() => player.move(-1)} />
-        <IconButton icon={playing ? 'pause' : 'play'} label={playing ? 'Pause' : 'Play'} onClick={() => player.toggle()} />
-        <IconButton icon="forward" label="Step forward" keys="]" onClick={() => player.move(1)} />
+        <IconButton icon="back" label="Step back" keys="[" disabled={disabled} onClick={() => player.move(-1)} />
+        <IconButton
+          icon={playing ? 'pause' : 'play'}
+          label={playing ? 'Pause' : 'Play'}
+          disabled={disabled}
+          onClick={() => player.toggle()}
+        />
+        <IconButton icon="forward" label="Step forward" keys="]" disabled={disabled} onClick={() => player.move(1)} />
       </div>
       <input
         type="range"
@@ -87,6 +101,7 @@ function TimeControls({ store }: { store: Store }) {
         max={count - 1}
         step={1}
         value={step}
+        disabled={disabled}
         aria-label="Time step"
         aria-valuetext={`Step ${step + 1} of ${count}${time && `, ${time}`}`}
         onInput={(event) => player.go(event.currentTarget.valueAsNumber)}
