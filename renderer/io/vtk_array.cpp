@@ -99,8 +99,7 @@ void checkVtkArrayFits(const VtkArray& array, std::uint64_t count) {
   // Text has at least a digit and a blank for each number.
   if (array.coding == VtkCoding::ascii) held = saturatingProduct(held / 2 + 1, sizeBytes(array.type));
   if (array.coding == VtkCoding::base64) held = held / 4 * 3 + 3;
-  if (array.coding != VtkCoding::ascii)
-    held = saturatingProduct(held, array.gzip ? 1032 : largestVtkRatio(array.compressor));
+  if (array.coding != VtkCoding::ascii) held = saturatingProduct(held, largestVtkRatio(array.compressor));
   if (bytes > held)
     throw Error(ErrorCode::badInput, array.where() + ": " + std::to_string(count) + " numbers need " +
                                          byteCount(bytes) + ", the file holds at most " + byteCount(held));
@@ -133,6 +132,9 @@ void VtkArrayReader::readSizes(std::uint64_t expectedBytes) {
   if (lastBytes > blockBytes && blocks > 1)
     throw badVtk(array_.where(), "a last block that is not larger than the others",
                  std::to_string(lastBytes));
+  if (loading_)
+    loading_->checkMemory(array_.where() + ": the sizes of its blocks", saturatingProduct(blocks, 8));
+  packedSizes_.reserve(std::size_t(blocks));
   for (std::uint64_t i = 0; i < blocks; ++i) packedSizes_.push_back(readSize());
   blockBytes_ = blocks == 1 ? expectedBytes : blockBytes;
   bytesLeft_ = expectedBytes;

@@ -69,6 +69,18 @@ double evenVtkStep(const std::string& where, const std::vector<double>& all) {
   return step;
 }
 
+/// Along an axis, the ends of all boxes, each once and in order.
+std::vector<int> vtkCuts(int axis, const glm::ivec3& dims, const std::vector<VtkBox>& boxes) {
+  std::vector<int> cuts{0, dims[axis]};
+  for (const VtkBox& box : boxes) {
+    cuts.push_back(box.first[axis]);
+    cuts.push_back(box.first[axis] + box.size[axis]);
+  }
+  std::ranges::sort(cuts);
+  cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
+  return cuts;
+}
+
 }  // namespace
 
 glm::dmat4 evenVtkAxes(const VtkDataSet& dataSet) {
@@ -85,42 +97,32 @@ glm::dmat4 evenVtkAxes(const VtkDataSet& dataSet) {
 void checkVtkCover(const std::string& file, const glm::ivec3& dims, const std::vector<VtkBox>& boxes) {
   // The ends of all boxes cut the grid into cells that are covered whole or not at all.
   constexpr std::uint64_t kMostWork = 1 << 26;
-  std::array<std::vector<int>, 3> cuts;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<int>& ends = cuts[std::size_t(axis)];
-    ends = {0, dims[axis]};
-    for (const VtkBox& box : boxes) {
-      ends.push_back(box.first[axis]);
-      ends.push_back(box.first[axis] + box.size[axis]);
-    }
-    std::ranges::sort(ends);
-    ends.erase(std::ranges::unique(ends).begin(), ends.end());
-  }
-  const glm::ivec3 cells(int(cuts[0].size()) - 1, int(cuts[1].size()) - 1, int(cuts[2].size()) - 1);
   const auto tooMany = [&] {
     return Error(ErrorCode::unsupported, file + ": expected pieces of a simple arrangement, found " +
                                              std::to_string(boxes.size()) +
                                              " that overlap or differ in size");
   };
-  const std::uint64_t count =
-      saturatingProduct(std::uint64_t(cells.x) * std::uint64_t(cells.y), std::uint64_t(cells.z));
-  if (count > kMostWork) throw tooMany();
-  std::vector<bool> covered(static_cast<std::size_t>(count));
+  const std::array<std::vector<int>, 3> cuts{vtkCuts(0, dims, boxes), vtkCuts(1, dims, boxes),
+                                             vtkCuts(2, dims, boxes)};
+  const std::size_t width = cuts[0].size() - 1, height = cuts[1].size() - 1, depth = cuts[2].size() - 1;
+  if (saturatingProduct(width * height, depth) > kMostWork) throw tooMany();
+  std::vector<bool> covered(width * height * depth);
   std::uint64_t work = 0;
   for (const VtkBox& box : boxes) {
-    glm::ivec3 begin, end;
-    for (int axis = 0; axis < 3; ++axis) {
-      const std::vector<int>& ends = cuts[std::size_t(axis)];
-      begin[axis] = int(std::ranges::lower_bound(ends, box.first[axis]) - ends.begin());
-      end[axis] = int(std::ranges::lower_bound(ends, box.first[axis] + box.size[axis]) - ends.begin());
+    std::array<std::size_t, 3> begin, end;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto indexOf = [&](int cut) {
+        return std::size_t(std::ranges::lower_bound(cuts[axis], cut) - cuts[axis].begin());
+      };
+      begin[axis] = indexOf(box.first[int(axis)]);
+      end[axis] = indexOf(box.first[int(axis)] + box.size[int(axis)]);
     }
-    work += countOf(end - begin);
+    work += (end[0] - begin[0]) * (end[1] - begin[1]) * (end[2] - begin[2]);
     if (work > kMostWork) throw tooMany();
-    for (int z = begin.z; z < end.z; ++z) {
-      for (int y = begin.y; y < end.y; ++y) {
-        for (int x = begin.x; x < end.x; ++x)
-          covered[(std::size_t(z) * std::size_t(cells.y) + std::size_t(y)) * std::size_t(cells.x) +
-                  std::size_t(x)] = true;
+    for (std::size_t z = begin[2]; z < end[2]; ++z) {
+      for (std::size_t y = begin[1]; y < end[1]; ++y) {
+        const auto row = covered.begin() + std::ptrdiff_t((z * height + y) * width);
+        std::fill(row + std::ptrdiff_t(begin[0]), row + std::ptrdiff_t(end[0]), true);
       }
     }
   }

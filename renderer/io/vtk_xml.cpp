@@ -255,9 +255,9 @@ glm::dmat4 vtkImageAffine(const VtkMarkup& markup, const pugi::xml_node& grid, c
 Match matchVtkXml(const FileStart& start) {
   if (start.folder) return Match::no;
   if (start.bytes.find("<VTKFile") != std::string::npos) return Match::content;
-  for (const char* ending : {"ti", "tr", "tu", "ts", "tp", "tm", "tmb", "th", "thb"}) {
-    if (start.hasEnding(std::string(".v") + ending) || start.hasEnding(std::string(".pv") + ending))
-      return Match::name;
+  for (const char* ending : {".vti", ".vtr", ".vtu", ".vts", ".vtp", ".vtm", ".vth", ".pvti", ".pvtr",
+                             ".pvtu", ".pvts", ".pvtp"}) {
+    if (start.hasEnding(ending)) return Match::name;
   }
   return Match::no;
 }

@@ -44,6 +44,15 @@ TEST(VtkXmlFiles, PiecesAreJoined) {
   std::string many;
   for (int i = 0; i < 300; ++i) many += vtkPieceText(0, 3);
   EXPECT_THAT(error(many), HasSubstr("expected pieces that overlap little"));
+  std::string diagonal;
+  for (int k = 0; k < 410; ++k) {
+    const std::string range = std::to_string(k) + " " + std::to_string(k + 1) + " ";
+    diagonal += "<Piece Extent=\"" + range + range + range + "\"><PointData>" +
+                vtkArrayText("UInt8", "a", "", "1 1 1 1 1 1 1 1") + "</PointData></Piece>";
+  }
+  const std::string whole = "<ImageData WholeExtent=\"0 410 0 410 0 410\">" + diagonal + "</ImageData>";
+  EXPECT_THAT(loadError(writeBytes(folder / "a.vti", vtkFileText("ImageData", "", whole))),
+              HasSubstr("expected pieces of a simple arrangement, found 410"));
 }
 
 TEST(VtkXmlFiles, AParallelFileNamesItsPieces) {
