@@ -31,7 +31,8 @@
   X(VtkLegacy, "VTK legacy", ".vtk", "")                                                            \
   X(Npy, "NumPy array", ".npy", "")                                                                 \
   X(Npz, "NumPy archive", ".npz", SCOLOPAX_LACKS_ZIP)                                               \
-  X(Slc, "SLC", ".slc", "")
+  X(Slc, "SLC", ".slc", "")                                                                         \
+  X(VtkJs, "vtk.js", "folders with index.json", "")
 // clang-format on
 
 namespace scolopax::io {

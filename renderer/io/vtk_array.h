@@ -32,7 +32,7 @@ struct VtkArray {
 
   std::filesystem::path path = {};
   std::uint64_t begin = 0, end = 0;  ///< bytes of the file
-  bool gzip = false;                 ///< the whole file may be packed
+  bool gzip = false;                 ///< the file may be packed; then `end` is the most that it can become
   VtkCoding coding = VtkCoding::raw;
   VtkCompressor compressor = VtkCompressor::none;  ///< not of ascii
   bool bigEndian = false;
