@@ -29,10 +29,11 @@
   X(Hdf5, "HDF5", ".h5, .hdf5, .hdf", SCOLOPAX_LACKS_HDF5)                                          \
   X(VtkXml, "VTK XML", ".vti, .vtr, .pvti, .pvtr", "")                                              \
   X(VtkLegacy, "VTK legacy", ".vtk", "")                                                            \
+  X(VtkJs, "vtk.js", "folders with index.json", "")                                                 \
   X(Npy, "NumPy array", ".npy", "")                                                                 \
   X(Npz, "NumPy archive", ".npz", SCOLOPAX_LACKS_ZIP)                                               \
   X(Slc, "SLC", ".slc", "")                                                                         \
-  X(VtkJs, "vtk.js", "folders with index.json", "")
+  X(Atlas, "texture atlas", ".json + .png", "")
 // clang-format on
 
 namespace scolopax::io {
