@@ -19,7 +19,7 @@ namespace scolopax::io {
 namespace fs = std::filesystem;
 
 bool isHdf5(std::string_view bytes) {
-  for (const std::size_t offset : {0, 512, 1024, 2048})
+  for (const std::size_t offset : {0U, 512U, 1024U, 2048U})
     if (bytes.size() > offset && bytes.substr(offset).starts_with("\x89HDF\r\n\x1A\n")) return true;
   return false;
 }

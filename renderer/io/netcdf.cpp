@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <set>
 
 #include "renderer/core/error.h"
 #include "renderer/io/byte_stream.h"
@@ -140,8 +141,11 @@ VolumeFile openNetcdf(const std::filesystem::path& path, const OpenOptions& opti
     sources->resize(kMostVolumes);
   }
   VolumeFile result{path};
+  std::set<std::string> warnings;  // most variables share their axes
+  const Warn warn = [&](const std::string& line) { warnings.insert(line); };
   for (const NetcdfSource& source : *sources)
-    result.volumes.push_back(describeNetcdf(file, tree, source, options.warn));
+    result.volumes.push_back(describeNetcdf(file, tree, source, warn));
+  std::ranges::for_each(warnings, options.warn);
   result.read = [path, sources](const VolumeInfo& volume, const Part& part, Loading& loading) {
     return readNetcdf(path, sources->at(part.volume), volume, part, loading);
   };

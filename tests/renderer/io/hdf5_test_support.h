@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "renderer/io/formats.h"
+
 namespace scolopax::io {
 
 template <class T>
@@ -119,6 +121,14 @@ std::vector<T> rampOf(std::size_t count) {
   std::vector<T> values(count);
   for (std::size_t i = 0; i < count; ++i) values[i] = T(i);
   return values;
+}
+
+/// The paths of a file's volumes.
+inline std::vector<std::string> hdf5Paths(const std::filesystem::path& path, const Warn& warn = {}) {
+  std::vector<std::string> paths;
+  const auto file = openFile(path, {.warn = warn});
+  for (const VolumeInfo& volume : file->volumes) paths.push_back(volume.path);
+  return paths;
 }
 
 }  // namespace scolopax::io
