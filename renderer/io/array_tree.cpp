@@ -133,8 +133,8 @@ void sendNode(const Sender& sender, const ArrayNode& node) {
   sender.send({packer.bytes});
 }
 
-ArrayTree scanApart(const std::filesystem::path& path, const Warn& warn, const std::stop_token& stop,
-                    const std::function<void(const Sender&)>& scan) {
+ArrayTree scanApart(const std::filesystem::path& path, std::chrono::seconds computing, const Warn& warn,
+                    const std::stop_token& stop, const std::function<void(const Sender&)>& scan) {
   const std::string file = shown(path);
   ArrayTree tree;
   std::uint64_t received = 0;
@@ -148,8 +148,7 @@ ArrayTree scanApart(const std::filesystem::path& path, const Warn& warn, const s
     visitArray(unpacker, tree.nodes.emplace_back());
     tree.byPath.emplace(tree.nodes.back().path, tree.nodes.size() - 1);
   };
-  // In which a hundred thousand arrays can be found.
-  runApart(file, {.computing = std::chrono::seconds(8)}, stop, scan, {receive, warn});
+  runApart(file, {.computing = computing}, stop, scan, {receive, warn});
   return tree;
 }
 

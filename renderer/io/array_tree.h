@@ -2,6 +2,7 @@
 // What a file of named arrays (HDF5, NetCDF) holds, as plain facts: a child process finds them by the
 // library, this process makes volumes of them.
 #pragma once
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -61,8 +62,9 @@ std::string lastOf(const std::string& path);
 /// In the child.
 void sendNode(const Sender& sender, const ArrayNode& node);
 
-/// Runs `scan`, which sends nodes, in a child. Throws Error as runApart, and tooLarge for too many nodes.
-ArrayTree scanApart(const std::filesystem::path& path, const Warn& warn, const std::stop_token& stop,
-                    const std::function<void(const Sender&)>& scan);
+/// Runs `scan`, which sends nodes, in a child that may compute for so long. Throws Error as runApart, and
+/// tooLarge for too many nodes.
+ArrayTree scanApart(const std::filesystem::path& path, std::chrono::seconds computing, const Warn& warn,
+                    const std::stop_token& stop, const std::function<void(const Sender&)>& scan);
 
 }  // namespace scolopax::io

@@ -228,7 +228,9 @@ VolumeFile openPlainHdf5(const Hdf5File& file) {
 VolumeFile openHdf5(const fs::path& path, const OpenOptions& options) {
   requireRegularFile(path);
   const auto scan = [&](const Sender& sender) { scanHdf5(path, sender); };
-  const Hdf5File file{path, shown(path), scanApart(path, options.warn, options.stop, scan), options};
+  constexpr std::chrono::seconds kComputing(30);  // Imaris files may have a hundred thousand arrays
+  const Hdf5File file{path, shown(path), scanApart(path, kComputing, options.warn, options.stop, scan),
+                      options};
   for (const auto& openLayout : {openImarisLayout, openPmdLayout, openMincLayout})
     if (auto volumes = openLayout(file)) return std::move(*volumes);
   return openPlainHdf5(file);

@@ -128,8 +128,9 @@ VolumeFile openNetcdf(const std::filesystem::path& path, const OpenOptions& opti
   constexpr std::size_t kMostVolumes = 4096;
   requireRegularFile(path);
   const std::string file = shown(path);
-  const ArrayTree tree =
-      scanApart(path, options.warn, options.stop, [&](const Sender& sender) { scanNetcdf(path, sender); });
+  constexpr std::chrono::seconds kComputing(4);  // the library never ends on some damaged files
+  const auto scan = [&](const Sender& sender) { scanNetcdf(path, sender); };
+  const ArrayTree tree = scanApart(path, kComputing, options.warn, options.stop, scan);
   const auto sources = std::make_shared<std::vector<NetcdfSource>>(netcdfSources(tree, 3));
   if (sources->empty()) *sources = netcdfSources(tree, 2);
   if (sources->empty())
