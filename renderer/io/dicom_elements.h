@@ -3,9 +3,6 @@
 // dicom_file.h.
 #pragma once
 #if SCOLOPAX_HAS_GDCM
-#include <gdcmDataSet.h>
-#include <gdcmSequenceOfItems.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -14,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "renderer/io/dicom_gdcm.h"
 #include "renderer/io/dicom_tags.h"
 #include "renderer/io/text.h"
 

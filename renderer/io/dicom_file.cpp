@@ -3,15 +3,13 @@
 #include "renderer/io/dicom_file.h"
 
 #if SCOLOPAX_HAS_GDCM
-#include <gdcmReader.h>
-#include <gdcmTrace.h>
-
 #include <fstream>
 
 #include "renderer/core/error.h"
 #include "renderer/io/byte_stream.h"
 #include "renderer/io/dicom_elements.h"
 #include "renderer/io/dicom_frames.h"
+#include "renderer/io/dicom_gdcm.h"
 #include "renderer/io/text.h"
 #include "renderer/io/voxel_stream.h"
 
@@ -46,9 +44,14 @@ void readDicomElements(DicomHeader& header, const fs::path& path) {
     read = header.reader.ReadUpToTag(pixels, {pixels});
   } catch (const std::exception&) {
   }
+  // GDCM reads nothing in a syntax that it does not know.
+  const std::string syntax = dicomText(header.reader.GetFile().GetHeader(), dicom::kTransferSyntax);
+  const bool unknown =
+      !syntax.empty() && gdcm::TransferSyntax::GetTSType(syntax.c_str()) == gdcm::TransferSyntax::TS_END;
+  if (unknown)
+    throw header.unsupported("TransferSyntaxUID: expected one that GDCM decodes, found " + inQuotes(syntax));
   if (!read)
-    throw Error(ErrorCode::badInput,
-                header.file + ": expected a DICOM file, found elements that no one can read");
+    throw Error(ErrorCode::badInput, header.file + ": expected a DICOM file, found damaged elements");
   header.pixelOffset = header.reader.GetStreamCurrentPosition();
 }
 
@@ -194,9 +197,8 @@ DicomFile readDicomFile(const fs::path& path) {
   readDicomElements(header, path);
   refuseOtherDicom(header);
   if (!isReadableSyntax(header.syntax()))
-    throw header.unsupported(
-        "expected pixels in a transfer syntax that GDCM decodes, found " +
-        inQuotes(header.syntax().GetString() ? header.syntax().GetString() : "an unknown one"));
+    throw header.unsupported("TransferSyntaxUID: expected one that GDCM decodes, found " +
+                             inQuotes(header.syntax().GetString()));
   const gdcm::DataSet& elements = header.elements();
   DicomFile file{.path = path};
   file.seriesUid = dicomText(elements, dicom::kSeriesUid);
@@ -206,6 +208,8 @@ DicomFile readDicomFile(const fs::path& path) {
   file.instance = parseInteger(dicomText(elements, dicom::kInstance)).value_or(0);
   readDicomPixelFormat(header, file);
   readDicomSegments(header, file);
+  if (dicomText(elements, dicom::kImageType).find("MOSAIC") != std::string::npos)
+    file.warnings.push_back("is a mosaic of slices, which are shown side by side");
   if (hasDicom(elements, dicom::kModalityTable))
     file.warnings.push_back("ModalityLUTSequence is not applied, the values are loaded as they are stored");
   readDicomFrames(elements, header.file, dicomFrameCount(header, file), file);

@@ -2,9 +2,8 @@
 // Where the frames of a DICOM file lie and how their values are scaled. Between dicom_file.cpp and GDCM.
 #pragma once
 #if SCOLOPAX_HAS_GDCM
-#include <gdcmDataSet.h>
-
 #include "renderer/io/dicom_file.h"
+#include "renderer/io/dicom_gdcm.h"
 
 namespace scolopax::io {
 

@@ -3,21 +3,19 @@
 #include "renderer/io/dicom_file.h"
 
 #if SCOLOPAX_HAS_GDCM
-#include <gdcmImageReader.h>
-#include <gdcmTrace.h>
-
 #include <algorithm>
 #include <cmath>
 #include <span>
 
 #include "renderer/core/error.h"
+#include "renderer/io/dicom_gdcm.h"
 #include "renderer/io/dicom_rle.h"
 #include "renderer/io/text.h"
 
 namespace scolopax::io {
 namespace {
 
-[[noreturn]] void failPixels(const DicomFile& file, const std::string& why) {
+[[noreturn]] void failDicomPixels(const DicomFile& file, const std::string& why) {
   throw Error(ErrorCode::badInput, shown(file.path) + ": PixelData: " + why);
 }
 
@@ -36,18 +34,18 @@ void checkDecodedDicom(const DicomFile& file, const gdcm::Image& image) {
   if (std::int64_t(image.GetColumns()) != file.columns || std::int64_t(image.GetRows()) != file.rows ||
       frames != file.frames.size() || format.GetBitsAllocated() != bits ||
       format.GetSamplesPerPixel() != file.samples || (format.GetPixelRepresentation() != 0) != isSigned)
-    failPixels(file, "expected pictures as the header says, found others");
+    failDicomPixels(file, "expected pictures as the header says, found others");
   const gdcm::ByteValue* stored = image.GetDataElement().GetByteValue();
   const std::uint64_t needed = packedDicomBytes(file);
   if (stored && std::uint64_t(stored->GetLength()) < needed)
-    failPixels(file, "expected " + std::to_string(needed) + " bytes, found " +
-                         std::to_string(std::uint64_t(stored->GetLength())));
+    failDicomPixels(file, "expected " + std::to_string(needed) + " bytes, found " +
+                              std::to_string(std::uint64_t(stored->GetLength())));
 }
 
 /// Pixels of one bit, straight from the file: GDCM expects rows that begin with a byte, which DICOM's do not.
 std::vector<std::byte> unpackedDicomBits(const DicomFile& file, const gdcm::Image& image) {
   const gdcm::ByteValue* stored = image.GetDataElement().GetByteValue();
-  if (!stored) failPixels(file, "expected pixels of one bit without compression, found others");
+  if (!stored) failDicomPixels(file, "expected pixels of one bit without compression, found others");
   const auto* bytes = reinterpret_cast<const std::byte*>(stored->GetPointer());
   std::vector<std::byte> unpacked(file.frameBytes() * file.frames.size());
   for (std::size_t i = 0; i < unpacked.size(); ++i) unpacked[i] = (bytes[i / 8] >> (i % 8)) & std::byte(1);
@@ -63,17 +61,17 @@ bool isDeepRle(const DicomFile& file, const gdcm::Image& image) {
 std::vector<std::byte> decodedRle(const DicomFile& file, const gdcm::Image& image) {
   const gdcm::SequenceOfFragments* fragments = image.GetDataElement().GetSequenceOfFragments();
   if (!fragments || fragments->GetNumberOfFragments() != file.frames.size())
-    failPixels(file, "expected a fragment for each frame, found others");
+    failDicomPixels(file, "expected a fragment for each frame, found others");
   std::vector<std::byte> decoded(file.frameBytes() * file.frames.size());
   for (std::size_t frame = 0; frame < file.frames.size(); ++frame) {
     const gdcm::ByteValue* packed = fragments->GetFragment(frame).GetByteValue();
-    if (!packed) failPixels(file, "expected a frame, found an empty fragment");
+    if (!packed) failDicomPixels(file, "expected a frame, found an empty fragment");
     try {
       decodeRleFrame(std::as_bytes(std::span(packed->GetPointer(), packed->GetLength())),
                      std::size_t(file.rows * file.columns), file.samples, sizeBytes(file.type),
                      decoded.data() + frame * file.frameBytes());
     } catch (const Error& error) {
-      failPixels(file, error.what());
+      failDicomPixels(file, error.what());
     }
   }
   return decoded;
@@ -81,11 +79,11 @@ std::vector<std::byte> decodedRle(const DicomFile& file, const gdcm::Image& imag
 
 std::vector<std::byte> decodedByGdcm(const DicomFile& file, const gdcm::Image& image) {
   if (image.GetBufferLength() != file.frameBytes() * file.frames.size())
-    failPixels(file, "expected " + std::to_string(file.frameBytes() * file.frames.size()) + " bytes, found " +
-                         std::to_string(image.GetBufferLength()));
+    failDicomPixels(file, "expected " + std::to_string(file.frameBytes() * file.frames.size()) +
+                              " bytes, found " + std::to_string(image.GetBufferLength()));
   std::vector<std::byte> decoded(file.frameBytes() * file.frames.size());
   if (!image.GetBuffer(reinterpret_cast<char*>(decoded.data())))
-    failPixels(file, "expected a picture, found data that cannot be decoded");
+    failDicomPixels(file, "expected a picture, found data that cannot be decoded");
   return decoded;
 }
 
@@ -123,7 +121,7 @@ DicomPixels decodeDicomFile(const DicomFile& file) {
   gdcm::ImageReader reader;
   reader.SetFileName(file.path.c_str());
   try {
-    if (!reader.Read()) failPixels(file, "expected a picture, found damaged data");
+    if (!reader.Read()) failDicomPixels(file, "expected a picture, found damaged data");
     const gdcm::Image& image = reader.GetImage();
     checkDecodedDicom(file, image);
     if (file.bits) return {unpackedDicomBits(file, image)};
@@ -133,12 +131,12 @@ DicomPixels decodeDicomFile(const DicomFile& file) {
     pixels.planar = file.samples == 3 && image.GetPlanarConfiguration() == 1;
     const std::string found = image.GetPhotometricInterpretation().GetString();
     if (!found.starts_with("YBR")) return pixels;
-    if (sizeBytes(file.type) != 1) failPixels(file, "expected YBR of 8 bits, found others");
+    if (sizeBytes(file.type) != 1) failDicomPixels(file, "expected YBR of 8 bits, found others");
     convertDicomToRgb(file, pixels);
   } catch (const Error&) {
     throw;
   } catch (const std::exception&) {
-    failPixels(file, "expected a picture, found data that cannot be decoded");
+    failDicomPixels(file, "expected a picture, found data that cannot be decoded");
   }
   return pixels;
 }

@@ -134,9 +134,10 @@ void DicomStack::setSegments() {
   for (DicomSlice& slice : slices_) slice.channel = frameOf(slice).segment;
   const auto key = [](const DicomSlice& slice) { return std::tuple(slice.channel, slice.z); };
   std::ranges::stable_sort(slices_, {}, key);
-  const auto doubled = std::ranges::unique(slices_, {}, key);
-  if (!doubled.empty()) warn_(name_ + ": slices lie where others do and are left out");
-  slices_.erase(doubled.begin(), doubled.end());
+  const auto same = [&](const DicomSlice& a, const DicomSlice& b) { return key(a) == key(b); };
+  const auto doubled = std::unique(slices_.begin(), slices_.end(), same);
+  if (doubled != slices_.end()) warn_(name_ + ": slices lie where others do and are left out");
+  slices_.erase(doubled, slices_.end());
 }
 
 /// Segmentations leave out slices that are empty. Moves slices to their places among all.

@@ -11,6 +11,8 @@ struct DicomTag {
 };
 
 namespace dicom {
+inline constexpr DicomTag kTransferSyntax{0x0002, 0x0010};  // TransferSyntaxUID
+inline constexpr DicomTag kImageType{0x0008, 0x0008};
 inline constexpr DicomTag kSopClass{0x0008, 0x0016};  // SOPClassUID
 inline constexpr DicomTag kModality{0x0008, 0x0060};
 inline constexpr DicomTag kDescription{0x0008, 0x103e};   // SeriesDescription
