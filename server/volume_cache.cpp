@@ -7,12 +7,16 @@
 #include <vector>
 
 #include "renderer/core/error.h"
+#include "renderer/core/wait_hooks.h"
 
 namespace scolopax::server {
 namespace {
 
 /// A `since` that lets every volume give way that nobody holds.
 constexpr std::uint64_t kAny = std::numeric_limits<std::uint64_t>::max();
+
+/// Within this time, loads end that are to end.
+constexpr std::chrono::seconds kEndTime{2};
 
 }  // namespace
 
@@ -34,25 +38,88 @@ bool VolumeCache::holds(const Key& key) const {
   return entries_.contains(key);
 }
 
+VolumeCache::~VolumeCache() {
+  std::map<Key, std::shared_ptr<Running>> running;
+  {
+    const std::lock_guard lock(mutex_);
+    running = running_;
+  }
+  for (const auto& [key, load] : running) load->thread.request_stop();
+  for (const auto& [key, load] : running) load->thread.join();
+}
+
 std::shared_ptr<const Volume> VolumeCache::get(const Wanted& wanted, const std::stop_token& stop) {
-  if (auto volume = find(wanted.key)) return volume;
-  return builds_.get(
-      wanted.key, [this, wanted](const std::stop_token& abandoned) { return load(wanted, kAny, abandoned); },
-      stop);
+  try {
+    return wait(wanted, kAny, stop);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::busy) throw;
+    return wait(wanted, kAny, stop);  // it may have joined a load in advance, which gives way to others
+  }
 }
 
 std::shared_ptr<const Volume> VolumeCache::getIfRoom(const Wanted& wanted, std::uint64_t since,
                                                      const std::stop_token& stop) {
-  if (auto volume = find(wanted.key)) return volume;
   try {
-    return builds_.get(
-        wanted.key,
-        [this, wanted, since](const std::stop_token& abandoned) { return load(wanted, since, abandoned); },
-        stop);
+    return wait(wanted, since, stop);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::busy) throw;
     return nullptr;
   }
+}
+
+/// Returns the volume, and waits for its load if necessary.
+std::shared_ptr<const Volume> VolumeCache::wait(const Wanted& wanted, std::uint64_t since,
+                                                const std::stop_token& stop) {
+  if (auto volume = find(wanted.key)) return volume;
+  const Waiting waiting;  // declared first: ends when the mutex is free again
+  std::list<std::shared_ptr<Running>> ended;
+  std::unique_lock lock(mutex_);
+  ended.swap(ended_);
+  std::shared_ptr<Running>& running = running_[wanted.key];
+  if (!running) {
+    running = std::make_shared<Running>();
+    running->thread = std::jthread([this, load = running.get(), wanted, since](
+                                       const std::stop_token& ending) { run(*load, wanted, since, ending); });
+  }
+  const std::shared_ptr<Running> load = running;
+  ++load->callers;
+  changed_.wait(lock, stop, [&] { return load->done; });
+  if (--load->callers == 0) load->left = std::chrono::steady_clock::now();
+  if (!load->done) throw Error(ErrorCode::cancelled, "loading was cancelled");
+  if (load->failure) std::rethrow_exception(load->failure);
+  return load->volume;
+}
+
+void VolumeCache::run(Running& running, const Wanted& wanted, std::uint64_t since,
+                      const std::stop_token& stop) {
+  std::shared_ptr<const Volume> volume;
+  std::exception_ptr failure;
+  try {
+    volume = load(wanted, since, stop);
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  const std::lock_guard lock(mutex_);
+  running.volume = std::move(volume);
+  running.failure = failure;
+  running.done = true;
+  const auto own = running_.find(wanted.key);
+  ended_.push_back(own->second);
+  running_.erase(own);
+  changed_.notify_all();
+}
+
+/// Asks the loads to end that nobody waits for, and waits for them, though not for long: one may be waiting
+/// here, too. Returns whether one has ended.
+bool VolumeCache::endAbandoned() {
+  std::list<std::shared_ptr<Running>> ending;
+  std::unique_lock lock(mutex_);
+  for (const auto& [key, load] : running_)
+    if (load->callers == 0 && load->thread.get_id() != std::this_thread::get_id()) ending.push_back(load);
+  for (const auto& load : ending) load->thread.request_stop();
+  const auto isDone = [](const auto& load) { return load->done; };
+  changed_.wait_for(lock, kEndTime, [&] { return std::ranges::all_of(ending, isDone); });
+  return std::ranges::any_of(ending, isDone);
 }
 
 std::shared_ptr<const Volume> VolumeCache::load(const Wanted& wanted, std::uint64_t since,
@@ -74,11 +141,16 @@ std::shared_ptr<const Volume> VolumeCache::load(const Wanted& wanted, std::uint6
     }
   };
   const Shown shown(*this, wanted.key);
+  std::stop_source abandoned;
+  const std::stop_callback ending(stop, [&abandoned] { abandoned.request_stop(); });
   const auto report = [&](const io::Progress& now) {
     const std::lock_guard lock(mutex_);
+    const Running& own = *running_.at(wanted.key);
+    if (own.callers == 0 && std::chrono::steady_clock::now() - own.left >= linger_) abandoned.request_stop();
     loads_[wanted.key] = {wanted.key.time, std::string(now.stage), now.doneBytes, now.allBytes};
   };
-  auto volume = wanted.load({.memoryLimitBytes = limit_, .warn = warn_, .progress = report, .stop = stop});
+  auto volume = wanted.load(
+      {.memoryLimitBytes = limit_, .warn = warn_, .progress = report, .stop = abandoned.get_token()});
   const std::lock_guard lock(mutex_);
   entries_[wanted.key] = {volume, volume->sizeBytes(), ++uses_};
   return volume;
@@ -99,6 +171,7 @@ std::unique_ptr<VolumeCache::Room> VolumeCache::roomFor(const Wanted& wanted, st
       }
       if (since == kAny) release = release_;
     }
+    if (endAbandoned()) continue;
     if (!release || !release())
       throw Error(ErrorCode::busy, wanted.title + ": needs " + io::byteCount(wanted.bytes) +
                                        " of memory; others use " + io::byteCount(usedBytes()) + " of the " +

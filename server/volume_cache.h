@@ -2,18 +2,22 @@
 // The voxels of data sets in memory. They are loaded when they are first asked for. When the memory is needed
 // for others, the volumes that nobody uses are dropped, the least recently used first.
 #pragma once
+#include <chrono>
 #include <compare>
+#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
+#include <list>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <thread>
 
-#include "renderer/core/shared_builds.h"
 #include "renderer/data/volume.h"
 #include "renderer/io/loading.h"
 
@@ -43,17 +47,27 @@ class VolumeCache {
     Load load;
   };
 
+  /// Time for which a load goes on after the last caller has left: a client whose request has timed out asks
+  /// again, and would otherwise make it begin anew each time.
+  static constexpr std::chrono::seconds kLinger{10};
+
   /// `limitBytes`: of all voxels together, also while they are loaded.
-  explicit VolumeCache(std::uint64_t limitBytes, io::Warn warn = {})
-      : limit_(limitBytes), warn_(std::move(warn)) {}
+  explicit VolumeCache(std::uint64_t limitBytes, io::Warn warn = {},
+                       std::chrono::milliseconds linger = kLinger)
+      : limit_(limitBytes), warn_(std::move(warn)), linger_(linger) {}
+  /// Ends all loads. Nobody may wait for one.
+  ~VolumeCache();
+  VolumeCache(const VolumeCache&) = delete;
+  VolumeCache& operator=(const VolumeCache&) = delete;
 
   /// The volume if it is in memory, else nullptr. Counts as a use.
   std::shared_ptr<const Volume> find(const Key& key);
   /// Whether it is in memory.
   bool holds(const Key& key) const;
-  /// The volume. Waits until it has been loaded; several callers share one load, which is cancelled when none
-  /// of them waits any more. Throws Error: tooLarge if it can never fit into the memory, busy if others use
-  /// the memory now, both before anything is read; cancelled once `stop` is requested; what `load` throws.
+  /// The volume. Waits until it has been loaded; several callers share one load. When none of them waits any
+  /// more, it is cancelled after a while, or at once if another load needs its memory. Throws Error: tooLarge
+  /// if it can never fit into the memory, busy if others use the memory now, both before anything is read;
+  /// cancelled once `stop` is requested; what `load` throws.
   std::shared_ptr<const Volume> get(const Wanted& wanted, const std::stop_token& stop);
   /// Loads the volume if no use since `since` has to give way to it; otherwise returns nullptr. Throws as
   /// get(), except busy.
@@ -89,6 +103,19 @@ class VolumeCache {
     ~Room();
   };
 
+  /// A load on a thread of its own.
+  struct Running {
+    std::size_t callers = 0;
+    std::chrono::steady_clock::time_point left{};  ///< when the last caller left
+    bool done = false;
+    std::shared_ptr<const Volume> volume = {};
+    std::exception_ptr failure = {};
+    std::jthread thread = {};
+  };
+
+  std::shared_ptr<const Volume> wait(const Wanted& wanted, std::uint64_t since, const std::stop_token& stop);
+  void run(Running& running, const Wanted& wanted, std::uint64_t since, const std::stop_token& stop);
+  bool endAbandoned();
   std::unique_ptr<Room> roomFor(const Wanted& wanted, std::uint64_t since);
   bool makeRoom(std::uint64_t bytes, std::uint64_t since);
   std::uint64_t held() const;
@@ -96,13 +123,16 @@ class VolumeCache {
 
   const std::uint64_t limit_;
   const io::Warn warn_;
-  mutable std::mutex mutex_;  ///< never held while loading
+  const std::chrono::milliseconds linger_;
+  mutable std::mutex mutex_;             ///< never held while loading
+  std::condition_variable_any changed_;  ///< notified when a load ends
   std::map<Key, Entry> entries_;
   std::map<Key, LoadProgress> loads_;
   std::uint64_t promised_ = 0;  ///< bytes of all Rooms
   std::uint64_t uses_ = 0;
   std::function<bool()> release_;
-  SharedBuilds<Key, Volume> builds_;  // declared last: its threads use the other members
+  std::map<Key, std::shared_ptr<Running>> running_;
+  std::list<std::shared_ptr<Running>> ended_;  ///< whose threads are to be joined
 };
 
 }  // namespace scolopax::server

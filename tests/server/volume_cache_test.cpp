@@ -130,22 +130,70 @@ TEST_F(VolumeCacheTest, SharesALoadAndTellsItsProgress) {
   EXPECT_FALSE(cache_.progress(this));
 }
 
-TEST_F(VolumeCacheTest, EndsALoadThatNobodyWaitsForAnyMore) {
+/// A load that goes on until it is cancelled, or until `go`.
+struct LongLoad {
   std::promise<void> begun;
-  VolumeCache::Wanted endless = wanted(0);
-  endless.load = [&](const io::LoadOptions& options) -> std::shared_ptr<const Volume> {
-    begun.set_value();
-    while (!options.stop.stop_requested()) std::this_thread::yield();
-    throw Error(ErrorCode::cancelled, "cancelled");
-  };
-  std::stop_source stop;
-  auto waiting =
-      std::async(std::launch::async, [&] { return codeOf([&] { cache_.get(endless, stop.get_token()); }); });
-  begun.get_future().wait();
-  stop.request_stop();
-  EXPECT_EQ(waiting.get(), ErrorCode::cancelled);
-  EXPECT_EQ(cache_.usedBytes(), 0u);
-  EXPECT_NE(cache_.get(wanted(0), {}), nullptr) << "it can be loaded later";
+  std::atomic<bool> go = false, cancelled = false;
+
+  VolumeCache::Wanted of(VolumeCache::Wanted wanted) {
+    wanted.load = [this](const io::LoadOptions& options) -> std::shared_ptr<const Volume> {
+      begun.set_value();
+      while (!go && !options.stop.stop_requested()) {
+        options.progress({"reading", 1, 2});
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+      cancelled = options.stop.stop_requested();
+      if (cancelled) throw Error(ErrorCode::cancelled, "cancelled");
+      return testing::smallVolume();
+    };
+    return wanted;
+  }
+  /// Asks for it, and leaves once it has begun.
+  void abandon(VolumeCache& cache, const VolumeCache::Wanted& wanted) {
+    std::stop_source stop;
+    auto waiting =
+        std::async(std::launch::async, [&] { return codeOf([&] { cache.get(wanted, stop.get_token()); }); });
+    begun.get_future().wait();
+    stop.request_stop();
+    EXPECT_EQ(waiting.get(), ErrorCode::cancelled);
+  }
+};
+
+TEST_F(VolumeCacheTest, EndsALoadThatNobodyWaitsForAnyMore) {
+  LongLoad load;
+  VolumeCache cache(3 * kBytes, {}, std::chrono::milliseconds(0));
+  load.abandon(cache, load.of(wanted(0)));
+  while (cache.usedBytes() > 0) std::this_thread::yield();
+  EXPECT_TRUE(load.cancelled);
+  EXPECT_NE(cache.get(wanted(0), {}), nullptr) << "it can be loaded later";
+}
+
+TEST_F(VolumeCacheTest, GoesOnWithALoadForAWhileSoThatOneWhoAsksAgainGetsIt) {
+  LongLoad load;
+  VolumeCache cache(3 * kBytes, {}, std::chrono::hours(1));
+  load.abandon(cache, load.of(wanted(0)));
+  auto again = std::async(std::launch::async, [&] { return cache.get(wanted(0), {}); });
+  load.go = true;
+  EXPECT_NE(again.get(), nullptr);
+  EXPECT_FALSE(load.cancelled);
+  EXPECT_EQ(loads_, 0) << "the first load has served it";
+}
+
+TEST_F(VolumeCacheTest, EndsALoadThatNobodyWaitsForWhenItsMemoryIsNeeded) {
+  LongLoad load;
+  VolumeCache cache(kBytes, {}, std::chrono::hours(1));
+  load.abandon(cache, load.of(wanted(0)));
+  EXPECT_NE(cache.get(wanted(1), {}), nullptr);
+  EXPECT_TRUE(load.cancelled);
+}
+
+TEST_F(VolumeCacheTest, EndsItsLoadsWhenItEnds) {
+  LongLoad load;
+  {
+    VolumeCache cache(kBytes, {}, std::chrono::hours(1));
+    load.abandon(cache, load.of(wanted(0)));
+  }
+  EXPECT_TRUE(load.cancelled);
 }
 
 TEST_F(VolumeCacheTest, GivesItsRoomBackWhenALoadFails) {
