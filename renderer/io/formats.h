@@ -20,6 +20,7 @@
   X(Nrrd, "NRRD", ".nrrd, .nhdr", "")                                                               \
   X(MetaImage, "MetaImage", ".mha, .mhd", "")                                                       \
   X(Dicom, "DICOM", ".dcm, a folder of such files", SCOLOPAX_LACKS_GDCM)                            \
+  X(OmeTiff, "OME-TIFF", ".ome.tif, .ome.tiff, .companion.ome", "")                                 \
   X(Tiff, "TIFF", ".tif, .tiff", "")                                                                \
   X(Zarr, "OME-Zarr", "folders .zarr, .zarr.zip, .ozx, http(s)://", "")                             \
   X(Imaris, "Imaris", ".ims", SCOLOPAX_LACKS_HDF5)                                                  \

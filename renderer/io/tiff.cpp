@@ -6,14 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <optional>
 
 #include "renderer/core/error.h"
 #include "renderer/io/formats.h"
 #include "renderer/io/text.h"
-#include "renderer/io/tiff_pages.h"
+#include "renderer/io/tiff_decode.h"
 #include "renderer/io/voxel_stream.h"
 
 namespace scolopax::io {
@@ -28,52 +27,6 @@ struct Stack {
   double timeInterval = 0;  ///< seconds; 0 if unknown
   std::int64_t pages() const { return channels * slices * times; }
 };
-
-/// Opens one page with OpenImageIO, for its numbers as they are stored.
-std::unique_ptr<OIIO::ImageInput> openPage(TiffPages& pages, std::size_t page) {
-  pages.select(page);
-  OIIO::ImageSpec options, spec;
-  options.attribute("oiio:UnassociatedAlpha", 1);
-  options.attribute("oiio:RawColor", 1);
-  auto input = OIIO::ImageInput::create("tiff");
-  if (!input || !input->set_ioproxy(&pages) || !input->open(pages.filename(), spec, options)) {
-    throw Error(ErrorCode::badInput, shown(pages.filename()) + ": page " + std::to_string(page + 1) + ": " +
-                                         cleanText(input ? input->geterror() : OIIO::geterror()));
-  }
-  return input;
-}
-
-StoredType storedType(const std::string& file, const OIIO::ImageSpec& spec) {
-  // OpenImageIO rescales other depths to the next larger type.
-  const int bits = spec.get_int_attribute("oiio:BitsPerSample", int(spec.format.size()) * 8);
-  if (bits == int(spec.format.size()) * 8) {
-    switch (spec.format.basetype) {
-      case OIIO::TypeDesc::INT8:
-        return StoredType::i8;
-      case OIIO::TypeDesc::UINT8:
-        return StoredType::u8;
-      case OIIO::TypeDesc::INT16:
-        return StoredType::i16;
-      case OIIO::TypeDesc::UINT16:
-        return StoredType::u16;
-      case OIIO::TypeDesc::INT32:
-        return StoredType::i32;
-      case OIIO::TypeDesc::UINT32:
-        return StoredType::u32;
-      case OIIO::TypeDesc::HALF:
-        return StoredType::f16;
-      case OIIO::TypeDesc::FLOAT:
-        return StoredType::f32;
-      case OIIO::TypeDesc::DOUBLE:
-        return StoredType::f64;
-      default:
-        break;
-    }
-  }
-  throw Error(ErrorCode::unsupported,
-              file + ": BitsPerSample: expected integers of 8, 16 or 32 bits or floats, found " +
-                  std::to_string(bits) + " bits as " + spec.format.c_str());
-}
 
 /// The lines "key=value" of ImageJ's ImageDescription; none if it is not ImageJ's.
 std::optional<std::map<std::string, std::string>> imageJFields(std::string_view description) {
@@ -98,10 +51,6 @@ std::string lengthUnit(const std::string& name) {
 
 Stack describeStack(const std::string& file, const OIIO::ImageSpec& spec, std::int64_t pageCount) {
   const std::string description = spec.get_string_attribute("ImageDescription");
-  if (description.find("<OME") != std::string::npos) {
-    throw Error(ErrorCode::unsupported,
-                file + ": ImageDescription: expected a plain stack or ImageJ's, found OME-XML");
-  }
   Stack stack;
   const auto fields = imageJFields(description);
   if (!fields) {
@@ -145,45 +94,6 @@ Stack describeStack(const std::string& file, const OIIO::ImageSpec& spec, std::i
   return stack;
 }
 
-/// The most bytes that one byte of the file can expand to.
-std::uint64_t largestRatio(const OIIO::ImageSpec& spec) {
-  const std::string compression = spec.get_string_attribute("compression", "none");
-  if (compression == "none") return 1;
-  if (compression == "packbits") return 64;
-  if (compression == "zip") return 1032;
-  return 1 << 15;
-}
-
-/// Reads row by row, or tile by tile: when OpenImageIO unpacks several deflated strips or tiles at once, it
-/// does not report damage. Returns false on failure.
-bool readPixels(OIIO::ImageInput& input, std::vector<std::byte>& page) {
-  const OIIO::ImageSpec spec = input.spec();
-  const std::size_t pixelBytes = spec.pixel_bytes(true), rowBytes = pixelBytes * std::size_t(spec.width);
-  if (spec.tile_width == 0) {
-    for (int y = 0; y < spec.height; ++y) {
-      if (!input.read_native_scanline(0, 0, spec.y + y, spec.z, &page[std::size_t(y) * rowBytes]))
-        return false;
-    }
-    return true;
-  }
-  constexpr std::uint64_t kLargestTile = std::uint64_t(1) << 28;
-  const std::size_t tileRowBytes = pixelBytes * std::size_t(spec.tile_width);
-  if (spec.tile_depth > 1 || saturatingProduct(tileRowBytes, std::uint64_t(spec.tile_height)) > kLargestTile)
-    return false;
-  std::vector<std::byte> tile(tileRowBytes * std::size_t(spec.tile_height));
-  for (int y = 0; y < spec.height; y += spec.tile_height) {
-    for (int x = 0; x < spec.width; x += spec.tile_width) {
-      if (!input.read_native_tile(0, 0, spec.x + x, spec.y + y, spec.z, tile.data())) return false;
-      const std::size_t bytes = pixelBytes * std::size_t(std::min(spec.tile_width, spec.width - x));
-      for (int row = 0; row < std::min(spec.tile_height, spec.height - y); ++row) {
-        std::memcpy(&page[std::size_t(y + row) * rowBytes + std::size_t(x) * pixelBytes],
-                    &tile[std::size_t(row) * tileRowBytes], bytes);
-      }
-    }
-  }
-  return true;
-}
-
 /// Reads the pages in order, each into `page`: `samples` interleaved numbers per pixel, in host byte order.
 class PageReader {
  public:
@@ -204,7 +114,7 @@ class PageReader {
       }
       return;
     }
-    const auto input = openPage(pages_, index);
+    const auto input = openTiffPage(pages_, index);
     const OIIO::ImageSpec& spec = input->spec();
     const std::string where = file_ + ": page " + std::to_string(index + 1);
     const auto text = [](const OIIO::ImageSpec& s) {
@@ -216,7 +126,7 @@ class PageReader {
                   where + ": expected " + text(first_) + " as on page 1, found " + text(spec));
     }
     input->geterror();  // discards what opening recorded: only warnings
-    if (!readPixels(*input, page) || input->has_error()) {
+    if (!readTiffPixels(*input, page) || input->has_error()) {
       throw Error(ErrorCode::badInput, where + ": cannot be decoded: " + cleanText(input->geterror()));
     }
   }
@@ -233,7 +143,7 @@ class PageReader {
 VoxelLayout layoutOf(const std::string& file, const OIIO::ImageSpec& first, const Stack& stack) {
   constexpr std::int64_t kMostTiffChannels = 4096;
   VoxelLayout layout;
-  layout.type = storedType(file, first);
+  layout.type = tiffStoredType(file, first);
   layout.dims =
       checkedDims(file + ": ImageWidth, ImageLength, pages", first.width, first.height, stack.slices);
   const std::int64_t samples = first.nchannels;
@@ -248,7 +158,7 @@ VoxelLayout layoutOf(const std::string& file, const OIIO::ImageSpec& first, cons
 
 void checkFileSize(const std::string& file, const TiffPages& pages, const OIIO::ImageSpec& first,
                    const VoxelLayout& layout, const Stack& stack) {
-  const std::uint64_t holds = saturatingProduct(pages.fileSize(), largestRatio(first));
+  const std::uint64_t holds = saturatingProduct(pages.fileSize(), tiffExpansion(first));
   const std::uint64_t needed = saturatingProduct(layout.sizeBytes(), std::uint64_t(stack.times));
   if (needed > holds) {
     throw Error(ErrorCode::badInput, file + ": " + layout.description() + " needs " + std::to_string(needed) +
@@ -261,7 +171,7 @@ void checkFileSize(const std::string& file, const TiffPages& pages, const OIIO::
 bool isContiguous(const std::string& file, const TiffPages& pages, const OIIO::ImageSpec& first,
                   const Stack& stack) {
   const bool contiguous = std::int64_t(pages.pageCount()) < stack.pages();
-  if (contiguous && (largestRatio(first) != 1 || first.tile_width != 0 || pages.stripOffset(0) == 0)) {
+  if (contiguous && (tiffExpansion(first) != 1 || first.tile_width != 0 || pages.stripOffset(0) == 0)) {
     throw Error(ErrorCode::badInput,
                 file + ": ImageDescription: expected a page for each image of a compressed file, found one");
   }
@@ -278,7 +188,7 @@ struct OpenStack {
 };
 
 OpenStack openStack(const fs::path& path, TiffPages& pages) {
-  OpenStack open{shown(path), openPage(pages, 0)->spec(), {}, {}};
+  OpenStack open{shown(path), openTiffPage(pages, 0)->spec(), {}, {}};
   open.stack = describeStack(open.file, open.first, std::int64_t(pages.pageCount()));
   open.layout = layoutOf(open.file, open.first, open.stack);
   checkFileSize(open.file, pages, open.first, open.layout, open.stack);

@@ -15,7 +15,8 @@
 namespace scolopax::io {
 namespace {
 
-constexpr unsigned kPhotometricTag = 262, kStripOffsetsTag = 273;
+constexpr unsigned kPhotometricTag = 262, kDescriptionTag = 270, kStripOffsetsTag = 273, kSubIfdTag = 330;
+constexpr std::size_t kMostSubDirectories = 64;
 constexpr unsigned kMinIsWhite = 0, kMinIsBlack = 1, kPalette = 3;
 
 std::uint64_t numberFrom(const unsigned char* bytes, std::size_t size, bool bigEndian) {
@@ -26,7 +27,8 @@ std::uint64_t numberFrom(const unsigned char* bytes, std::size_t size, bool bigE
 
 }  // namespace
 
-TiffPages::TiffPages(const std::filesystem::path& path) : IOProxy(path.string(), Read) {
+TiffPages::TiffPages(const std::filesystem::path& path, std::size_t mostPages)
+    : IOProxy(path.string(), Read) {
   requireRegularFile(path);
   const auto refuse = [&](const std::string& what) {
     if (fd_ >= 0) ::close(fd_);
@@ -49,7 +51,7 @@ TiffPages::TiffPages(const std::filesystem::path& path) : IOProxy(path.string(),
   // Directories do not overlap, so together they are no larger than the file: that bounds the walk.
   std::unordered_set<std::uint64_t> seen;
   std::uint64_t directoryBytes = 0;
-  for (std::uint64_t at = bigTiff_ ? number(8, 8) : number(4, 4); at != 0;) {
+  for (std::uint64_t at = bigTiff_ ? number(8, 8) : number(4, 4); at != 0 && pages_.size() < mostPages;) {
     const std::string where = "page " + std::to_string(pages_.size() + 1) + ": ";
     if (!seen.insert(at).second) refuse(where + "expected a new directory, found an earlier one");
     const Page page = readPage(at, directoryBytes);
@@ -91,17 +93,44 @@ TiffPages::Page TiffPages::readPage(std::uint64_t start, std::uint64_t& director
                type = unsigned(numberFrom(entry + 2, 2, bigEndian_));
     const std::size_t valueAt = bigTiff_ ? 12 : 8;
     const std::uint64_t values = numberFrom(entry + 4, bigTiff_ ? 8 : 4, bigEndian_);
-    const std::size_t valueBytes = type == 3 ? 2 : type == 4 ? 4 : type == 16 ? 8 : 0;  // SHORT, LONG, LONG8
+    // SHORT; LONG, IFD; LONG8, IFD8
+    const std::size_t valueBytes = type == 3                  ? 2
+                                   : type == 4 || type == 13  ? 4
+                                   : type == 16 || type == 18 ? 8
+                                                              : 0;
+    const auto valuesStart = [&](std::size_t bytesEach) {
+      const bool inlined = values <= (bigTiff_ ? 8u : 4u) / bytesEach;
+      return inlined ? entriesStart + i * entryBytes + valueAt
+                     : numberFrom(entry + valueAt, bigTiff_ ? 8 : 4, bigEndian_);
+    };
     if (tag == kPhotometricTag && valueBytes == 2) {
       page.photometric = unsigned(numberFrom(entry + valueAt, 2, bigEndian_));
       page.photometricAt = entriesStart + i * entryBytes + valueAt;
     } else if (tag == kStripOffsetsTag && valueBytes > 0) {
-      const bool inlined = values * valueBytes <= (bigTiff_ ? 8u : 4u);
-      page.strip = inlined ? numberFrom(entry + valueAt, valueBytes, bigEndian_)
-                           : number(numberFrom(entry + valueAt, bigTiff_ ? 8 : 4, bigEndian_), valueBytes);
+      page.strip = number(valuesStart(valueBytes), valueBytes);
+    } else if (tag == kDescriptionTag && type == 2) {
+      page.descriptionAt = valuesStart(1);
+      page.descriptionBytes = values;
+    } else if (tag == kSubIfdTag && valueBytes >= 4) {
+      readSubDirectories(valuesStart(valueBytes), values, valueBytes, page);
     }
   }
   return page;
+}
+
+void TiffPages::readSubDirectories(std::uint64_t at, std::uint64_t count, std::size_t valueBytes,
+                                   Page& page) const {
+  for (std::uint64_t i = 0; i < count && page.subDirectories.size() < kMostSubDirectories; ++i)
+    page.subDirectories.push_back(number(at + i * valueBytes, valueBytes));
+}
+
+std::string TiffPages::description(std::size_t index) const {
+  const Page& page = pages_[index];
+  if (page.descriptionAt >= fileSize_) return {};
+  std::string text(std::size_t(std::min(page.descriptionBytes, fileSize_ - page.descriptionAt)), '\0');
+  const ssize_t got = ::pread(fd_, text.data(), text.size(), off_t(page.descriptionAt));
+  text.resize(std::size_t(std::max<ssize_t>(got, 0)));
+  return text.substr(0, text.find('\0'));
 }
 
 TiffPages::Patch TiffPages::patch(std::uint64_t at, std::size_t size, std::uint64_t value) const {
@@ -112,8 +141,15 @@ TiffPages::Patch TiffPages::patch(std::uint64_t at, std::size_t size, std::uint6
   return result;
 }
 
-void TiffPages::select(std::size_t index) {
-  const Page& page = pages_[index];
+void TiffPages::select(std::size_t index, std::size_t level) {
+  Page page = pages_[index];
+  if (level > 0) {
+    std::uint64_t directoryBytes = 0;
+    page = readPage(page.subDirectories.at(level - 1), directoryBytes);
+    if (page.next == 0)
+      throw Error(ErrorCode::badInput, shown(m_filename) + ": page " + std::to_string(index + 1) +
+                                           ": SubIFDs: expected directories within the file, found others");
+  }
   const std::size_t offsetBytes = bigTiff_ ? 8 : 4;
   patches_ = {patch(bigTiff_ ? 8 : 4, offsetBytes, page.start), patch(page.next, offsetBytes, 0)};
   if (page.photometricAt != 0 && (page.photometric == kMinIsWhite || page.photometric == kPalette)) {
