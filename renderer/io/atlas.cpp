@@ -192,7 +192,9 @@ Match matchAtlas(const FileStart& start) {
 VolumeFile openAtlas(const fs::path& path, const OpenOptions& options) {
   const AtlasJson json(path);
   auto atlas = std::make_shared<Atlas>(Atlas{atlasTiles(json), {}});
-  VolumeInfo volume{.levels = {atlasGrid(json, atlas->tiles)}, .worldUnit = atlasUnit(json)};
+  VolumeInfo volume;
+  volume.levels.push_back(atlasGrid(json, atlas->tiles));
+  volume.worldUnit = atlasUnit(json);
   VolumeFile file{path};
   const auto places = placeAtlasChannels(json, path, options.warn);
   const Json &names = json.list("channel_names"), &colors = json.list("channel_colors");
