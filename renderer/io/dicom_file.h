@@ -17,6 +17,9 @@
 
 namespace scolopax::io {
 
+/// The farthest that a picture may be from the origin: sums of such numbers stay finite.
+inline constexpr double kFarthestDicomMm = 1e9;
+
 /// One picture of a file. Lengths in mm, in the patient's axes: x to the left, y to the back, z to the head.
 struct DicomFrame {
   std::optional<glm::dvec3> position = {};             ///< of the first pixel's centre

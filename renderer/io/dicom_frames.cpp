@@ -32,7 +32,11 @@ std::vector<double> dicomNumbers(const gdcm::DataSet& set, const DicomTag& tag, 
 
 void takeDicomPosition(const gdcm::DataSet& set, const std::string& name, DicomFrame& frame) {
   const auto p = dicomNumbers(set, dicom::kPosition, 3, name, "ImagePositionPatient");
-  if (!p.empty()) frame.position = glm::dvec3(p[0], p[1], p[2]);
+  if (p.empty()) return;
+  if (!(std::abs(p[0]) + std::abs(p[1]) + std::abs(p[2]) <= kFarthestDicomMm))
+    failDicomField(name, "ImagePositionPatient", "at most 1e9 mm",
+                   inQuotes(dicomText(set, dicom::kPosition)));
+  frame.position = glm::dvec3(p[0], p[1], p[2]);
 }
 
 void takeDicomOrientation(const gdcm::DataSet& set, const std::string& name, DicomFrame& frame) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -72,9 +73,13 @@ void checkDicomFile(const DicomFile& file) {
   bool good = file.rows >= 1 && file.rows <= kMostSide && file.columns >= 1 && file.columns <= kMostSide &&
               (file.samples == 1 || file.samples == 3) && std::ranges::any_of(kTypes, isType) &&
               !file.frames.empty();
-  for (const DicomFrame& frame : file.frames)
-    good = good && std::isfinite(frame.slope) && frame.slope != 0 && std::isfinite(frame.intercept) &&
-           frame.segment < std::max<std::size_t>(file.segments.size(), 1);
+  for (const DicomFrame& frame : file.frames) {
+    const auto place = frame.position.value_or(glm::dvec3(0));
+    const auto axes = frame.axes.value_or(std::array{glm::dvec3(0), glm::dvec3(0)});
+    good = good && glm::length(place) <= kFarthestDicomMm && glm::length(axes[0]) <= 2 &&
+           glm::length(axes[1]) <= 2 && std::isfinite(frame.slope) && frame.slope != 0 &&
+           std::isfinite(frame.intercept) && frame.segment < std::max<std::size_t>(file.segments.size(), 1);
+  }
   if (!good) throw Error(ErrorCode::badInput, shown(file.path) + ": is damaged (its library failed)");
 }
 
