@@ -16,6 +16,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::uint64_t kLargestOmeXml = std::uint64_t(256) << 20;
+constexpr std::size_t kMostOmeChannelsOfAll = 1 << 16;
 
 struct OmeSet {
   std::vector<fs::path> files;
@@ -161,6 +162,7 @@ VolumeFile openOmeTiff(const fs::path& path, const OpenOptions& options) {
   VolumeFile file{path};
   std::vector<std::string> names;
   std::optional<Error> failed;
+  std::size_t channels = 0;
   const std::vector<OmeImage>& images = source.document.images;
   for (std::size_t i = 0; i < images.size(); ++i) {
     const std::string where = source.where + (images.size() > 1 ? ": Image " + std::to_string(i) : "");
@@ -169,11 +171,16 @@ VolumeFile openOmeTiff(const fs::path& path, const OpenOptions& options) {
       file.volumes.push_back(openOmeImage(where, images[i], files, series, options.warn));
       set->series.push_back(std::move(series));
       names.push_back(images[i].name);
+      channels += file.volumes.back().channels.size();
     } catch (const Error& error) {  // the other images may be sound
       if (images.size() == 1) throw;
       if (!failed) failed = error;
       options.warn(std::string(error.what()) + "; left out");
     }
+    if (channels > kMostOmeChannelsOfAll)
+      throw Error(ErrorCode::unsupported, where + ": expected at most " +
+                                              std::to_string(kMostOmeChannelsOfAll) +
+                                              " channels of all images, found more");
   }
   if (file.volumes.empty() && failed) throw *failed;
   if (file.volumes.empty())

@@ -116,7 +116,7 @@ void readSpacing(const OmeElement& pixels, OmeImage& image, const Warn& warn) {
 /// Times from the increment, else from the planes' own, if all times have one and they ascend.
 void readTimes(const std::string& where, const OmeElement& pixels, const pugi::xml_node& node,
                OmeImage& image, const Warn& warn) {
-  constexpr std::int64_t kMostOmeTimes = 1 << 24;
+  constexpr std::int64_t kMostOmeTimes = 1 << 20;
   if (image.sizeT > kMostOmeTimes)
     throw Error(ErrorCode::unsupported, pixels.where("SizeT") + ": expected at most " +
                                             std::to_string(kMostOmeTimes) + ", found " +
