@@ -31,6 +31,7 @@
   X(VtkXml, "VTK XML", ".vti, .vtr, .pvti, .pvtr", "")                                              \
   X(VtkLegacy, "VTK legacy", ".vtk", "")                                                            \
   X(VtkJs, "vtk.js", "folders with index.json", "")                                                 \
+  X(OpenVdb, "OpenVDB", ".vdb", SCOLOPAX_LACKS_OPENVDB)                                             \
   X(Npy, "NumPy array", ".npy", "")                                                                 \
   X(Npz, "NumPy archive", ".npz", SCOLOPAX_LACKS_ZIP)                                               \
   X(Slc, "SLC", ".slc", "")                                                                         \

@@ -30,7 +30,7 @@ std::vector<Dataset> open(const std::filesystem::path& path) {
   return openDatasets({&path, 1}, {.fourthAxis = FourthAxis::member});
 }
 
-std::vector<double> valuesOf(const Channel& channel) {
+std::vector<double> ensembleValues(const Channel& channel) {
   std::vector<double> values;
   for (std::size_t i = 0; i < channel.voxels.count(); ++i)
     values.push_back(channel.slope * double(channel.voxels.as<float>()[i]) + channel.intercept);
@@ -49,10 +49,10 @@ TEST(Ensemble, HasADataSetOfItsMembersAndOneOfTheirStatistics) {
   const auto volume = loadVolume(datasets[1], 0, 0, {});
   ASSERT_EQ(volume->channels().size(), 4u);
   // Of 1, 2, 4, 9: mean 4, squared deviations 9 + 4 + 0 + 25 = 38, divided by 3.
-  EXPECT_THAT(valuesOf(volume->channels()[0]), ElementsAre(4, 5));
-  EXPECT_THAT(valuesOf(volume->channels()[1]), ElementsAre(testing::DoubleNear(38.0 / 3, 1e-5), 0));
-  EXPECT_THAT(valuesOf(volume->channels()[2]), ElementsAre(1, 5));
-  EXPECT_THAT(valuesOf(volume->channels()[3]), ElementsAre(9, 5));
+  EXPECT_THAT(ensembleValues(volume->channels()[0]), ElementsAre(4, 5));
+  EXPECT_THAT(ensembleValues(volume->channels()[1]), ElementsAre(testing::DoubleNear(38.0 / 3, 1e-5), 0));
+  EXPECT_THAT(ensembleValues(volume->channels()[2]), ElementsAre(1, 5));
+  EXPECT_THAT(ensembleValues(volume->channels()[3]), ElementsAre(9, 5));
 }
 
 TEST(Ensemble, IsAlsoReachedByItsName) {
@@ -67,8 +67,8 @@ TEST(Ensemble, KeepsTheDigitsOfSmallVariancesOfLargeValues) {
   // Sums of squares in float would have an error of 1e5.
   const float members[4][2] = {{1e6f - 1, 0}, {1e6f + 1, 0}, {1e6f - 1, 0}, {1e6f + 1, 0}};
   const auto volume = loadVolume(open(ensemble(folder, members))[1], 0, 0, {});
-  EXPECT_NEAR(valuesOf(volume->channels()[0])[0], 1e6, 0.1);
-  EXPECT_NEAR(valuesOf(volume->channels()[1])[0], 4.0 / 3, 0.05);
+  EXPECT_NEAR(ensembleValues(volume->channels()[0])[0], 1e6, 0.1);
+  EXPECT_NEAR(ensembleValues(volume->channels()[1])[0], 4.0 / 3, 0.05);
 }
 
 TEST(Ensemble, HasNoStatisticsWhereAMemberHasNone) {
@@ -76,7 +76,7 @@ TEST(Ensemble, HasNoStatisticsWhereAMemberHasNone) {
   const float members[4][2] = {{1, 1}, {NAN, 2}, {3, 3}, {4, INFINITY}};
   const auto volume = loadVolume(open(ensemble(folder, members))[1], 0, 0, {});
   for (const Channel& channel : volume->channels())
-    for (const double value : valuesOf(channel)) EXPECT_TRUE(std::isnan(value)) << channel.name;
+    for (const double value : ensembleValues(channel)) EXPECT_TRUE(std::isnan(value)) << channel.name;
 }
 
 TEST(Ensemble, NeedsSeveralMembers) {
