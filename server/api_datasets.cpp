@@ -53,9 +53,9 @@ net::Response probeAnswer(const ApiContext& context, const net::Request& request
   const double x = queryNumber(request, "x"), y = queryNumber(request, "y"), z = queryNumber(request, "z");
   const std::size_t time = queryUnsigned(request, "time", 0);
   if (dataset->times() > 1 && time >= dataset->times())
-    throw protocol::ProtocolError(422, "/time",
-                                  "time: expected 0 to " + std::to_string(dataset->times() - 1) +
-                                      ", found " + std::to_string(time));
+    throw protocol::ProtocolError(
+        422, "/time",
+        "time: expected 0 to " + std::to_string(dataset->times() - 1) + ", found " + std::to_string(time));
   auto volume = dataset->loaded(time);
   if (!volume)
     volume = inLongRequest(context, request,
