@@ -51,11 +51,7 @@ net::Response gradientHistogramAnswer(const ApiContext& context, const net::Requ
 net::Response probeAnswer(const ApiContext& context, const net::Request& request) {
   const auto dataset = datasetAt(context, request);
   const double x = queryNumber(request, "x"), y = queryNumber(request, "y"), z = queryNumber(request, "z");
-  const std::size_t time = queryUnsigned(request, "time", 0);
-  if (dataset->times() > 1 && time >= dataset->times())
-    throw protocol::ProtocolError(
-        422, "/time",
-        "time: expected 0 to " + std::to_string(dataset->times() - 1) + ", found " + std::to_string(time));
+  const std::size_t time = dataset->stepAt(queryUnsigned(request, "time", 0));
   auto volume = dataset->loaded(time);
   if (!volume)
     volume = inLongRequest(context, request,

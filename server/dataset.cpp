@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "protocol/problem.h"
 #include "renderer/data/visible_hull.h"
 
 namespace scolopax::server {
@@ -34,17 +35,25 @@ std::size_t finestThatFits(const io::Dataset& headers, std::uint64_t limitBytes)
 }  // namespace
 
 Dataset::Dataset(io::Dataset headers, std::shared_ptr<VolumeCache> cache)
-    : headers_(std::move(headers)),
-      level_(finestThatFits(headers_, cache->limitBytes())),
+    : headers_(std::make_shared<const io::Dataset>(std::move(headers))),
+      level_(finestThatFits(*headers_, cache->limitBytes())),
       cache_(std::move(cache)) {}
 
 Dataset::Dataset(io::LoadedDataset loaded) : pinned_(loaded.volume) {
-  headers_ = headersOf(std::move(loaded));
+  headers_ = std::make_shared<const io::Dataset>(headersOf(std::move(loaded)));
   measure(*pinned_, 0);
 }
 
+std::size_t Dataset::stepAt(std::uint64_t time) const {
+  if (times() > 1 && time >= times())
+    throw protocol::ProtocolError(
+        422, "/time",
+        "time: expected 0 to " + std::to_string(times() - 1) + ", found " + std::to_string(time));
+  return stepOf(std::size_t(time));
+}
+
 std::uint64_t Dataset::memoryBytes() const {
-  return pinned_ ? pinned_->sizeBytes() : io::memoryBytes(headers_, level_);
+  return pinned_ ? pinned_->sizeBytes() : io::memoryBytes(*headers_, level_);
 }
 
 std::shared_ptr<const DatasetFacts> Dataset::facts() const {
@@ -70,10 +79,7 @@ std::shared_ptr<const Volume> Dataset::load(std::size_t time, const std::stop_to
   return volume;
 }
 
-bool Dataset::isLoaded() const {
-  const auto known = facts();
-  return pinned_ || (known && cache_->holds({this, known->time}));
-}
+bool Dataset::isLoaded() const { return pinned_ || cache_->holdsAny(this); }
 
 std::optional<LoadProgress> Dataset::loading() const {
   return pinned_ ? std::nullopt : cache_->progress(this);
@@ -81,8 +87,11 @@ std::optional<LoadProgress> Dataset::loading() const {
 
 VolumeCache::Wanted Dataset::wanted(std::size_t time) const {
   const std::size_t step = stepOf(time);
-  return {{this, step}, headers_.title, memoryBytes(), [this, step](const io::LoadOptions& options) {
-            return io::loadVolume(headers_, level_, step, options);
+  return {{this, step},
+          headers_->title,
+          memoryBytes(),
+          [headers = headers_, level = level_, step](const io::LoadOptions& options) {
+            return io::loadVolume(*headers, level, step, options);
           }};
 }
 

@@ -33,12 +33,15 @@ class Dataset {
   /// Voxels that are in memory and stay there, the same at all times.
   explicit Dataset(io::LoadedDataset loaded);
 
-  const std::string& id() const { return headers_.id; }
-  const std::string& title() const { return headers_.title; }
-  const io::Dataset& headers() const { return headers_; }
+  const std::string& id() const { return headers_->id; }
+  const std::string& title() const { return headers_->title; }
+  const io::Dataset& headers() const { return *headers_; }
   std::size_t level() const { return level_; }
-  const Grid& grid() const { return headers_.levels[level_]; }
-  std::size_t times() const { return headers_.times.count; }
+  const Grid& grid() const { return headers_->levels[level_]; }
+  std::size_t times() const { return headers_->times.count; }
+  /// The step that is shown at a scene's `time`: a data set of a single step is the same at all times, so
+  /// that one can change to it and back. Throws ProtocolError(422) at /time if there is no such step.
+  std::size_t stepAt(std::uint64_t time) const;
   /// Memory that the voxels of one time need, at most.
   std::uint64_t memoryBytes() const;
 
@@ -48,7 +51,7 @@ class Dataset {
   std::shared_ptr<const DatasetFacts> factsOrLoad(const std::stop_token& stop, std::size_t time = 0) const;
   /// The voxels if they are in memory, else nullptr.
   std::shared_ptr<const Volume> loaded(std::size_t time) const;
-  /// Whether those of facts() are in memory. Does not count as a use.
+  /// Whether voxels of any time are in memory. Does not count as a use.
   bool isLoaded() const;
   /// The voxels. Waits until they have been loaded. Throws as VolumeCache::get().
   std::shared_ptr<const Volume> load(std::size_t time, const std::stop_token& stop = {}) const;
@@ -59,10 +62,10 @@ class Dataset {
   VolumeCache::Wanted wanted(std::size_t time) const;
 
  private:
-  std::size_t stepOf(std::size_t time) const { return headers_.times.count == 1 ? 0 : time; }
+  std::size_t stepOf(std::size_t time) const { return headers_->times.count == 1 ? 0 : time; }
   void measure(const Volume& volume, std::size_t time) const;
 
-  io::Dataset headers_;
+  std::shared_ptr<const io::Dataset> headers_;  ///< shared with loads, which may outlive this
   std::size_t level_ = 0;
   std::shared_ptr<VolumeCache> cache_;
   std::shared_ptr<const Volume> pinned_;

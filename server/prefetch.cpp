@@ -9,6 +9,14 @@
 
 namespace scolopax::server {
 
+namespace {
+
+/// Macrocells x channels beyond which the macrocells of a step are not built in advance, because they stay in
+/// the memory of requests as long as the step's voxels are kept.
+constexpr std::size_t kMostIntervals = 1 << 20;
+
+}  // namespace
+
 std::vector<std::size_t> stepsAround(std::size_t time, std::size_t times, bool backwards, std::size_t most) {
   std::vector<std::size_t> steps;
   const auto add = [&](std::size_t distance, bool back) {
@@ -88,7 +96,10 @@ void Prefetch::load(const Request& request, const std::stop_token& stop) {
     const auto wanted = dataset.wanted(step);
     const auto volume = cache.getIfRoom(wanted, before, stop);
     if (!volume) return;
-    cache.attach(wanted.key, sharedMacrocells(volume, request.macrocell, stop, memory_));
+    const std::size_t intervals =
+        intervalCount(volume->grid().dims, volume->channels().size(), request.macrocell);
+    if (intervals <= kMostIntervals)
+      cache.attach(wanted.key, sharedMacrocells(volume, request.macrocell, stop, memory_));
   }
 }
 

@@ -203,13 +203,16 @@ void ProgressiveRender::buildScene(const RenderRequest& request, const OtherSess
   if (film_.begunInteractive && film_.unfinished && film_.scene)
     resolution_.passGivenUp(true, filmSize(), film_.passSeconds);
   if (dataset_ != request.scene->dataset) resolution_.forget();  // another time costs the same
-  if (dataset_ != request.scene->dataset || time_ != request.scene->time) dropRenderer();
+  const auto build = std::make_shared<SceneBuild>();
+  if (dataset_ != request.scene->dataset || time_ != request.scene->time) {
+    build->previous = std::exchange(renderer_, nullptr);
+    dropRenderer();
+  }
   if (film_.recording && !request.aovs) dropRenderer();  // to release the memory of the records
   dataset_ = request.scene->dataset;
   time_ = request.scene->time;
   film_.abandoned = film_.unfinished;
   film_.unfinished = false;
-  const auto build = std::make_shared<SceneBuild>();
   build->request = request;
   build->begin = context_.now();
   build->divisor = wantedDivisor(request, others.edited);
@@ -228,6 +231,7 @@ void ProgressiveRender::buildScene(const RenderRequest& request, const OtherSess
 
 void ProgressiveRender::ended(const std::shared_ptr<SceneBuild>& build, PassResult& result) {
   const RenderRequest& request = build->request;
+  const bool otherData = volume_ != build->volume;
   volume_ = build->volume;
   renderer_ = build->renderer;
   if (build->record) {
@@ -241,7 +245,7 @@ void ProgressiveRender::ended(const std::shared_ptr<SceneBuild>& build, PassResu
   film_.divisor = build->divisor;
   film_.begunInteractive = request.interactive;
   film_.restShown = false;
-  if (context_.prefetch) context_.prefetch->around(dataset_, time_, build->scene.macrocell);
+  if (otherData && context_.prefetch) context_.prefetch->around(dataset_, time_, build->scene.macrocell);
   result.built = build->inBackground;
   result.rebuildSeconds = secondsBetween(build->begin, context_.now());
   rebuildUs_ = microseconds(result.rebuildSeconds);

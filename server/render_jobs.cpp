@@ -27,6 +27,7 @@ Scene drawnScene(const ResolvedScene& resolved, double divisor, bool interactive
 }
 
 void SceneBuild::run(const std::stop_token& stop) {
+  previous.reset();
   if (!volume) volume = request.scene->dataset->load(request.scene->time, stop);
   if (!renderer) renderer = make(volume);
   stats = renderer->setScene(scene, stop);

@@ -33,6 +33,7 @@ struct SceneBuild {
   bool record = false;  ///< AOVs are recorded from this scene on
   bool inBackground = false;
   bool onlyChooses = false;              ///< only the automatic choice of the method takes long
+  std::shared_ptr<Renderer> previous;    ///< of other data: released first, as its memory may be needed
   std::shared_ptr<const Volume> volume;  ///< null: loaded first
   std::shared_ptr<Renderer> renderer;    ///< null: made by `make`
   MakeRenderer make;

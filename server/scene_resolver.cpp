@@ -73,15 +73,6 @@ protocol::Scene pictureOf(protocol::Scene resolved) {
   return resolved;
 }
 
-/// A data set with a single step is the same at all times, so that one can change to it and back.
-std::size_t timeOf(const protocol::Scene& scene, const Dataset& dataset) {
-  if (dataset.times() > 1 && scene.time >= dataset.times())
-    throw ProtocolError(422, "/time",
-                        "time: expected 0 to " + std::to_string(dataset.times() - 1) + ", found " +
-                            std::to_string(scene.time));
-  return dataset.times() > 1 ? scene.time : 0;
-}
-
 /// Throws Unmeasured if nothing of the data set has been loaded.
 std::shared_ptr<const DatasetFacts> factsOf(const ResolvedScene& scene) {
   auto facts = scene.dataset->facts();
@@ -223,7 +214,8 @@ SceneResolver::Resolved SceneResolver::resolve(SparseScene sparse, const Automat
   if (automatic.dataset == result->dataset) result->automatic = automatic;
   result->automatic.dataset = result->dataset;
   protocol::checkChannelCount(scene, result->dataset->headers().channels.size());
-  result->time = timeOf(scene, *result->dataset);
+  result->time = result->dataset->stepAt(scene.time);
+  scene.time = std::uint32_t(result->time);
   const auto facts = factsOf(*result);
   const VolumeFacts& volume = facts->volume;
   Scene& render = result->render;

@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <limits>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "renderer/core/error.h"
+#include "renderer/core/thread_priority.h"
 #include "renderer/core/wait_hooks.h"
 
 namespace scolopax::server {
@@ -22,8 +24,10 @@ constexpr std::chrono::seconds kEndTime{2};
 
 VolumeCache::Room::~Room() {
   const std::lock_guard lock(cache->mutex_);
-  cache->promised_ -= bytes;
+  release();
 }
+
+void VolumeCache::Room::release() { cache->promised_ -= std::exchange(bytes, 0); }
 
 std::shared_ptr<const Volume> VolumeCache::find(const Key& key) {
   const std::lock_guard lock(mutex_);
@@ -38,6 +42,12 @@ bool VolumeCache::holds(const Key& key) const {
   return entries_.contains(key);
 }
 
+bool VolumeCache::holdsAny(const void* dataset) const {
+  const std::lock_guard lock(mutex_);
+  const auto first = entries_.lower_bound({dataset, 0});
+  return first != entries_.end() && first->first.dataset == dataset;
+}
+
 VolumeCache::~VolumeCache() {
   std::map<Key, std::shared_ptr<Running>> running;
   {
@@ -49,11 +59,14 @@ VolumeCache::~VolumeCache() {
 }
 
 std::shared_ptr<const Volume> VolumeCache::get(const Wanted& wanted, const std::stop_token& stop) {
-  try {
-    return wait(wanted, kAny, stop);
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::busy) throw;
-    return wait(wanted, kAny, stop);  // it may have joined a load in advance, which gives way to others
+  for (bool again = false;; again = true) {
+    try {
+      return wait(wanted, kAny, stop);
+    } catch (const Error& error) {
+      // It may have joined a load in advance, which gives way to others, or one that was ending.
+      const bool others = error.code() == ErrorCode::busy || error.code() == ErrorCode::cancelled;
+      if (again || !others || stop.stop_requested()) throw;
+    }
   }
 }
 
@@ -70,24 +83,47 @@ std::shared_ptr<const Volume> VolumeCache::getIfRoom(const Wanted& wanted, std::
 /// Returns the volume, and waits for its load if necessary.
 std::shared_ptr<const Volume> VolumeCache::wait(const Wanted& wanted, std::uint64_t since,
                                                 const std::stop_token& stop) {
+  if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "loading was cancelled");
   if (auto volume = find(wanted.key)) return volume;
+  joinEnded();
   const Waiting waiting;  // declared first: ends when the mutex is free again
-  std::list<std::shared_ptr<Running>> ended;
   std::unique_lock lock(mutex_);
-  ended.swap(ended_);
-  std::shared_ptr<Running>& running = running_[wanted.key];
-  if (!running) {
-    running = std::make_shared<Running>();
-    running->thread = std::jthread([this, load = running.get(), wanted, since](
-                                       const std::stop_token& ending) { run(*load, wanted, since, ending); });
-  }
-  const std::shared_ptr<Running> load = running;
+  const std::shared_ptr<Running> load = running(wanted, since);
   ++load->callers;
+  load->wanted = load->wanted || since == kAny;
   changed_.wait(lock, stop, [&] { return load->done; });
   if (--load->callers == 0) load->left = std::chrono::steady_clock::now();
   if (!load->done) throw Error(ErrorCode::cancelled, "loading was cancelled");
   if (load->failure) std::rethrow_exception(load->failure);
-  return load->volume;
+  // What nobody waits for any more must not keep the volume from giving way.
+  return load->callers == 0 ? std::exchange(load->volume, nullptr) : load->volume;
+}
+
+/// The load of this volume, which is begun unless it is running. A load that nobody waits for ends then, so
+/// that there are never more of them than callers and one. Requires the mutex.
+std::shared_ptr<VolumeCache::Running> VolumeCache::running(const Wanted& wanted, std::uint64_t since) {
+  if (const auto known = running_.find(wanted.key); known != running_.end()) return known->second;
+  for (const auto& [key, load] : running_)
+    if (load->callers == 0) load->thread.request_stop();
+  const auto load = std::make_shared<Running>();
+  running_[wanted.key] = load;
+  try {
+    load->thread = std::jthread([this, own = load.get(), wanted, since](const std::stop_token& ending) {
+      if (since != kAny) lowerThreadPriority();
+      run(*own, wanted, since, ending);
+    });
+  } catch (const std::system_error&) {
+    running_.erase(wanted.key);
+    throw Error(ErrorCode::busy, wanted.title + ": cannot be loaded now: there are too many threads");
+  }
+  return load;
+}
+
+/// Joins the threads of loads that have ended.
+void VolumeCache::joinEnded() {
+  std::list<std::shared_ptr<Running>> ended;  // destroyed without the mutex, which their threads may need
+  const std::lock_guard lock(mutex_);
+  ended.swap(ended_);
 }
 
 void VolumeCache::run(Running& running, const Wanted& wanted, std::uint64_t since,
@@ -100,7 +136,7 @@ void VolumeCache::run(Running& running, const Wanted& wanted, std::uint64_t sinc
     failure = std::current_exception();
   }
   const std::lock_guard lock(mutex_);
-  running.volume = std::move(volume);
+  if (running.callers > 0) running.volume = std::move(volume);
   running.failure = failure;
   running.done = true;
   const auto own = running_.find(wanted.key);
@@ -150,8 +186,9 @@ std::shared_ptr<const Volume> VolumeCache::load(const Wanted& wanted, std::uint6
     loads_[wanted.key] = {wanted.key.time, std::string(now.stage), now.doneBytes, now.allBytes};
   };
   auto volume = wanted.load(
-      {.memoryLimitBytes = limit_, .warn = warn_, .progress = report, .stop = abandoned.get_token()});
+      {.memoryLimitBytes = room->most, .warn = warn_, .progress = report, .stop = abandoned.get_token()});
   const std::lock_guard lock(mutex_);
+  room->release();
   entries_[wanted.key] = {volume, volume->sizeBytes(), ++uses_};
   return volume;
 }
@@ -163,15 +200,16 @@ std::unique_ptr<VolumeCache::Room> VolumeCache::roomFor(const Wanted& wanted, st
                                          " (--memory)");
   for (;;) {
     std::function<bool()> release;
+    std::vector<Entry> dropped;  // destroyed without the mutex, as that takes time
     {
       const std::lock_guard lock(mutex_);
-      if (makeRoom(wanted.bytes, since)) {
+      if (makeRoom(wanted.bytes, since, dropped)) {
         promised_ += wanted.bytes;
-        return std::make_unique<Room>(this, wanted.bytes);
+        return std::make_unique<Room>(this, wanted.bytes, limit_ - held() + wanted.bytes);
       }
       if (since == kAny) release = release_;
     }
-    if (endAbandoned()) continue;
+    if (since == kAny && endAbandoned()) continue;
     if (!release || !release())
       throw Error(ErrorCode::busy, wanted.title + ": needs " + io::byteCount(wanted.bytes) +
                                        " of memory; others use " + io::byteCount(usedBytes()) + " of the " +
@@ -179,9 +217,9 @@ std::unique_ptr<VolumeCache::Room> VolumeCache::roomFor(const Wanted& wanted, st
   }
 }
 
-/// Drops volumes until so many bytes are free; false, with nothing dropped, if that is impossible. Requires
+/// Takes volumes out until so many bytes are free; false, with nothing taken, if that is impossible. Requires
 /// the mutex.
-bool VolumeCache::makeRoom(std::uint64_t bytes, std::uint64_t since) {
+bool VolumeCache::makeRoom(std::uint64_t bytes, std::uint64_t since, std::vector<Entry>& dropped) {
   std::uint64_t held = this->held();
   std::vector<std::map<Key, Entry>::iterator> victims;
   for (auto entry = entries_.begin(); entry != entries_.end(); ++entry)
@@ -191,7 +229,10 @@ bool VolumeCache::makeRoom(std::uint64_t bytes, std::uint64_t since) {
   auto end = victims.begin();
   for (; held + bytes > limit_ && end != victims.end(); ++end) held -= (*end)->second.bytes;
   if (held + bytes > limit_) return false;
-  std::for_each(victims.begin(), end, [&](const auto& entry) { entries_.erase(entry); });
+  std::for_each(victims.begin(), end, [&](const auto& entry) {
+    dropped.push_back(std::move(entry->second));
+    entries_.erase(entry);
+  });
   return true;
 }
 
@@ -220,9 +261,14 @@ void VolumeCache::attach(const Key& key, std::shared_ptr<const void> what) {
 
 std::optional<LoadProgress> VolumeCache::progress(const void* dataset) const {
   const std::lock_guard lock(mutex_);
-  for (const auto& [key, load] : loads_)
-    if (key.dataset == dataset) return load;
-  return std::nullopt;
+  std::optional<LoadProgress> inAdvance;
+  for (const auto& [key, load] : loads_) {
+    if (key.dataset != dataset) continue;
+    const auto running = running_.find(key);
+    if (running != running_.end() && running->second->wanted) return load;
+    inAdvance = load;
+  }
+  return inAdvance;
 }
 
 void VolumeCache::setRelease(std::function<bool()> release) {

@@ -17,6 +17,7 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "renderer/data/volume.h"
 #include "renderer/io/loading.h"
@@ -64,6 +65,8 @@ class VolumeCache {
   std::shared_ptr<const Volume> find(const Key& key);
   /// Whether it is in memory.
   bool holds(const Key& key) const;
+  /// Whether the data set is in memory at any time.
+  bool holdsAny(const void* dataset) const;
   /// The volume. Waits until it has been loaded; several callers share one load. When none of them waits any
   /// more, it is cancelled after a while, or at once if another load needs its memory. Throws Error: tooLarge
   /// if it can never fit into the memory, busy if others use the memory now, both before anything is read;
@@ -78,7 +81,7 @@ class VolumeCache {
   /// Keeps something alive as long as the volume is in memory.
   void attach(const Key& key, std::shared_ptr<const void> what);
 
-  /// The load of this data set that is running, if any.
+  /// A load of this data set that is running, if any; one that a caller of get() wants before others.
   std::optional<LoadProgress> progress(const void* dataset) const;
   std::uint64_t limitBytes() const { return limit_; }
   /// Of the volumes that are in memory or being loaded.
@@ -97,15 +100,19 @@ class VolumeCache {
   struct Room {
     VolumeCache* cache;
     std::uint64_t bytes;
-    Room(VolumeCache* owner, std::uint64_t size) : cache(owner), bytes(size) {}
+    std::uint64_t most;  ///< that the load may use, its promise included
+    Room(VolumeCache* owner, std::uint64_t size, std::uint64_t limit)
+        : cache(owner), bytes(size), most(limit) {}
     Room(const Room&) = delete;
     Room& operator=(const Room&) = delete;
     ~Room();
+    void release();  ///< Requires the mutex.
   };
 
   /// A load on a thread of its own.
   struct Running {
     std::size_t callers = 0;
+    bool wanted = false;                           ///< not only in advance
     std::chrono::steady_clock::time_point left{};  ///< when the last caller left
     bool done = false;
     std::shared_ptr<const Volume> volume = {};
@@ -114,10 +121,12 @@ class VolumeCache {
   };
 
   std::shared_ptr<const Volume> wait(const Wanted& wanted, std::uint64_t since, const std::stop_token& stop);
+  std::shared_ptr<Running> running(const Wanted& wanted, std::uint64_t since);
+  void joinEnded();
   void run(Running& running, const Wanted& wanted, std::uint64_t since, const std::stop_token& stop);
   bool endAbandoned();
   std::unique_ptr<Room> roomFor(const Wanted& wanted, std::uint64_t since);
-  bool makeRoom(std::uint64_t bytes, std::uint64_t since);
+  bool makeRoom(std::uint64_t bytes, std::uint64_t since, std::vector<Entry>& dropped);
   std::uint64_t held() const;
   std::shared_ptr<const Volume> load(const Wanted& wanted, std::uint64_t since, const std::stop_token& stop);
 

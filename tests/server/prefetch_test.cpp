@@ -117,6 +117,13 @@ TEST_F(TimeSeries, HasNoOtherStepsThanItsOwn) {
   }
 }
 
+TEST_F(TimeSeries, CanBeLoadedWhenItIsServedNoLonger) {
+  auto store = storeOf(1000);
+  const VolumeCache::Wanted wanted = store->first()->wanted(4);
+  store.reset();
+  EXPECT_EQ(wanted.load({})->channels()[0].histogram.maximum, 4);
+}
+
 TEST_F(TimeSeries, IsLoadedInAdvanceInTheDirectionOfPlay) {
   const auto store = storeOf(1000);
   Prefetch prefetch(nullptr);

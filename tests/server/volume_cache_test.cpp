@@ -196,6 +196,35 @@ TEST_F(VolumeCacheTest, EndsItsLoadsWhenItEnds) {
   EXPECT_TRUE(load.cancelled);
 }
 
+TEST_F(VolumeCacheTest, HasOneLoadAtMostThatNobodyWaitsFor) {
+  VolumeCache cache(3 * kBytes, {}, std::chrono::hours(1));
+  LongLoad first, second;
+  first.abandon(cache, first.of(wanted(0)));
+  second.abandon(cache, second.of(wanted(1)));
+  while (cache.usedBytes() > kBytes) std::this_thread::yield();
+  EXPECT_TRUE(first.cancelled);
+  second.go = true;
+}
+
+TEST_F(VolumeCacheTest, DropsTheVolumeThatWasLoadedLast) {
+  for (std::size_t time = 0; time < 20; ++time) EXPECT_NE(cache_.get(wanted(time), {}), nullptr);
+  EXPECT_EQ(loads_, 20) << "none was refused at first";
+  VolumeCache one(kBytes);
+  for (std::size_t time = 0; time < 5; ++time) {
+    bool asked = false;
+    one.setRelease([&] { return asked = true, false; });
+    EXPECT_NE(one.get(wanted(time), {}), nullptr);
+    EXPECT_FALSE(asked) << "nothing else has to give way";
+  }
+}
+
+TEST_F(VolumeCacheTest, BeginsNoLoadForACallerWhoHasLeft) {
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_EQ(codeOf([&] { cache_.get(wanted(0), stop.get_token()); }), ErrorCode::cancelled);
+  EXPECT_EQ(loads_, 0);
+}
+
 TEST_F(VolumeCacheTest, GivesItsRoomBackWhenALoadFails) {
   VolumeCache::Wanted broken = wanted(0);
   broken.load = [](const io::LoadOptions&) -> std::shared_ptr<const Volume> {
