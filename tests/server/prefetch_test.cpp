@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "protocol/problem.h"
 #include "renderer/core/error.h"
 #include "renderer/io/datasets.h"
 #include "server/dataset_store.h"
