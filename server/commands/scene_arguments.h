@@ -21,8 +21,8 @@ struct SceneArguments {
   std::vector<std::string> assignments = {};  ///< "channels.0.density=0.1"
 };
 
-/// Adds SCENE, --data, --fourth-axis, --allow-host, --time and --set, which fill `arguments`. `arguments` must
-/// live as long as the command.
+/// Adds SCENE, --data, --fourth-axis, --allow-host, --time and --set, which fill `arguments`. `arguments`
+/// must live as long as the command.
 void addSceneArguments(CLI::App& command, SceneArguments& arguments);
 
 /// Loads the data, reads the scene and applies the assignments in order. Throws Error or ProtocolError.
