@@ -12,8 +12,6 @@ namespace scolopax::io {
 namespace fs = std::filesystem;
 namespace {
 
-bool isDigit(char c) { return c >= '0' && c <= '9'; }
-
 std::string_view digitsAt(std::string_view text, std::size_t at) {
   std::size_t end = at;
   while (end < text.size() && isDigit(text[end])) ++end;
