@@ -66,7 +66,7 @@ std::vector<Opened> listAll(std::span<const fs::path> names, const OpenOptions& 
   for (const fs::path& given : names) {
     const DataName name = splitName(given);
     std::error_code ignored;
-    if (!name.inner.empty() || !fs::is_directory(name.path, ignored) || findFormat(name.path)) {
+    if (!name.inner.empty() || !fs::is_directory(name.path, ignored) || claimsAllBelow(name.path)) {
       all.push_back({name});
       continue;
     }
@@ -74,7 +74,8 @@ std::vector<Opened> listAll(std::span<const fs::path> names, const OpenOptions& 
     if (files.empty())
       throw Error(ErrorCode::notFound,
                   shown(name.path) + ": expected volume files in this folder, found none");
-    for (const fs::path& file : files) all.push_back({{file}, true});
+    const bool itself = files.size() == 1 && files[0] == name.path;
+    for (const fs::path& file : files) all.push_back({{file}, !itself});
   }
   return all;
 }

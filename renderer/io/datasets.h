@@ -43,7 +43,7 @@ struct Dataset {
   std::vector<Source> sources = {};
 };
 
-/// Opens what the names say. In place of a folder, unless a format claims it, come the volumes in it
+/// Opens what the names say. In place of a folder, unless a format claims all of it, come the volumes in it
 /// (volumesIn); those that fail are left out with a warning. Numbered files become the steps of a series
 /// (joinSeries), unless options.fourthAxis is channel. Then groups volumes whose finest grids agree
 /// (sameGrid) and whose times do, or that have only one, in the order of first appearance; those in a folder

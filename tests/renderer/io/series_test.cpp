@@ -3,6 +3,9 @@
 #include "renderer/io/series.h"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <cstdlib>
 
 #include "renderer/io/folder.h"
 #include "tests/renderer/io/io_test_support.h"
@@ -154,7 +157,7 @@ TEST(Series, HaveOneFileOfEachNumber) {
 TEST(Series, OfTheSameTimesBecomeChannels) {
   const TempDir folder;
   std::vector<fs::path> paths;
-  for (const char* stem : {"a_01", "a_02", "a_03", "b_01", "b_02", "b_03", "c_01", "c_02", "c_04"})
+  for (const char* stem : {"a_01", "a_02", "a_03", "b_01", "b_02", "b_03", "d_01", "d_02", "d_04"})
     paths.push_back(cube(folder / "", stem, 2, 1));
   const auto datasets = open(paths);
   ASSERT_EQ(datasets.size(), 2u);
@@ -169,7 +172,7 @@ TEST(Series, TakeTheTimesOfTheFirstThatTellsThem) {
                                          "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 2 2 2 3\n"
                                          "kinds: domain domain domain time\nencoding: raw\n\n" +
                                              std::string(24, 'x'))};
-  for (const char* stem : {"a_01", "a_02", "a_03", "c_01", "c_02", "c_04"})
+  for (const char* stem : {"a_01", "a_02", "a_03", "d_01", "d_02", "d_04"})
     paths.push_back(cube(folder / "", stem, 2, 1));
   const auto datasets = open(paths);
   ASSERT_EQ(datasets.size(), 2u);
@@ -229,6 +232,64 @@ TEST(Folders, JoinNoMoreChannelsThanAVolumeHolds) {
   ASSERT_EQ(datasets.size(), 2u);
   EXPECT_EQ(datasets[0].channels.size(), std::size_t(kMaxChannels));
   EXPECT_EQ(datasets[1].channels.size(), 1u);
+}
+
+TEST(Folders, LeaveOutLinksThatLeadOutOfThem) {
+  const TempDir outside, folder;
+  const fs::path file = cube(outside / "", "secret", 2, 1);
+  fs::create_directory(outside / "secret.zarr");
+  writeBytes(outside / "secret.zarr/.zgroup", "{}");
+  cube(folder / "deep", "a", 2, 1);
+  fs::create_symlink(file, folder / "file.nrrd");
+  fs::create_symlink(file, folder / "deep/file.nrrd");
+  fs::create_directory_symlink(outside / "secret.zarr", folder / "claimed.zarr");
+  fs::create_directory_symlink(outside / "", folder / "plain");
+  fs::create_symlink(folder / "deep/a.nrrd", folder / "inside.nrrd");
+  EXPECT_THAT(volumesIn(folder.path(), {}), ElementsAre(folder / "inside.nrrd", folder / "deep/a.nrrd"));
+}
+
+TEST(Folders, OfALinkAreThoseThatItLeadsTo) {
+  const TempDir outside, folder;
+  cube(outside / "", "a", 2, 1);
+  fs::create_directory_symlink(outside.path(), folder / "link");
+  EXPECT_THAT(volumesIn(folder / "link", {}), ElementsAre(folder / "link/a.nrrd"));
+}
+
+/// Takes the rights of the administrator, who may read everything, for a while.
+class AsNobody {
+ public:
+  AsNobody() : own_(geteuid()) {
+    if (own_ == 0 && seteuid(65534) != 0) throw std::runtime_error("no other user");
+  }
+  ~AsNobody() {
+    if (own_ == 0 && seteuid(0) != 0) std::abort();
+  }
+  AsNobody(const AsNobody&) = delete;
+  AsNobody& operator=(const AsNobody&) = delete;
+
+ private:
+  uid_t own_;
+};
+
+TEST(Folders, LeaveOutWhatCannotBeReadWithAWarning) {
+  const TempDir folder;
+  cube(folder / "shut", "x", 2, 1);
+  cube(folder / "z", "y", 2, 1);
+  const fs::path file = cube(folder / "", "closed", 2, 1);
+  fs::permissions(folder.path(), fs::perms(0755));
+  fs::permissions(folder / "shut", fs::perms::none);
+  fs::permissions(file, fs::perms::none);
+  std::vector<std::string> warnings;
+  const auto warn = [&](const std::string& line) { warnings.push_back(line); };
+  {
+    const AsNobody nobody;
+    EXPECT_THAT(volumesIn(folder.path(), {.warn = warn}), ElementsAre(folder / "z/y.nrrd"));
+    EXPECT_THAT(errorOf([&] { volumesIn(folder / "shut", {}); }), HasSubstr("shut: Permission denied"));
+  }
+  EXPECT_THAT(warnings,
+              testing::UnorderedElementsAre(testing::AllOf(HasSubstr("closed.nrrd"), HasSubstr("; left out")),
+                                            testing::AllOf(HasSubstr("shut"), HasSubstr("; left out"))));
+  fs::permissions(folder / "shut", fs::perms::owner_all);
 }
 
 TEST(Folders, WithoutVolumesAreRefused) {
