@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <unordered_map>
 
 #include "renderer/core/error.h"
 #include "renderer/io/channel_names.h"
@@ -20,7 +21,7 @@ namespace {
 std::string slugOf(const std::string& text) {
   std::string slug;
   for (const char c : lowerCase(text)) {
-    if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'))
+    if ((c >= 'a' && c <= 'z') || isDigit(c))
       slug += c;
     else if (!slug.empty() && slug.back() != '-')
       slug += '-';
@@ -53,9 +54,10 @@ struct Opened {
   bool dropped = false;  ///< read through another file
 };
 
-bool isSameFile(const fs::path& a, const fs::path& b) {
+/// The path without links and dots; "" of what does not exist.
+std::string canonicalPath(const fs::path& path) {
   std::error_code ignored;
-  return fs::equivalent(a, b, ignored);
+  return fs::canonical(path, ignored).string();
 }
 
 /// The names, with the volumes of a folder in its place unless it is a volume itself.
@@ -64,7 +66,7 @@ std::vector<Opened> listAll(std::span<const fs::path> names, const OpenOptions& 
   for (const fs::path& given : names) {
     const DataName name = splitName(given);
     std::error_code ignored;
-    if (!name.inner.empty() || !fs::is_directory(name.path, ignored) || findFormat(name.path)) {
+    if (!name.inner.empty() || !fs::is_directory(name.path, ignored) || claimsAllBelow(name.path)) {
       all.push_back({name});
       continue;
     }
@@ -72,7 +74,8 @@ std::vector<Opened> listAll(std::span<const fs::path> names, const OpenOptions& 
     if (files.empty())
       throw Error(ErrorCode::notFound,
                   shown(name.path) + ": expected volume files in this folder, found none");
-    for (const fs::path& file : files) all.push_back({{file}, true});
+    const bool itself = files.size() == 1 && files[0] == name.path;
+    for (const fs::path& file : files) all.push_back({{file}, !itself});
   }
   return all;
 }
@@ -82,9 +85,30 @@ void joinAllSeries(std::vector<Opened>& all) {
   std::vector<std::shared_ptr<const VolumeFile>> files;
   for (const Opened& one : all)
     if (one.file && one.name.inner.empty()) files.push_back(one.file);
-  for (const auto& series : joinSeries(files))
-    for (Opened& one : all)
-      if (one.file && one.file->path == series->path && one.name.inner.empty()) one.file = series;
+  std::unordered_map<std::string, std::shared_ptr<const VolumeFile>> joined;  // by their paths
+  for (const auto& file : joinSeries(files)) joined.try_emplace(file->path.string(), file);
+  for (Opened& one : all) {
+    if (!one.file || !one.name.inner.empty()) continue;
+    const auto series = joined.find(one.file->path.string());
+    if (series != joined.end()) one.file = series->second;
+  }
+}
+
+/// Drops files that others among them read.
+void dropDataFiles(std::vector<Opened>& all) {
+  std::unordered_map<std::string, std::vector<std::size_t>> indicesOf;  // of each canonical path
+  for (std::size_t i = 0; i < all.size(); ++i) indicesOf[canonicalPath(all[i].name.path)].push_back(i);
+  indicesOf.erase("");
+  for (std::size_t header = 0; header < all.size(); ++header) {
+    if (!all[header].file || all[header].dropped) continue;
+    for (const fs::path& data : all[header].file->dataFiles) {
+      const auto found = indicesOf.find(canonicalPath(data));
+      if (found == indicesOf.end()) continue;
+      for (const std::size_t i : found->second)
+        if (i != header) all[i].dropped = true;
+    }
+  }
+  std::erase_if(all, [](const Opened& one) { return one.dropped; });
 }
 
 /// Opens all files. One that fails may be the data file of a header among the others, so its error waits.
@@ -105,15 +129,7 @@ std::vector<Opened> openAll(std::span<const fs::path> names, const OpenOptions& 
   if (options.fourthAxis == FourthAxis::member)
     for (Opened& one : all)
       if (one.file) one.file = withStatistics(one.file);
-  for (const Opened& header : all) {
-    if (!header.file || header.dropped) continue;
-    for (Opened& other : all)
-      if (&other != &header && std::ranges::any_of(header.file->dataFiles, [&](const fs::path& data) {
-            return isSameFile(data, other.name.path);
-          }))
-        other.dropped = true;
-  }
-  std::erase_if(all, [](const Opened& one) { return one.dropped; });
+  dropDataFiles(all);
   for (const Opened& one : all) {
     if (one.error && !one.inFolder) throw *one.error;
     if (!options.warn) continue;
@@ -124,11 +140,17 @@ std::vector<Opened> openAll(std::span<const fs::path> names, const OpenOptions& 
   return all;
 }
 
+/// Whether both can be shown at one time: either has a single one, or they have the same, as far as is known.
+bool sameTimes(const Times& a, const Times& b) {
+  if (a.count == 1 || b.count == 1) return true;
+  if (a.count != b.count) return false;
+  return a.values.empty() || b.values.empty() || (a.values == b.values && a.unit == b.unit);
+}
+
 bool agree(const Dataset& dataset, const VolumeInfo& volume) {
-  const std::size_t a = dataset.times.count, b = volume.times.count;
   const Dataset::Source& first = dataset.sources.front();
   if (first.file->volumes[first.part.volume].derived != volume.derived) return false;
-  return sameGrid(dataset.levels[0], volume.levels[0]) && (a == b || a == 1 || b == 1);
+  return sameGrid(dataset.levels[0], volume.levels[0]) && sameTimes(dataset.times, volume.times);
 }
 
 /// Whether a part of a file in a folder may join: the data set is of the same folder and has room.
@@ -146,7 +168,8 @@ void add(Dataset& dataset, const Opened& opened, const Part& part) {
          sameGrid(dataset.levels[levels], volume.levels[levels]))
     ++levels;
   dataset.levels.resize(levels);
-  if (volume.times.count > dataset.times.count) dataset.times = volume.times;
+  const bool moreTimes = volume.times.count > dataset.times.count;
+  if (moreTimes || (volume.times.count > 1 && dataset.times.values.empty())) dataset.times = volume.times;
   if (dataset.worldUnit.empty()) dataset.worldUnit = volume.worldUnit;
   const auto addChannel = [&](std::size_t channel) { dataset.channels.push_back(volume.channels[channel]); };
   if (part.channels.empty())

@@ -43,13 +43,13 @@ struct Dataset {
   std::vector<Source> sources = {};
 };
 
-/// Opens what the names say. In place of a folder, unless a format claims it, come the volumes in it
+/// Opens what the names say. In place of a folder, unless a format claims all of it, come the volumes in it
 /// (volumesIn); those that fail are left out with a warning. Numbered files become the steps of a series
 /// (joinSeries), unless options.fourthAxis is channel. Then groups volumes whose finest grids agree
-/// (sameGrid) and whose numbers of times do, in the order of first appearance; those in a folder only with
-/// others of the same folder, as long as there is room. A data file whose header is also among the files is
-/// read only through that header. Throws Error: notFound for something that is not in a file, unsupported for
-/// more than kMaxChannels on one grid, naming what there is to choose from, and as openFile.
+/// (sameGrid) and whose times do, or that have only one, in the order of first appearance; those in a folder
+/// only with others of the same folder, as long as there is room. A data file whose header is also among the
+/// files is read only through that header. Throws Error: notFound for something that is not in a file,
+/// unsupported for more than kMaxChannels on one grid, naming what there is to choose from, and as openFile.
 std::vector<Dataset> openDatasets(std::span<const std::filesystem::path> names,
                                   const OpenOptions& options = {});
 

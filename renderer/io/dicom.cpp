@@ -46,16 +46,24 @@ bool isDicomFile(const fs::path& path) {
   }
 }
 
-/// DICOM files in and below a folder, sorted; at most `mostFiles` of them, after at most `mostEntries`.
+/// Whether all DICOM files below a folder belong together, not only those directly in it.
+bool hasDicomDirectory(const fs::path& folder) {
+  std::error_code failed;
+  return fs::exists(folder / "DICOMDIR", failed);
+}
+
+/// DICOM files in a folder, and below it if it has a DICOMDIR, sorted; at most `mostFiles` of them, after at
+/// most `mostEntries`.
 std::vector<fs::path> dicomFilesIn(const fs::path& folder, std::size_t mostFiles, std::size_t mostEntries,
                                    const std::stop_token& stop) {
   std::vector<fs::path> files;
+  const int deepest = hasDicomDirectory(folder) ? kDeepestDicomFolder : 0;
   std::error_code failed;
   fs::recursive_directory_iterator entry(folder, fs::directory_options::skip_permission_denied, failed), end;
   for (std::size_t seen = 0; !failed && entry != end && files.size() < mostFiles && seen < mostEntries;
        entry.increment(failed), ++seen) {
     if (stop.stop_requested()) throw Error(ErrorCode::cancelled, "loading was cancelled");
-    if (entry.depth() >= kDeepestDicomFolder) entry.disable_recursion_pending();
+    if (entry.depth() >= deepest) entry.disable_recursion_pending();
     if (isDicomFile(entry->path())) files.push_back(entry->path());
   }
   std::ranges::sort(files);
@@ -181,10 +189,10 @@ std::vector<VoxelBuffer> readDicom(const DicomVolumes& dicom, const VolumeInfo& 
 }  // namespace
 
 Match matchDicom(const FileStart& start) {
-  constexpr std::size_t kMostEntries = 200;
+  constexpr std::size_t kMostEntries = 2000;
   if (start.folder) {
-    if (start.contains("DICOMDIR")) return Match::content;
-    return dicomFilesIn(start.path, 1, kMostEntries, {}).empty() ? Match::no : Match::content;
+    if (hasDicomDirectory(start.path)) return Match::content;
+    return dicomFilesIn(start.path, 1, kMostEntries, {}).empty() ? Match::no : Match::files;
   }
   if (startsLikeDicom(start.bytes) || isZippedDicom(start)) return Match::content;
   return start.hasEnding(".dcm") || start.hasEnding(".dicom") ? Match::name : Match::no;

@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -15,15 +16,25 @@
 namespace scolopax::io {
 namespace {
 
-constexpr std::size_t kStatisticCount = 4;
+enum Statistic : std::size_t { kMean, kVariance, kMinimum, kMaximum, kStatisticCount };
 constexpr std::string_view kStatisticNames[kStatisticCount] = {"mean", "variance", "minimum", "maximum"};
+
+/// Which statistics of one channel are asked for.
+using Wanted = std::array<bool, kStatisticCount>;
+
+/// The statistics that a channel's wanted ones need: the mean is what variances are updated from.
+Wanted neededFor(Wanted wanted) {
+  wanted[kMean] = wanted[kMean] || wanted[kVariance];
+  return wanted;
+}
 
 /// The statistics of one channel, voxel by voxel.
 struct ChannelStatistics {
-  VoxelBuffer all[kStatisticCount];
+  VoxelBuffer all[kStatisticCount];  ///< empty where not needed
 
-  explicit ChannelStatistics(std::size_t voxels) {
-    for (VoxelBuffer& one : all) one = VoxelBuffer(ScalarType::f32, voxels);
+  ChannelStatistics(const Wanted& needed, std::size_t voxels) {
+    for (std::size_t i = 0; i < kStatisticCount; ++i)
+      if (needed[i]) all[i] = VoxelBuffer(ScalarType::f32, voxels);
   }
 
   /// Adds the member of this number, from 1.
@@ -39,34 +50,61 @@ struct ChannelStatistics {
 
   /// Sums of squares become variances.
   void finish(std::size_t members) {
-    for (float& sum : all[1].as<float>()) sum = float(double(sum) / double(members - 1));
+    for (float& sum : all[kVariance].as<float>()) sum = float(double(sum) / double(members - 1));
   }
 
  private:
+  /// nullptr if the statistic is not needed.
+  float* at(Statistic statistic, std::size_t i) {
+    const auto values = all[statistic].as<float>();
+    return values.empty() ? nullptr : &values[i];
+  }
+
+  /// What is not a number stays so, whatever is added.
   void addValue(std::size_t i, double value, double number) {
-    float& mean = all[0].as<float>()[i];
-    float& squares = all[1].as<float>()[i];
-    float& least = all[2].as<float>()[i];
-    float& most = all[3].as<float>()[i];
-    if (number == 1) mean = squares = 0, least = most = float(value);
-    if (std::isnan(mean)) return;
-    if (!std::isfinite(value)) {
-      mean = squares = least = most = std::numeric_limits<float>::quiet_NaN();
-      return;
-    }
-    const double before = value - double(mean), next = double(mean) + before / number;
-    squares = float(double(squares) + before * (value - next));
-    mean = float(next);
-    least = std::min(least, float(value));
-    most = std::max(most, float(value));
+    if (!std::isfinite(value)) value = std::numeric_limits<double>::quiet_NaN();
+    const bool replaces = number == 1 || std::isnan(value);
+    if (float* least = at(kMinimum, i)) *least = replaces ? float(value) : std::min(*least, float(value));
+    if (float* most = at(kMaximum, i)) *most = replaces ? float(value) : std::max(*most, float(value));
+    float* mean = at(kMean, i);
+    if (!mean) return;
+    const double old = number == 1 ? 0 : double(*mean), before = value - old, next = old + before / number;
+    if (float* squares = at(kVariance, i))
+      *squares = float((number == 1 ? 0 : double(*squares)) + before * (value - next));
+    *mean = float(next);
   }
 };
+
+/// Channels of the members, ascending, that these channels of their statistics are of.
+std::vector<std::size_t> memberChannels(const std::vector<std::size_t>& channels) {
+  std::vector<std::size_t> members;
+  for (const std::size_t channel : channels)
+    if (members.empty() || members.back() != channel / kStatisticCount)
+      members.push_back(channel / kStatisticCount);
+  return members;
+}
+
+/// For each of `members`, the statistics that are needed for `channels`.
+std::vector<Wanted> neededOf(const std::vector<std::size_t>& channels,
+                             const std::vector<std::size_t>& members) {
+  std::vector<Wanted> needed(members.size(), Wanted{});
+  std::size_t member = 0;
+  for (const std::size_t channel : channels) {
+    while (members[member] != channel / kStatisticCount) ++member;
+    needed[member][channel % kStatisticCount] = true;
+  }
+  std::ranges::transform(needed, needed.begin(), neededFor);
+  return needed;
+}
 
 VolumeInfo statisticsOf(const VolumeInfo& members) {
   VolumeInfo info = members;
   info.path += (info.path.empty() ? "" : "/") + std::string(kStatistics);
   info.times = {};
   info.derived = true;
+  info.readBytes = [members](std::size_t level, const std::vector<std::size_t>& channels) {
+    return saturatingProduct(storedBytes(members, level, memberChannels(channels)), members.times.count);
+  };
   info.channels.clear();
   for (const ChannelInfo& channel : members.channels)
     for (const std::string_view name : kStatisticNames) {
@@ -81,17 +119,17 @@ VolumeInfo statisticsOf(const VolumeInfo& members) {
 std::vector<VoxelBuffer> readStatistics(const VolumeFile& file, std::size_t volume, const Part& part,
                                         Loading& loading) {
   const VolumeInfo& members = file.volumes[volume];
-  Part member{.volume = volume, .level = part.level};
-  for (const std::size_t channel : part.channels)
-    if (member.channels.empty() || member.channels.back() != channel / kStatisticCount)
-      member.channels.push_back(channel / kStatisticCount);
+  Part member{.volume = volume, .level = part.level, .channels = memberChannels(part.channels)};
+  const std::vector<Wanted> needed = neededOf(part.channels, member.channels);
+  std::size_t buffers = 0;
+  for (const Wanted& one : needed) buffers += std::size_t(std::ranges::count(one, true));
   const std::size_t voxels = members.levels[part.level].voxelCount();
   loading.checkMemory(
       shown(file.path) + ": statistics over " + std::to_string(members.times.count) + " members",
       saturatingSum(memoryBytes(members, part.level, member.channels),
-                    saturatingProduct(voxels * sizeof(float), kStatisticCount * member.channels.size())));
+                    saturatingProduct(voxels * sizeof(float), buffers)));
   std::vector<ChannelStatistics> statistics;
-  for (std::size_t i = 0; i < member.channels.size(); ++i) statistics.emplace_back(voxels);
+  for (const Wanted& one : needed) statistics.emplace_back(one, voxels);
   for (member.time = 0; member.time < members.times.count; ++member.time) {
     const std::vector<ChannelSource> values = load(file, member, loading).channels;
     loading.checkStop();

@@ -52,19 +52,19 @@ std::string knownFormats() {
   return known;
 }
 
-const Format* matchOf(const FileStart& start) {
-  const Format* byName = nullptr;
+FormatMatch matchOf(const FileStart& start) {
+  FormatMatch best;
   for (const Format& format : kFormats) {
     const Match match = format.match(start);
-    if (match == Match::content) return &format;
-    if (match == Match::name && !byName) byName = &format;
+    if (match == Match::content) return {&format, match};
+    if (match > best.match) best = {&format, match};
   }
-  return byName;
+  return best;
 }
 
 const Format& formatOf(const fs::path& path) {
   const FileStart start = startOf(path);
-  if (const Format* format = matchOf(start)) return *format;
+  if (const Format* format = matchOf(start).format) return *format;
   throw Error(ErrorCode::unsupported, shown(path) + ": expected " +
                                           (start.folder ? "a file, or a folder of " : "") + "one of " +
                                           knownFormats());
@@ -128,13 +128,15 @@ bool FileStart::contains(std::string_view entry) const {
 
 std::span<const Format> formats() { return kFormats; }
 
-const Format* findFormat(const fs::path& path) {
+FormatMatch findMatch(const fs::path& path) {
   try {
     return matchOf(startOf(path));
   } catch (const Error&) {  // cannot be read
-    return nullptr;
+    return {};
   }
 }
+
+const Format* findFormat(const fs::path& path) { return findMatch(path).format; }
 
 std::shared_ptr<const VolumeFile> openFile(const Format& format, const fs::path& path,
                                            const OpenOptions& options) {

@@ -58,8 +58,10 @@ struct FileStart {
 /// Whether the path is that of something on a server: "http://..." or "https://...".
 bool isUrl(const std::filesystem::path& path);
 
-/// How well a file matches a format. What it contains takes precedence over its name.
-enum class Match { no, name, content };
+/// How well a file or folder matches a format. What it contains takes precedence over its name. A folder that
+/// matches by name or content is the format's with all that is below it; `files` is for a folder of which
+/// only the format's files directly in it are read, as one.
+enum class Match { no, name, files, content };
 
 struct Format {
   std::string_view name;     ///< "NIfTI"
@@ -83,6 +85,13 @@ std::span<const Format> formats();
 
 /// The format that matches a file or folder best; nullptr if none does or if it cannot be read.
 const Format* findFormat(const std::filesystem::path& path);
+
+/// The same, and how it matches.
+struct FormatMatch {
+  const Format* format = nullptr;
+  Match match = Match::no;
+};
+FormatMatch findMatch(const std::filesystem::path& path);
 
 /// Opens a file, folder or URL with the format that matches it best. Never waits for a pipe. Names are clean
 /// text in what it returns. Throws Error: unsupported, naming the known formats, if none matches, and naming

@@ -6,7 +6,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <tuple>
 
 #include "renderer/io/text.h"
 
@@ -14,8 +13,6 @@ namespace scolopax::io {
 namespace {
 
 using File = std::shared_ptr<const VolumeFile>;
-
-bool isDigit(char c) { return c >= '0' && c <= '9'; }
 
 /// Whether the text ends with a word that counts channels or slices.
 bool countsOther(std::string_view before) {
@@ -31,9 +28,11 @@ bool hasOneStep(const VolumeFile& file) {
   return std::ranges::all_of(file.volumes, [](const VolumeInfo& v) { return v.times.count == 1; });
 }
 
+/// Whether the channels of one stand for those of the other: their scales hold for all steps.
 bool sameChannels(const VolumeInfo& a, const VolumeInfo& b, bool named) {
   return std::ranges::equal(a.channels, b.channels, [&](const ChannelInfo& x, const ChannelInfo& y) {
-    return x.type == y.type && (!named || x.name == y.name);
+    return x.type == y.type && x.unit == y.unit && x.slope == y.slope && x.intercept == y.intercept &&
+           (!named || x.name == y.name);
   });
 }
 
@@ -46,9 +45,35 @@ bool sameVolumes(const VolumeFile& a, const VolumeFile& b) {
   });
 }
 
-File joined(std::vector<std::pair<double, File>> steps) {
-  std::ranges::stable_sort(steps, {}, [](const auto& step) { return step.first; });
-  auto series = std::make_shared<VolumeFile>(*steps[0].second);
+/// What may become a series: the steps by their numbers.
+struct Group {
+  File first = {};
+  std::map<double, File> steps = {};
+
+  /// Whether the file is now a step: one like the first, of a number that no other has.
+  bool take(double number, const File& file) {
+    if (!first) first = file;
+    return sameVolumes(*first, *file) && steps.emplace(number, file).second;
+  }
+};
+
+struct StepName {
+  std::string group;  ///< the path without the number
+  double number = 0;
+};
+
+/// None if the file cannot be a step.
+std::optional<StepName> stepName(const VolumeFile& file) {
+  const std::string filename = file.path.filename().string();
+  const NumberedName name = numberedName(filename);
+  if (!name.numbered || !hasOneStep(file)) return std::nullopt;
+  // No name contains a slash.
+  const std::string unnumbered = std::string(name.before) + "/" + std::string(name.after);
+  return StepName{file.path.parent_path().string() + "/" + unnumbered, name.number};
+}
+
+File joined(const std::map<double, File>& steps) {
+  auto series = std::make_shared<VolumeFile>(*steps.begin()->second);
   std::vector<File> files;
   Times times{.count = steps.size()};
   for (const auto& [number, file] : steps) {
@@ -87,32 +112,20 @@ NumberedName numberedName(std::string_view filename) {
 }
 
 std::vector<File> joinSeries(std::span<const File> files) {
-  using Key = std::tuple<std::filesystem::path, std::string, std::string>;
-  std::map<Key, std::vector<std::pair<double, File>>> groups;
-  const auto keyOf = [](const VolumeFile& file, double* number) -> std::optional<Key> {
-    const std::string filename = file.path.filename().string();
-    const NumberedName name = numberedName(filename);
-    if (!name.numbered || !hasOneStep(file)) return std::nullopt;
-    *number = name.number;
-    return Key{file.path.parent_path(), name.before, name.after};
-  };
-  double number = 0;
-  for (const File& file : files)
-    if (const auto key = keyOf(*file, &number)) {
-      auto& group = groups[*key];
-      if (group.empty() || sameVolumes(*group[0].second, *file)) group.emplace_back(number, file);
-    }
-  std::vector<File> result;
+  std::map<std::string, Group> groups;
+  std::vector<const Group*> groupOf;  // of each file; nullptr if it stays alone
   for (const File& file : files) {
-    const auto key = keyOf(*file, &number);
-    const auto group = key ? groups.find(*key) : groups.end();
-    const auto inGroup = [&] {
-      return std::ranges::any_of(group->second, [&](const auto& step) { return step.second == file; });
-    };
-    if (group == groups.end() || group->second.size() < kLeastSteps || !inGroup())
-      result.push_back(file);
-    else if (group->second[0].second == file)
-      result.push_back(joined(group->second));
+    const auto name = stepName(*file);
+    Group* group = name ? &groups[name->group] : nullptr;
+    groupOf.push_back(group && group->take(name->number, file) ? group : nullptr);
+  }
+  std::vector<File> result;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const Group* group = groupOf[i];
+    if (!group || group->steps.size() < kLeastSteps)
+      result.push_back(files[i]);
+    else if (group->first == files[i])
+      result.push_back(joined(group->steps));
   }
   return result;
 }

@@ -24,9 +24,10 @@ NumberedName numberedName(std::string_view filename);
 inline constexpr std::size_t kLeastSteps = 3;
 
 /// Joins files in one folder, if at least kLeastSteps of them have names that differ in their number only,
-/// each holds a single step, and their volumes have the same paths, grids and channels. A series takes the
-/// place of its first file, its steps are sorted by number, and its other files become its dataFiles. Other
-/// files stay as they are.
+/// each holds a single step, and their volumes have the same paths, grids and channels, with the same units
+/// and scales. Of files with the same number, only the first joins. A series takes the place of its first
+/// file and has the path of that with the least number, its steps are sorted by number, and its files become
+/// its dataFiles. Other files stay as they are.
 std::vector<std::shared_ptr<const VolumeFile>> joinSeries(
     std::span<const std::shared_ptr<const VolumeFile>> files);
 

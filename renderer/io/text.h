@@ -11,6 +11,9 @@
 
 namespace scolopax::io {
 
+/// Whether it is one of 0 to 9, in every locale.
+constexpr bool isDigit(char c) { return c >= '0' && c <= '9'; }
+
 std::string_view trimmed(std::string_view text);
 std::string lowerCase(std::string_view text);
 /// The words between spaces, tabs and line ends.

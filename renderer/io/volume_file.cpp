@@ -51,6 +51,7 @@ std::uint64_t memoryBytes(const VolumeInfo& volume, std::size_t level,
 
 std::uint64_t storedBytes(const VolumeInfo& volume, std::size_t level,
                           const std::vector<std::size_t>& channels) {
+  if (volume.readBytes) return volume.readBytes(level, orAll(channels, volume));
   return sumOverChannels(volume, level, channels, [](StoredType type) { return sizeBytes(type); });
 }
 

@@ -40,6 +40,9 @@ struct VolumeInfo {
   std::vector<ChannelInfo> channels = {};  ///< at least one; there may be more than a Volume can have
   std::string worldUnit = {};              ///< "mm", "um", ...; "" if unknown
   bool derived = false;                    ///< computed from others: only derived volumes join it
+  /// Of a derived volume: bytes, unpacked, of all that is read for these channels of a level, which are at
+  /// least one.
+  std::function<std::uint64_t(std::size_t level, const std::vector<std::size_t>& channels)> readBytes = {};
 };
 
 /// What of a file is to be read.
@@ -78,7 +81,7 @@ std::vector<ChannelWriter> makeWriters(const std::string& file, const VolumeInfo
                                        Loading& loading);
 
 /// Memory that a level's channels need once loaded, at most, and bytes that its voxels have in the file,
-/// unpacked. Without `channels`, of all. Saturate.
+/// unpacked; of a derived volume, those of all that is read for it. Without `channels`, of all. Saturate.
 std::uint64_t memoryBytes(const VolumeInfo& volume, std::size_t level,
                           const std::vector<std::size_t>& channels = {});
 std::uint64_t storedBytes(const VolumeInfo& volume, std::size_t level,

@@ -113,12 +113,14 @@ TEST_F(DicomFolders, SeriesAndOrientationsAreVolumes) {
   EXPECT_THAT(paths, testing::UnorderedElementsAre("7 T1_axial 3", "7 T1_axial (2) 1", "8 1"));
 }
 
-TEST_F(DicomFolders, FilesInFoldersBelowBelongToIt) {
+TEST_F(DicomFolders, OfADirectoryHaveTheFilesInFoldersBelow) {
   const TempDir folder;
+  writeBytes(folder / "DICOMDIR", "");
   std::filesystem::create_directories(folder / "a/b");
   writeBytes(folder / "a/b/one", dicomBytes(sliceAt(1, 20)));
   writeBytes(folder / "a/two", dicomBytes(sliceAt(0, 10)));
   EXPECT_THAT(valuesOfFolder(folder), ElementsAre(10, 11, 20, 21));
+  EXPECT_EQ(openDatasets(std::vector{folder.path()}).size(), 1u);
 }
 
 TEST_F(DicomFolders, DamagedFilesAreLeftOutWithAWarning) {
@@ -248,6 +250,59 @@ TEST_F(DicomFolders, ACtWindowIsThatOfTheMiddleSlice) {
   ASSERT_TRUE(channel.look.window);
   EXPECT_EQ(channel.look.window->lo, 41 - 0.5 - 200);
   EXPECT_EQ(channel.look.window->hi, 41 - 0.5 + 200);
+}
+
+/// A NRRD of one voxel.
+void writeVoxel(const std::filesystem::path& path) {
+  writeBytes(path, "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1 1 1\nencoding: raw\n\nx");
+}
+
+/// Two slices in a folder below.
+void writeSeriesIn(const std::filesystem::path& folder, int value, const char* ending = "") {
+  std::filesystem::create_directories(folder);
+  for (int z = 0; z < 2; ++z)
+    writeBytes(folder / ("slice" + std::to_string(z) + ending), dicomBytes(sliceAt(z, value + 10 * z)));
+}
+
+std::vector<std::string> datasetsOf(const std::filesystem::path& folder,
+                                    std::vector<std::string>* warnings = nullptr) {
+  const auto warn = [=](const std::string& line) {
+    if (warnings) warnings->push_back(line);
+  };
+  std::vector<std::string> all;
+  for (const Dataset& dataset : openDatasets(std::vector{folder}, {.warn = warn}))
+    all.push_back(dataset.title + " " + std::to_string(dataset.levels[0].dims.z));
+  return all;
+}
+
+TEST_F(DicomFolders, LeaveOtherFilesToTheirFormats) {
+  const TempDir folder;
+  writeSeriesIn(folder / "mixed", 10, ".dcm");
+  writeVoxel(folder / "mixed/a.nrrd");
+  std::filesystem::create_directory(folder / "mixed/below");
+  writeVoxel(folder / "mixed/below/b.nrrd");
+  for (const auto& named : {folder.path(), folder / "mixed"})
+    EXPECT_THAT(datasetsOf(named), ElementsAre("mixed 2", "a.nrrd 1", "b.nrrd 1"));
+}
+
+TEST_F(DicomFolders, BelowAFolderAreFilesOfTheirOwn) {
+  const TempDir folder;
+  writeSeriesIn(folder / "first", 10);
+  writeSeriesIn(folder / "deep/second", 50);
+  writeBytes(folder / "deep/second/third", dicomBytes(sliceAt(2, 90)));
+  writeVoxel(folder / "a.nrrd");
+  EXPECT_EQ(findFormat(folder.path()), nullptr);
+  EXPECT_THAT(datasetsOf(folder.path()), ElementsAre("a.nrrd 1", "second 3", "first 2"));
+}
+
+TEST_F(DicomFolders, ThatAreNamedFailWithTheirError) {
+  const TempDir folder;
+  writeSlices(folder, {sliceAt(0, 10), sliceAt(1, 20), sliceAt(5, 30)});
+  EXPECT_THAT(errorOf([&] { datasetsOf(folder.path()); }), HasSubstr("uneven grids cannot be shown"));
+  writeVoxel(folder / "a.nrrd");
+  std::vector<std::string> warnings;
+  EXPECT_THAT(datasetsOf(folder.path(), &warnings), ElementsAre("a.nrrd 1"));
+  EXPECT_THAT(warnings, testing::Contains(HasSubstr("; left out")));
 }
 
 }  // namespace

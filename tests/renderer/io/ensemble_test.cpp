@@ -94,5 +94,47 @@ TEST(Ensemble, ChecksTheMemoryOfItsStatistics) {
   EXPECT_NE(loadVolume(datasets[1], 0, 0, {.memoryLimitBytes = 40}), nullptr);
 }
 
+TEST(Ensemble, KeepsOnlyTheStatisticsThatAreAskedFor) {
+  const TempDir folder;
+  const auto file = withStatistics(openFile(ensemble(folder), {.fourthAxis = FourthAxis::time}));
+  constexpr std::uint64_t kMember = 2 * sizeof(float), kStatistic = 2 * sizeof(float);
+  const auto values = [&](std::vector<std::size_t> channels, std::uint64_t statistics) {
+    const Part part{.volume = 1, .channels = std::move(channels)};
+    std::vector<std::vector<double>> all;
+    for (const ChannelSource& channel :
+         load(*file, part, {.memoryLimitBytes = kMember + statistics * kStatistic}).channels)
+      all.push_back(valuesOf(channel));
+    return all;
+  };
+  EXPECT_THAT(values({0}, 1), ElementsAre(ElementsAre(4, 5)));
+  EXPECT_THAT(values({1}, 2), ElementsAre(ElementsAre(testing::DoubleNear(38.0 / 3, 1e-5), 0)));
+  EXPECT_THAT(values({2}, 1), ElementsAre(ElementsAre(1, 5)));
+  EXPECT_THAT(values({2, 3}, 2), ElementsAre(ElementsAre(1, 5), ElementsAre(9, 5)));
+  EXPECT_THAT(errorOf([&] { values({1}, 1); }), HasSubstr("statistics over 4 members"));
+}
+
+TEST(Ensemble, HasNoLeastOrMostWhereAMemberHasNoneAlsoByThemselves) {
+  const TempDir folder;
+  const float members[4][2] = {{1, NAN}, {-INFINITY, 2}, {3, 3}, {4, 4}};
+  const auto file = withStatistics(openFile(ensemble(folder, members), {.fourthAxis = FourthAxis::time}));
+  for (const ChannelSource& channel : load(*file, {.volume = 1, .channels = {2, 3}}, {}).channels)
+    for (const double value : valuesOf(channel)) EXPECT_TRUE(std::isnan(value)) << channel.name;
+}
+
+TEST(Ensemble, ReportsProgressOverAllMembers) {
+  const TempDir folder;
+  const auto datasets = open(ensemble(folder));
+  std::vector<Progress> reading;
+  loadVolume(datasets[1], 0, 0, {.progress = [&](const Progress& now) {
+               if (now.stage == "reading") reading.push_back(now);
+             }});
+  ASSERT_FALSE(reading.empty());
+  for (const Progress& now : reading) EXPECT_EQ(now.allBytes, sizeof kMembers);
+  EXPECT_EQ(reading.back().doneBytes, sizeof kMembers);
+  EXPECT_EQ(storedBytes(datasets[1].sources[0].file->volumes[1], 0, {1, 3}), sizeof kMembers)
+      << "each member is read once, for whatever statistics";
+  EXPECT_EQ(storedBytes(datasets[0].sources[0].file->volumes[0], 0), sizeof kMembers / 4);
+}
+
 }  // namespace
 }  // namespace scolopax::io

@@ -3,6 +3,9 @@
 #include "renderer/io/series.h"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <cstdlib>
 
 #include "renderer/io/folder.h"
 #include "tests/renderer/io/io_test_support.h"
@@ -105,6 +108,90 @@ TEST(Series, NeedThreeFilesOfOneGrid) {
   EXPECT_EQ(mixed[1].times.count, 1u);
 }
 
+/// A MetaImage of one voxel: data value = slope * 1 + intercept.
+fs::path scaledVoxel(const fs::path& path, const std::string& scale) {
+  return writeBytes(path, "ObjectType = Image\nNDims = 3\nDimSize = 1 1 1\nElementType = MET_UCHAR\n" +
+                              scale + "ElementDataFile = LOCAL\n\x01");
+}
+
+TEST(Series, HaveOneScale) {
+  const TempDir folder;
+  const std::string half = "ElementToIntensityFunctionSlope = 0.5\n";
+  const std::string less = "ElementToIntensityFunctionOffset = -1\n";
+  for (const std::string& other : {half, less}) {
+    const auto datasets = open({scaledVoxel(folder / "a_01.mha", ""), scaledVoxel(folder / "a_02.mha", other),
+                                scaledVoxel(folder / "a_03.mha", ""), scaledVoxel(folder / "a_04.mha", "")});
+    ASSERT_EQ(datasets.size(), 1u);
+    ASSERT_EQ(datasets[0].sources.size(), 2u) << "one file is not a step";
+    EXPECT_THAT(datasets[0].times.values, ElementsAre(1, 3, 4));
+    EXPECT_EQ(datasets[0].files[1].filename(), "a_02.mha");
+  }
+}
+
+/// A file of one step whose only channel has this unit.
+std::shared_ptr<const VolumeFile> stepOfUnit(const std::string& name, const std::string& unit) {
+  VolumeFile file{name};
+  file.volumes = {{.levels = {Grid{}}, .channels = {{.name = "x", .unit = unit}}}};
+  return std::make_shared<const VolumeFile>(std::move(file));
+}
+
+TEST(Series, HaveOneUnit) {
+  const std::vector files{stepOfUnit("a_01.vti", "K"), stepOfUnit("a_02.vti", "K"),
+                          stepOfUnit("a_03.vti", "degC"), stepOfUnit("a_04.vti", "K")};
+  const auto joined = joinSeries(files);
+  ASSERT_EQ(joined.size(), 2u);
+  EXPECT_THAT(joined[0]->volumes[0].times.values, ElementsAre(1, 2, 4));
+  EXPECT_EQ(joined[1], files[2]);
+}
+
+TEST(Series, HaveOneFileOfEachNumber) {
+  std::vector<std::shared_ptr<const VolumeFile>> files;
+  for (const char* name : {"run_01.vti", "run_001.vti", "run_02.vti", "run_03.vti"})
+    files.push_back(stepOfUnit(name, ""));
+  const auto joined = joinSeries(files);
+  ASSERT_EQ(joined.size(), 2u);
+  EXPECT_THAT(joined[0]->volumes[0].times.values, ElementsAre(1, 2, 3));
+  EXPECT_EQ(joined[1], files[1]);
+}
+
+TEST(Series, OfTheSameTimesBecomeChannels) {
+  const TempDir folder;
+  std::vector<fs::path> paths;
+  for (const char* stem : {"a_01", "a_02", "a_03", "b_01", "b_02", "b_03", "d_01", "d_02", "d_04"})
+    paths.push_back(cube(folder / "", stem, 2, 1));
+  const auto datasets = open(paths);
+  ASSERT_EQ(datasets.size(), 2u);
+  EXPECT_EQ(datasets[0].channels.size(), 2u);
+  EXPECT_THAT(datasets[0].times.values, ElementsAre(1, 2, 3));
+  EXPECT_THAT(datasets[1].times.values, ElementsAre(1, 2, 4));
+}
+
+TEST(Series, TakeTheTimesOfTheFirstThatTellsThem) {
+  const TempDir folder;
+  std::vector<fs::path> paths{writeBytes(folder / "untold.nrrd",
+                                         "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 2 2 2 3\n"
+                                         "kinds: domain domain domain time\nencoding: raw\n\n" +
+                                             std::string(24, 'x'))};
+  for (const char* stem : {"a_01", "a_02", "a_03", "d_01", "d_02", "d_04"})
+    paths.push_back(cube(folder / "", stem, 2, 1));
+  const auto datasets = open(paths);
+  ASSERT_EQ(datasets.size(), 2u);
+  EXPECT_THAT(datasets[0].times.values, ElementsAre(1, 2, 3));
+  EXPECT_THAT(datasets[1].times.values, ElementsAre(1, 2, 4));
+}
+
+TEST(Series, MayHaveThousandsOfFiles) {
+  const TempDir folder;
+  constexpr int kFiles = 5000;  // to compare each with each other would take minutes
+  std::vector<fs::path> paths;
+  for (int i = 0; i < kFiles; ++i)
+    paths.push_back(cube(folder / "", "run_" + std::to_string(10000 + i), 1, 1));
+  const auto datasets = open(paths);
+  ASSERT_EQ(datasets.size(), 1u);
+  EXPECT_EQ(datasets[0].times.count, std::size_t(kFiles));
+  EXPECT_EQ(datasets[0].sources.size(), 1u);
+}
+
 TEST(Folders, HoldTheVolumesBelowThem) {
   const TempDir folder;
   cube(folder / "series", "s10", 3, 1);
@@ -145,6 +232,64 @@ TEST(Folders, JoinNoMoreChannelsThanAVolumeHolds) {
   ASSERT_EQ(datasets.size(), 2u);
   EXPECT_EQ(datasets[0].channels.size(), std::size_t(kMaxChannels));
   EXPECT_EQ(datasets[1].channels.size(), 1u);
+}
+
+TEST(Folders, LeaveOutLinksThatLeadOutOfThem) {
+  const TempDir outside, folder;
+  const fs::path file = cube(outside / "", "secret", 2, 1);
+  fs::create_directory(outside / "secret.zarr");
+  writeBytes(outside / "secret.zarr/.zgroup", "{}");
+  cube(folder / "deep", "a", 2, 1);
+  fs::create_symlink(file, folder / "file.nrrd");
+  fs::create_symlink(file, folder / "deep/file.nrrd");
+  fs::create_directory_symlink(outside / "secret.zarr", folder / "claimed.zarr");
+  fs::create_directory_symlink(outside / "", folder / "plain");
+  fs::create_symlink(folder / "deep/a.nrrd", folder / "inside.nrrd");
+  EXPECT_THAT(volumesIn(folder.path(), {}), ElementsAre(folder / "inside.nrrd", folder / "deep/a.nrrd"));
+}
+
+TEST(Folders, OfALinkAreThoseThatItLeadsTo) {
+  const TempDir outside, folder;
+  cube(outside / "", "a", 2, 1);
+  fs::create_directory_symlink(outside.path(), folder / "link");
+  EXPECT_THAT(volumesIn(folder / "link", {}), ElementsAre(folder / "link/a.nrrd"));
+}
+
+/// Takes the rights of the administrator, who may read everything, for a while.
+class AsNobody {
+ public:
+  AsNobody() : own_(geteuid()) {
+    if (own_ == 0 && seteuid(65534) != 0) throw std::runtime_error("no other user");
+  }
+  ~AsNobody() {
+    if (own_ == 0 && seteuid(0) != 0) std::abort();
+  }
+  AsNobody(const AsNobody&) = delete;
+  AsNobody& operator=(const AsNobody&) = delete;
+
+ private:
+  uid_t own_;
+};
+
+TEST(Folders, LeaveOutWhatCannotBeReadWithAWarning) {
+  const TempDir folder;
+  cube(folder / "shut", "x", 2, 1);
+  cube(folder / "z", "y", 2, 1);
+  const fs::path file = cube(folder / "", "closed", 2, 1);
+  fs::permissions(folder.path(), fs::perms(0755));
+  fs::permissions(folder / "shut", fs::perms::none);
+  fs::permissions(file, fs::perms::none);
+  std::vector<std::string> warnings;
+  const auto warn = [&](const std::string& line) { warnings.push_back(line); };
+  {
+    const AsNobody nobody;
+    EXPECT_THAT(volumesIn(folder.path(), {.warn = warn}), ElementsAre(folder / "z/y.nrrd"));
+    EXPECT_THAT(errorOf([&] { volumesIn(folder / "shut", {}); }), HasSubstr("shut: Permission denied"));
+  }
+  EXPECT_THAT(warnings,
+              testing::UnorderedElementsAre(testing::AllOf(HasSubstr("closed.nrrd"), HasSubstr("; left out")),
+                                            testing::AllOf(HasSubstr("shut"), HasSubstr("; left out"))));
+  fs::permissions(folder / "shut", fs::perms::owner_all);
 }
 
 TEST(Folders, WithoutVolumesAreRefused) {
