@@ -177,7 +177,8 @@ void addServerOptions(CLI::App& command, ServeOptions& options) {
     return addOption(command, name, value, doc);
   };
   command.add_option("PATH", options.paths, kDataDoc);
-  addDataOptions(command, options.data, [](CLI::Option& option) { option.envname(variableOf(option.get_name())); });
+  addDataOptions(command, options.data,
+                 [](CLI::Option& option) { option.envname(variableOf(option.get_name())); });
   add("host", config.host, "Address to listen on; 0.0.0.0: all addresses of this machine")
       ->type_name("ADDRESS");
   add("port", config.port, "Port to listen on; 0: any free one")->type_name("PORT");
