@@ -191,8 +191,18 @@ void checkChannelCount(const Dataset& dataset) {
                                           "; choose some, as FILE:NAME, from " + listed(names));
 }
 
-/// Sets id, title and the names of channels.
-void nameDataset(Dataset& dataset, const std::string& inner, const std::vector<Dataset>& others) {
+/// Several data sets of one file are told apart by the first volume that each shows; others need no name
+/// inside of their file.
+std::string nameInFile(const Dataset& dataset, const std::vector<Dataset>& all) {
+  const bool several = std::ranges::any_of(
+      all, [&](const Dataset& other) { return &other != &dataset && other.files[0] == dataset.files[0]; });
+  const Dataset::Source& first = dataset.sources.front();
+  return several ? first.file->volumes[first.part.volume].path : "";
+}
+
+/// Sets id, title and the names of channels. `asked`: what was asked of the first file; "" for all of it.
+void nameDataset(Dataset& dataset, const std::string& asked, const std::vector<Dataset>& others) {
+  const std::string inner = asked.empty() ? nameInFile(dataset, others) : asked;
   const std::string slug =
       slugOf(stemOf(dataset.files[0]) + (inner.empty() ? std::string() : "-" + cleanText(inner)));
   const auto taken = [&](const std::string& id) {
@@ -203,7 +213,8 @@ void nameDataset(Dataset& dataset, const std::string& inner, const std::vector<D
   for (int suffix = 2; taken(dataset.id); ++suffix) dataset.id = slug + "-" + std::to_string(suffix);
   dataset.title =
       cleanText(dataset.files[0].filename().string()) + (inner.empty() ? "" : ":" + cleanText(inner));
-  const std::size_t more = dataset.files.size() - 1;
+  const bool ofOneFile = asked.empty() && !inner.empty() && dataset.files.size() == 1;
+  const std::size_t more = (ofOneFile ? dataset.sources.size() : dataset.files.size()) - 1;
   if (more > 0) dataset.title += " +" + std::to_string(more);
   std::vector<std::string> names;
   for (const ChannelInfo& channel : dataset.channels) names.push_back(channel.name);
@@ -281,7 +292,7 @@ std::vector<Dataset> openDatasets(std::span<const fs::path> names, const OpenOpt
       });
       if (dataset == datasets.end()) {
         dataset = datasets.insert(datasets.end(), Dataset{.levels = volume.levels});
-        inners.push_back(volume.derived && opened.name.inner.empty() ? volume.path : opened.name.inner);
+        inners.push_back(opened.name.inner);
       }
       add(*dataset, opened, part);
     }

@@ -29,8 +29,12 @@ std::vector<Part> partsOf(const VolumeFile& file, const std::string& inner);
 
 /// A data set whose headers have been read and whose voxels have not.
 struct Dataset {
-  std::string id = {};     ///< slug of the first file's stem, made unique among the data sets by a suffix
-  std::string title = {};  ///< the first file's name, and how many more there are: "a.nrrd +2"
+  /// Slug of the first file's stem and, if the file has several data sets, the first volume's path; made
+  /// unique among the data sets by a suffix.
+  std::string id = {};
+  /// The first file's name, and how many more files there are: "a.nrrd +2". If the file has several data
+  /// sets, followed by the first volume's path, and how many more volumes there are: "wrf.nc:P +5".
+  std::string title = {};
   std::vector<std::filesystem::path> files = {};
   std::vector<Grid> levels = {};           ///< that all parts have, the finest first
   Times times = {};                        ///< parts with a single time hold at all of them
