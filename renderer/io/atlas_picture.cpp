@@ -27,7 +27,9 @@ void checkPngChunks(const std::filesystem::path& path, bool pixels) {
     return std::string_view(reinterpret_cast<const char*>(start.data()) + at, start.size() - at);
   };
   const auto number = [&] {
-    return std::uint64_t(start[0]) << 24 | start[1] << 16 | start[2] << 8 | start[3];
+    std::uint64_t bytes = 0;
+    for (std::size_t i = 0; i < 4; ++i) bytes = bytes << 8 | start[i];
+    return bytes;
   };
   stream.readSome(std::as_writable_bytes(std::span(start)));
   if (text(0) != "\x89PNG\r\n\x1A\n") throw bad("PNG", text(0));
