@@ -79,6 +79,8 @@ std::shared_ptr<const Volume> Dataset::load(std::size_t time, const std::stop_to
   return volume;
 }
 
+std::shared_ptr<const Volume> Dataset::lastUsed() const { return pinned_ ? pinned_ : cache_->lastUsed(this); }
+
 bool Dataset::isLoaded() const { return pinned_ || cache_->holdsAny(this); }
 
 std::optional<LoadProgress> Dataset::loading() const {

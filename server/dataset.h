@@ -51,6 +51,8 @@ class Dataset {
   std::shared_ptr<const DatasetFacts> factsOrLoad(const std::stop_token& stop, std::size_t time = 0) const;
   /// The voxels if they are in memory, else nullptr.
   std::shared_ptr<const Volume> loaded(std::size_t time) const;
+  /// The voxels of the time that was used last, if any are in memory.
+  std::shared_ptr<const Volume> lastUsed() const;
   /// Whether voxels of any time are in memory. Does not count as a use.
   bool isLoaded() const;
   /// The voxels. Waits until they have been loaded. Throws as VolumeCache::get().

@@ -110,11 +110,27 @@ DatasetStore::Gradients DatasetStore::gradients(const Dataset& dataset, int chan
   return kept(dataset, channel);
 }
 
+namespace {
+
+/// The step of the data set's facts; if its memory is not free because another step is shown, that one.
+std::shared_ptr<const Volume> volumeToMeasure(const Dataset& dataset, const std::stop_token& stop) {
+  const auto facts = dataset.factsOrLoad(stop);
+  try {
+    return dataset.load(facts->time, stop);
+  } catch (const Error& error) {
+    auto shown = error.code() == ErrorCode::busy ? dataset.lastUsed() : nullptr;
+    if (!shown) throw;
+    return shown;
+  }
+}
+
+}  // namespace
+
 DatasetStore::Gradients DatasetStore::measuredGradients(const Dataset& dataset, int channel,
                                                         const std::stop_token& stop) const {
   if (Gradients known = gradients(dataset, channel)) return known;
-  const auto facts = dataset.factsOrLoad(stop);
-  Gradients measured = sharedGradientHistogram(dataset.load(facts->time, stop), channel, stop, memory_);
+  const auto volume = volumeToMeasure(dataset, stop);
+  Gradients measured = sharedGradientHistogram(volume, channel, stop, memory_);
   const std::lock_guard lock(mutex_);
   if (Gradients known = kept(dataset, channel)) return known;  // another thread measured the same
   gradients_.push_front({&dataset, channel, measured});

@@ -42,10 +42,13 @@ bool VolumeCache::holds(const Key& key) const {
   return entries_.contains(key);
 }
 
-bool VolumeCache::holdsAny(const void* dataset) const {
+std::shared_ptr<const Volume> VolumeCache::lastUsed(const void* dataset) const {
   const std::lock_guard lock(mutex_);
-  const auto first = entries_.lower_bound({dataset, 0});
-  return first != entries_.end() && first->first.dataset == dataset;
+  const Entry* last = nullptr;
+  for (auto entry = entries_.lower_bound({dataset, 0});
+       entry != entries_.end() && entry->first.dataset == dataset; ++entry)
+    if (!last || entry->second.lastUse > last->lastUse) last = &entry->second;
+  return last ? last->volume : nullptr;
 }
 
 VolumeCache::~VolumeCache() {

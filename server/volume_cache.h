@@ -66,7 +66,10 @@ class VolumeCache {
   /// Whether it is in memory.
   bool holds(const Key& key) const;
   /// Whether the data set is in memory at any time.
-  bool holdsAny(const void* dataset) const;
+  bool holdsAny(const void* dataset) const { return lastUsed(dataset) != nullptr; }
+  /// The volume of the data set, at any time, that was used last; nullptr if none is in memory. Does not
+  /// count as a use.
+  std::shared_ptr<const Volume> lastUsed(const void* dataset) const;
   /// The volume. Waits until it has been loaded; several callers share one load. When none of them waits any
   /// more, it is cancelled after a while, or at once if another load needs its memory. Throws Error: tooLarge
   /// if it can never fit into the memory, busy if others use the memory now, both before anything is read;

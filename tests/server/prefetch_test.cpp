@@ -101,6 +101,14 @@ TEST_F(TimeSeries, KeepsItsRangesWhenTheTimeOrTheMemoryChanges) {
   EXPECT_EQ(first->dataset->load(3)->channels()[0].histogram.maximum, 3) << "it is loaded again";
 }
 
+TEST_F(TimeSeries, IsMeasuredAtTheStepThatIsShownIfThereIsNoRoomForAnother) {
+  const auto store = storeOf(16);
+  store->first()->load(2);
+  const auto shown = store->first()->load(3);
+  EXPECT_EQ(store->first()->facts()->time, 2u);
+  EXPECT_NE(store->measuredGradients(*store->first(), 0, {}), nullptr);
+}
+
 TEST_F(TimeSeries, NeedsItsDataToBeLoadedBeforeAScene) {
   const SceneResolver resolver(storeOf(1000), {1'000'000});
   EXPECT_THROW(resolver.replaceNow({{"time", 1}}), Unmeasured);
