@@ -74,7 +74,8 @@ std::uint64_t TiffPages::number(std::uint64_t at, std::size_t size) const {
 }
 
 TiffPages::Page TiffPages::readPage(std::uint64_t start, std::uint64_t& directoryBytes) const {
-  const std::size_t countBytes = bigTiff_ ? 8 : 2, entryBytes = bigTiff_ ? 20 : 12;
+  const std::size_t countBytes = bigTiff_ ? 8 : 2, entryBytes = bigTiff_ ? 20 : 12,
+                    offsetBytes = bigTiff_ ? 8 : 4;
   Page page;
   page.start = start;
   const std::uint64_t count = start < fileSize_ ? number(start, countBytes) : 0;
@@ -92,16 +93,16 @@ TiffPages::Page TiffPages::readPage(std::uint64_t start, std::uint64_t& director
     const auto tag = unsigned(numberFrom(entry, 2, bigEndian_)),
                type = unsigned(numberFrom(entry + 2, 2, bigEndian_));
     const std::size_t valueAt = bigTiff_ ? 12 : 8;
-    const std::uint64_t values = numberFrom(entry + 4, bigTiff_ ? 8 : 4, bigEndian_);
+    const std::uint64_t values = numberFrom(entry + 4, offsetBytes, bigEndian_);
     // SHORT; LONG, IFD; LONG8, IFD8
     const std::size_t valueBytes = type == 3                  ? 2
                                    : type == 4 || type == 13  ? 4
                                    : type == 16 || type == 18 ? 8
                                                               : 0;
+    const std::uint64_t stored = numberFrom(entry + valueAt, offsetBytes, bigEndian_);
     const auto valuesStart = [&](std::size_t bytesEach) {
-      const bool inlined = values <= (bigTiff_ ? 8u : 4u) / bytesEach;
-      return inlined ? entriesStart + i * entryBytes + valueAt
-                     : numberFrom(entry + valueAt, bigTiff_ ? 8 : 4, bigEndian_);
+      const bool inlined = values <= offsetBytes / bytesEach;
+      return inlined ? entriesStart + i * entryBytes + valueAt : stored;
     };
     if (tag == kPhotometricTag && valueBytes == 2) {
       page.photometric = unsigned(numberFrom(entry + valueAt, 2, bigEndian_));

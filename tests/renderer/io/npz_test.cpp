@@ -15,7 +15,7 @@ using testing::HasSubstr;
 
 std::string zipNumber(std::uint64_t value, int bytes) {
   std::string text;
-  for (int i = 0; i < bytes; ++i) text += char(value >> (8 * i) & 0xFF);
+  for (int i = 0; i < bytes; ++i, value >>= 8) text += char(value & 0xFF);
   return text;
 }
 std::string zipDeflated(std::string_view bytes) {
