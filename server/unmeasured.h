@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Statistics of the data are measured when a scene first needs them. This takes long, so it is done only by
-// threads that may wait, and without holding a lock.
+// Data is loaded, and statistics of it are measured, when a scene first needs them. This takes long, so it is
+// done only by threads that may wait, and without holding a lock.
 #pragma once
 #include <functional>
 #include <stop_token>
@@ -10,14 +10,15 @@
 
 namespace scolopax::server {
 
-/// Thrown when a result depends on statistics that have not been measured yet. Nothing has been changed then.
+/// Thrown when a result depends on data that has not been loaded or measured yet. Nothing has been changed
+/// then.
 class Unmeasured : public Error {
  public:
   using Measure = std::function<void(const std::stop_token&)>;
   explicit Unmeasured(Measure measure)
-      : Error(ErrorCode::busy, "the statistics that the scene needs have not been measured yet"),
+      : Error(ErrorCode::busy, "the data that the scene needs has not been loaded and measured yet"),
         measure_(std::move(measure)) {}
-  /// Measures the statistics and stores them, or waits until another thread has done so. Throws Error:
+  /// Loads and measures it, or waits until another thread has done so. Throws Error:
   /// cancelled once `stop` is requested, busy and tooLarge if there is not enough memory.
   void measure(const std::stop_token& stop) const { measure_(stop); }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lets a pool of threads run other work while one of its threads only waits. SharedBuilds calls the hooks;
-// the pool sets them.
+// Lets a pool of threads run other work while one of its threads only waits. What waits for other threads
+// (SharedBuilds, loads of volumes) calls the hooks; the pool sets them.
 #pragma once
 
 namespace scolopax {

@@ -185,19 +185,8 @@ std::string metaImageUnit(const MetaImageHeader& header) {
 /// Reads one volume: these samples of every voxel with these writers.
 void readMetaImageVolume(MetaImageStream& stream, const VoxelLayout& layout, std::size_t index,
                          const std::vector<std::size_t>& samples, std::span<ChannelWriter> writers) {
-  constexpr std::size_t kMetaImageBytesAtOnce = 1 << 20;
-  const std::size_t numberBytes = sizeBytes(layout.type), voxelBytes = numberBytes * layout.samples,
-                    count = std::size_t(layout.voxelCount());
-  const std::size_t atOnce = std::max<std::size_t>(kMetaImageBytesAtOnce / voxelBytes, 1);
-  std::vector<std::byte> block(std::min(count, atOnce) * voxelBytes);
   stream.skipTo(index * layout.sizeBytes());
-  for (std::size_t first = 0; first < count; first += atOnce) {
-    const std::size_t voxels = std::min(atOnce, count - first);
-    stream.read(std::span(block).first(voxels * voxelBytes));
-    for (std::size_t i = 0; i < samples.size(); ++i)
-      writers[i].writeStrided(first, voxels, block.data() + samples[i] * numberBytes,
-                              std::ptrdiff_t(voxelBytes), layout.bigEndian);
-  }
+  readInterleaved(stream, layout, samples, writers);
 }
 
 }  // namespace

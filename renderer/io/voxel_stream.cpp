@@ -32,21 +32,6 @@ void readPlanar(ByteStream& stream, const VoxelLayout& layout, const std::vector
   }
 }
 
-void readInterleaved(ByteStream& stream, const VoxelLayout& layout, const std::vector<std::size_t>& samples,
-                     std::vector<ChannelWriter>& writers) {
-  const std::size_t numberBytes = sizeBytes(layout.type), voxelBytes = numberBytes * layout.samples,
-                    count = std::size_t(layout.voxelCount());
-  const std::size_t atOnce = std::max<std::size_t>(kBytesAtOnce / voxelBytes, 1);
-  std::vector<std::byte> block(std::min(count, atOnce) * voxelBytes);
-  for (std::size_t first = 0; first < count; first += atOnce) {
-    const std::size_t voxels = std::min(atOnce, count - first);
-    stream.read(std::span(block).first(voxels * voxelBytes));
-    for (std::size_t i = 0; i < samples.size(); ++i)
-      writers[i].writeStrided(first, voxels, block.data() + samples[i] * numberBytes,
-                              std::ptrdiff_t(voxelBytes), layout.bigEndian);
-  }
-}
-
 }  // namespace
 
 std::uint64_t VoxelLayout::voxelCount() const {

@@ -2,8 +2,11 @@
 // Voxels that lie in a stream one after the other, as after most simple headers. Between ByteStream and the
 // readers of such formats.
 #pragma once
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -35,6 +38,25 @@ glm::ivec3 checkedDims(const std::string& where, std::int64_t x, std::int64_t y,
 /// Throws Error(badInput) if the file is too short for a `layout` that starts `offset` bytes into the stream,
 /// even if its gzip data expand as far as deflate can. Allocates and reads nothing.
 void checkFileHolds(const ByteStream& stream, const VoxelLayout& layout, std::uint64_t offset);
+
+/// Reads one volume whose samples vary fastest, from the stream's position on: samples[i] with writers[i].
+/// `Stream::read(std::span<std::byte>)` fills the span.
+template <class Stream>
+void readInterleaved(Stream& stream, const VoxelLayout& layout, const std::vector<std::size_t>& samples,
+                     std::span<ChannelWriter> writers) {
+  constexpr std::size_t kBytesAtOnce = 1 << 20;
+  const std::size_t numberBytes = sizeBytes(layout.type), voxelBytes = numberBytes * layout.samples,
+                    count = std::size_t(layout.voxelCount());
+  const std::size_t atOnce = std::max<std::size_t>(kBytesAtOnce / voxelBytes, 1);
+  std::vector<std::byte> block(std::min(count, atOnce) * voxelBytes);
+  for (std::size_t first = 0; first < count; first += atOnce) {
+    const std::size_t voxels = std::min(atOnce, count - first);
+    stream.read(std::span(block).first(voxels * voxelBytes));
+    for (std::size_t i = 0; i < samples.size(); ++i)
+      writers[i].writeStrided(first, voxels, block.data() + samples[i] * numberBytes,
+                              std::ptrdiff_t(voxelBytes), layout.bigEndian);
+  }
+}
 
 /// Skips to `offset` of the stream and writes the samples with these indices: samples[i] with writers[i].
 void readSamples(ByteStream& stream, std::uint64_t offset, const VoxelLayout& layout,

@@ -53,9 +53,10 @@ inline std::filesystem::path writeBytes(const std::filesystem::path& path, std::
   return path;
 }
 
-inline std::string gzipped(std::string_view bytes) {
+/// `windowBits` as zlib has it: 15 + 16 for gzip, -15 for deflate alone.
+inline std::string deflated(std::string_view bytes, int windowBits) {
   z_stream stream{};
-  deflateInit2(&stream, 9, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
+  deflateInit2(&stream, 9, Z_DEFLATED, windowBits, 8, Z_DEFAULT_STRATEGY);
   std::string packed(deflateBound(&stream, bytes.size()), '\0');
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
   stream.avail_in = uInt(bytes.size());
@@ -66,6 +67,8 @@ inline std::string gzipped(std::string_view bytes) {
   deflateEnd(&stream);
   return packed;
 }
+
+inline std::string gzipped(std::string_view bytes) { return deflated(bytes, 15 + 16); }
 
 /// The bytes of the values, each in memory order or reversed.
 template <class T>

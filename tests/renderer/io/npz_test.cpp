@@ -18,19 +18,6 @@ std::string zipNumber(std::uint64_t value, int bytes) {
   for (int i = 0; i < bytes; ++i, value >>= 8) text += char(value & 0xFF);
   return text;
 }
-std::string zipDeflated(std::string_view bytes) {
-  z_stream stream{};
-  deflateInit2(&stream, 9, Z_DEFLATED, -15, 8, Z_DEFAULT_STRATEGY);
-  std::string packed(deflateBound(&stream, bytes.size()), '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-  stream.avail_in = uInt(bytes.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = uInt(packed.size());
-  deflate(&stream, Z_FINISH);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  return packed;
-}
 
 struct ZipEntry {
   std::string name, bytes;
@@ -41,7 +28,7 @@ struct ZipEntry {
 std::string zipped(const std::vector<ZipEntry>& entries, bool packed) {
   std::string archive, directory;
   for (const ZipEntry& entry : entries) {
-    const std::string data = packed ? zipDeflated(entry.bytes) : entry.bytes;
+    const std::string data = packed ? deflated(entry.bytes, -15) : entry.bytes;
     const auto crc = ::crc32(0, reinterpret_cast<const Bytef*>(entry.bytes.data()), uInt(entry.bytes.size()));
     const std::string common = zipNumber(20, 2) + zipNumber(0, 2) +
                                zipNumber(entry.method ? unsigned(entry.method)
