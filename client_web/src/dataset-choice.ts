@@ -28,6 +28,8 @@ export interface ChoiceActions {
   unanswered(): boolean;
   /** Takes back all edits that wait on the server; `then` runs once the server's scene is known. */
   takeBack(then?: () => void): void;
+  /** Shows an edit without sending it, because the server's scene is about to be the same. */
+  show(patch: JsonObject): void;
   create(scene: JsonObject): void;
   cancelCreation(): void;
 }
@@ -56,6 +58,8 @@ export const stepOf = (dataset: DatasetInfo, scene: Scene | undefined) =>
 export class DatasetChoice {
   private readonly awaited = signal<Awaited | undefined>(undefined);
   private readonly poll = new Poll(() => this.ask(), kPollMs);
+  /** Counts choices: what a cancelled one still has to do is void after the next. */
+  private choices = 0;
 
   /** The data set whose first picture the page waits for while it is loaded. */
   readonly loading = computed<DatasetInfo | undefined>(() => {
@@ -88,6 +92,7 @@ export class DatasetChoice {
     const next = this.datasets.find(id);
     if (!next || !scene || scene.dataset === id) return;
     if (this.actions.unanswered()) this.actions.takeBack(); // otherwise this edit would wait behind that load
+    ++this.choices;
     this.awaited.value = { id, back: before?.back ?? lookOf(scene) };
     this.actions.edit(patchTo(next, this.datasets.shown.peek()));
     this.poll.wake();
@@ -99,9 +104,13 @@ export class DatasetChoice {
     this.awaited.value = undefined;
     if (this.actions.state().kind === 'creating') return this.actions.cancelCreation();
     if (!back) return;
+    if (!this.actions.unanswered()) return this.actions.edit(back);
     // The server cancels the load of an edit that is taken back. It may have finished meanwhile.
-    if (!this.actions.unanswered()) this.actions.edit(back);
-    else this.actions.takeBack(() => this.actions.scene()?.dataset === id && this.actions.edit(back));
+    const choice = this.choices;
+    this.actions.takeBack(() => {
+      if (choice === this.choices && this.actions.scene()?.dataset === id) this.actions.edit(back);
+    });
+    this.actions.show(back);
   }
 
   /** The page waits for the first picture of a session. */

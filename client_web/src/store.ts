@@ -62,6 +62,7 @@ export class Store {
     },
     unanswered: () => this.edits.unconfirmed.some((patch) => 'dataset' in patch),
     takeBack: (then) => this.takeBack(then),
+    show: (patch) => this.show(patch),
     create: (scene) => void this.link.create(scene),
     cancelCreation: () => this.link.cancelCreation(),
   });
@@ -103,9 +104,13 @@ export class Store {
 
   /** Shows an edit at once and sends it with the others of this animation frame. */
   edit(patch: JsonObject): void {
-    this.scene.value = applyEdit(this.scene.peek() as Json | undefined, patch);
+    this.show(patch);
     this.edits.push(patch);
     this.refreshLater();
+  }
+
+  private show(patch: JsonObject): void {
+    this.scene.value = applyEdit(this.scene.peek() as Json | undefined, patch);
   }
 
   set(path: Path, value: Json): void {

@@ -2,10 +2,11 @@
 import { signal } from '@preact/signals';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import type { DatasetInfo } from '../src/api';
+import { applyEdit } from '../src/apply-edit';
 import type { ConnectionState } from '../src/connection';
 import { DatasetChoice, kPollMs, patchTo } from '../src/dataset-choice';
 import { DatasetList } from '../src/dataset-list';
-import type { JsonObject } from '../src/merge-patch';
+import type { Json, JsonObject } from '../src/merge-patch';
 import type { Scene } from '../src/scene.generated';
 import { datasetInfo } from './dataset-info';
 
@@ -29,6 +30,9 @@ async function setUp() {
     takeBack: (then) => {
       done.push('take back');
       server.takenBack = then;
+    },
+    show: (patch) => {
+      scene.value = applyEdit(scene.value as Json, patch);
     },
     create: (made) => done.push({ create: made }),
     cancelCreation: () => done.push('cancel creation'),
@@ -102,6 +106,21 @@ describe('the choice of a data set', () => {
     scene.value = { dataset: 'b' };
     server.takenBack!();
     expect(done.slice(1)).toEqual(['take back', back]);
+  });
+
+  it('can be made again at once after it was cancelled, and is not undone by that', async () => {
+    const { choice, scene, done, server } = await setUp();
+    choice.choose('b');
+    scene.value = { dataset: 'b' }; // as edit() shows it
+    server.unanswered = true;
+    choice.cancel();
+    expect(scene.value?.dataset).toBe('a');
+    server.unanswered = false;
+    choice.choose('b');
+    scene.value = { dataset: 'b' };
+    server.takenBack!();
+    const chosen = { edit: { dataset: 'b', channels: null, camera: null } };
+    expect(done).toEqual([chosen, 'take back', chosen]);
   });
 
   it('does not wait for one data set before it loads another, and still knows the way back', async () => {

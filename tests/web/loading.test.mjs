@@ -100,10 +100,14 @@ test('another data set can be chosen while one is loaded', async () => {
   await bar().waitFor();
   slow.id = undefined;
   await list().getByRole('button', { name: /orbitals/ }).click(); // again: the same load
+  // The next choice is made before the page has heard from the server that this one is undone.
+  const late = (route) => setTimeout(() => void route.continue(), 700);
+  await page.route('**/api/v1/sessions/*', late);
   await list().getByRole('button', { name: /series/ }).click(); // the one shown before: as Cancel
   await eventually(async () => (await bar().count()) === 0, 'the load is still shown');
   await list().getByRole('button', { name: /orbitals/ }).click();
   await eventually(async () => (await page.locator('.channel').count()) === 4, 'the orbitals are not shown');
+  await page.unroute('**/api/v1/sessions/*', late);
   await steadyPicture(page, 4);
 });
 
