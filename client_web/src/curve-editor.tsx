@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Editor of a curve, such as opacity, drawn over the histogram within the range. Points are moved by dragging or
 // the arrow keys, added by a double click, Enter or Insert, and removed by a double click, Delete or Backspace.
-import { useEffect, useRef } from 'preact/hooks';
+import { useLayoutEffect, useRef } from 'preact/hooks';
 import { addPoint, evaluate, kSteps, movePoint, pointAfter, removePoint, stepSize, type Curve, type Point } from './curve';
 import { CurveLines, type CurveLine } from './curve-lines';
 import { fractionIn, followPointer } from './drag';
@@ -32,7 +32,8 @@ export function CurveEditor({ label, curve, range, histogram, paint, onChange, l
     onChange(next);
   };
 
-  useEffect(() => {
+  // Before the next key arrives, which is meant for that point.
+  useLayoutEffect(() => {
     if (focusNext.current === undefined) return;
     handles.current[focusNext.current]?.focus();
     focusNext.current = undefined;

@@ -13,10 +13,12 @@ std::string_view nameOf(InstructionSet set) {
 bool available(InstructionSet set) {
   switch (set) {
 #if defined(__x86_64__)
+#if !defined(SCOLOPAX_WITHOUT_AVX512)
     case InstructionSet::avx512:
       return available(InstructionSet::avx2) && __builtin_cpu_supports("avx512f") &&
              __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
              __builtin_cpu_supports("avx512vl");
+#endif
     case InstructionSet::avx2:
       return __builtin_cpu_supports("avx2");
 #endif

@@ -207,11 +207,10 @@ OpenArrays openNetcdfArrays(const std::filesystem::path& path) {
     OpenArray array{netcdfChunk(group, variable, slab.dims.size()), {}};
     // Fails for NetCDF 3, which has no chunks.
     nc_set_var_chunk_cache(group, variable, std::max<std::size_t>(1 << 20, slab.chunkBytes), 521, 1.0F);
-    array.read = [group = group, variable = variable, where](std::span<const std::uint64_t> first,
-                                                             std::span<const std::uint64_t> count,
-                                                             std::byte* to) {
+    array.read = [in = group, id = variable, where](std::span<const std::uint64_t> first,
+                                                    std::span<const std::uint64_t> count, std::byte* to) {
       const std::vector<std::size_t> start(first.begin(), first.end()), size(count.begin(), count.end());
-      checkNetcdf(where, nc_get_vara(group, variable, start.data(), size.data(), to));
+      checkNetcdf(where, nc_get_vara(in, id, start.data(), size.data(), to));
     };
     return array;
   };

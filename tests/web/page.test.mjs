@@ -174,8 +174,13 @@ test('the keyboard turns, zooms and resets, also with parallel rays', async () =
 test('the opacity curve is edited by the keyboard', async () => {
   const points = page.getByRole('slider', { name: /^Opacity point/ });
   const before = await points.count();
-  await points.first().focus();
-  await page.keyboard.press('Enter');
+  // The added point has the focus before another key can arrive.
+  const focused = await points.first().evaluate(async (first) => {
+    first.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter', bubbles: true }));
+    for (let i = 0; i < 10; ++i) await null;
+    return document.activeElement.ariaLabel;
+  });
+  assert.match(focused, /^Opacity point 2 /);
   assert.equal(await points.count(), before + 1);
   const point = page.getByRole('slider', { name: /^Opacity point 2 / });
   const value = async () => Number(await point.getAttribute('aria-valuenow'));
