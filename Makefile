@@ -52,6 +52,7 @@ check: export SCOLOPAX_RANDOM_SCENES := 2000
 check-asan-ubsan: export SCOLOPAX_COMBINATIONS := pairs
 check-asan-ubsan: export SCOLOPAX_STATISTICS := 0.1
 check-asan-ubsan: export SCOLOPAX_RANDOM_SCENES := 20
+check-asan-ubsan: export ASAN_SYMBOLIZER_PATH := /usr/lib/llvm-19/bin/llvm-symbolizer
 check: $(foreach stage,format test bench hostile asan-ubsan cuda fuzz tsan tidy,passed-$(stage))
 
 # A stage that has passed is not run again on the same commit, so that an interrupted check can be continued.

@@ -29,4 +29,11 @@ bool ParkedRenderers::dropOldest() {
   return true;
 }
 
+std::vector<const Volume*> ParkedRenderers::volumes() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<const Volume*> volumes;
+  for (const Place& place : places_) volumes.push_back(place.parked.volume.get());
+  return volumes;
+}
+
 }  // namespace scolopax::server

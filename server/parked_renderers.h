@@ -5,6 +5,7 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <vector>
 
 #include "renderer/renderer.h"
 
@@ -23,13 +24,15 @@ class ParkedRenderers {
   Parked take(const void* owner);
   /// Drops the renderer that was parked first; false if there is none.
   bool dropOldest();
+  /// The volumes that are rendered here, in the order in which their renderers were parked.
+  std::vector<const Volume*> volumes() const;
 
  private:
   struct Place {
     const void* owner;
     Parked parked;
   };
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::list<Place> places_;  ///< in the order in which they were parked
 };
 

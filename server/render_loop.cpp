@@ -24,9 +24,17 @@ RenderLoop::RenderLoop(SessionStore& store, RenderContext context, OnPass onPass
       onPass_(std::move(onPass)),
       interrupter_(context_.now, context_.wakeWatch) {
   if (context_.volumes)
-    context_.volumes->setRelease([kept = std::weak_ptr(context_.parked)] {
-      const auto parked = kept.lock();
-      return parked && parked->dropOldest();
+    context_.volumes->setResting({
+        .volumes =
+            [kept = std::weak_ptr(context_.parked)] {
+              const auto parked = kept.lock();
+              return parked ? parked->volumes() : std::vector<const Volume*>{};
+            },
+        .release =
+            [kept = std::weak_ptr(context_.parked)] {
+              const auto parked = kept.lock();
+              return parked && parked->dropOldest();
+            },
     });
   if (!context_.memory) return;
   // Pictures first, because they can be made again from the films.

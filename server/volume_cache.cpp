@@ -202,7 +202,7 @@ std::unique_ptr<VolumeCache::Room> VolumeCache::roomFor(const Wanted& wanted, st
                                          " of memory, expected at most " + io::byteCount(limit_) +
                                          " (--memory)");
   for (;;) {
-    std::function<bool()> release;
+    Resting resting;
     std::vector<Entry> dropped;  // destroyed without the mutex, as that takes time
     {
       const std::lock_guard lock(mutex_);
@@ -210,10 +210,10 @@ std::unique_ptr<VolumeCache::Room> VolumeCache::roomFor(const Wanted& wanted, st
         promised_ += wanted.bytes;
         return std::make_unique<Room>(this, wanted.bytes, limit_ - held() + wanted.bytes);
       }
-      if (since == kAny) release = release_;
+      if (since == kAny) resting = resting_;
     }
     if (since == kAny && endAbandoned()) continue;
-    if (!release || !release())
+    if (!resting.release || !wouldFit(wanted.bytes, resting.volumes()) || !resting.release())
       throw Error(ErrorCode::busy, wanted.title + ": needs " + io::byteCount(wanted.bytes) +
                                        " of memory; others use " + io::byteCount(usedBytes()) + " of the " +
                                        io::byteCount(limit_) + " for voxels (--memory)");
@@ -237,6 +237,16 @@ bool VolumeCache::makeRoom(std::uint64_t bytes, std::uint64_t since, std::vector
     entries_.erase(entry);
   });
   return true;
+}
+
+/// Whether so many bytes may be free once these volumes are no longer kept: they may be in use besides.
+bool VolumeCache::wouldFit(std::uint64_t bytes, const std::vector<const Volume*>& resting) const {
+  const std::lock_guard lock(mutex_);
+  std::uint64_t kept = promised_;
+  for (const auto& [key, entry] : entries_)
+    if (entry.volume.use_count() > 1 && std::ranges::find(resting, entry.volume.get()) == resting.end())
+      kept += entry.bytes;
+  return kept + bytes <= limit_;
 }
 
 /// Requires the mutex.
@@ -274,9 +284,9 @@ std::optional<LoadProgress> VolumeCache::progress(const void* dataset) const {
   return inAdvance;
 }
 
-void VolumeCache::setRelease(std::function<bool()> release) {
+void VolumeCache::setResting(Resting resting) {
   const std::lock_guard lock(mutex_);
-  release_ = std::move(release);
+  resting_ = std::move(resting);
 }
 
 }  // namespace scolopax::server

@@ -89,9 +89,14 @@ class VolumeCache {
   std::uint64_t limitBytes() const { return limit_; }
   /// Of the volumes that are in memory or being loaded.
   std::uint64_t usedBytes() const;
-  /// Before a load is refused because all volumes are in use, `release` is called, with no lock held. It
-  /// returns whether it has released a volume.
-  void setRelease(std::function<bool()> release);
+  /// Those who keep volumes without using them now, such as renderers that nobody watches.
+  struct Resting {
+    std::function<std::vector<const Volume*>()> volumes;  ///< that they keep; one may be named twice
+    std::function<bool()> release;                        ///< ends one of them; false if there is none
+  };
+  /// They are ended one by one before a load is refused, unless all their volumes would not be enough. Both
+  /// functions are called with no lock held.
+  void setResting(Resting resting);
 
  private:
   struct Entry {
@@ -130,6 +135,7 @@ class VolumeCache {
   bool endAbandoned();
   std::unique_ptr<Room> roomFor(const Wanted& wanted, std::uint64_t since);
   bool makeRoom(std::uint64_t bytes, std::uint64_t since, std::vector<Entry>& dropped);
+  bool wouldFit(std::uint64_t bytes, const std::vector<const Volume*>& resting) const;
   std::uint64_t held() const;
   std::shared_ptr<const Volume> load(const Wanted& wanted, std::uint64_t since, const std::stop_token& stop);
 
@@ -142,7 +148,7 @@ class VolumeCache {
   std::map<Key, LoadProgress> loads_;
   std::uint64_t promised_ = 0;  ///< bytes of all Rooms
   std::uint64_t uses_ = 0;
-  std::function<bool()> release_;
+  Resting resting_;
   std::map<Key, std::shared_ptr<Running>> running_;
   std::list<std::shared_ptr<Running>> ended_;  ///< whose threads are to be joined
 };

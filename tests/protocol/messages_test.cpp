@@ -98,7 +98,7 @@ TEST(ServerMessages, AreWrittenAsTheFixtures) {
 
 TEST(ServerMessages, AreUtf8WhateverTheyTell) {
   EXPECT_EQ(json::parse(noticeText("\xff"))["text"], "\xef\xbf\xbd");
-  EXPECT_NO_THROW(json::parse(errorText(ProtocolError(400, "", "\xff"))));
+  EXPECT_TRUE(json::accept(errorText(ProtocolError(400, "", "\xff"))));
 }
 
 }  // namespace

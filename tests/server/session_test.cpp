@@ -355,11 +355,12 @@ TEST(Session, TellsViewersAndScriptsThatASceneCannotBeRendered) {
 }
 
 TEST(Session, ServesOthersWhileAnOldPictureIsReleased) {
-  Workshop workshop;
-  const auto session = workshop.store.create(json::object());
+  // Before the workshop, which releases the last pictures.
   std::vector<std::future<std::size_t>> answers;
   bool asks = true;
   int served = 0;
+  Workshop workshop;
+  const auto session = workshop.store.create(json::object());
   // A picture whose release another thread's request interrupts.
   const auto image = [&] {
     return std::shared_ptr<const Image>(new Image(), [&](const Image* released) {

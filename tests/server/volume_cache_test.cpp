@@ -80,16 +80,41 @@ TEST_F(VolumeCacheTest, RefusesWhatNeverFitsBeforeReadingIt) {
   EXPECT_EQ(loads_, 0);
 }
 
+/// Keeps volumes without using them.
+struct Keepers {
+  std::vector<std::shared_ptr<const Volume>> kept;
+
+  VolumeCache::Resting resting() {
+    const auto volumes = [this] {
+      std::vector<const Volume*> all;
+      for (const auto& volume : kept) all.push_back(volume.get());
+      return all;
+    };
+    const auto release = [this] {
+      if (kept.empty()) return false;
+      kept.pop_back();
+      return true;
+    };
+    return {volumes, release};
+  }
+};
+
 TEST_F(VolumeCacheTest, AsksForTheReleaseOfWhatIsUsedNeedlessly) {
-  std::vector<std::shared_ptr<const Volume>> used;
-  for (std::size_t time = 0; time < 3; ++time) used.push_back(cache_.get(wanted(time), {}));
-  cache_.setRelease([&] {
-    if (used.empty()) return false;
-    used.pop_back();
-    return true;
-  });
+  Keepers keepers;
+  for (std::size_t time = 0; time < 3; ++time) keepers.kept.push_back(cache_.get(wanted(time), {}));
+  cache_.setResting(keepers.resting());
   cache_.get(wanted(3), {});
-  EXPECT_EQ(used.size(), 2u) << "no more is released than is needed";
+  EXPECT_EQ(keepers.kept.size(), 2u) << "no more is released than is needed";
+}
+
+TEST_F(VolumeCacheTest, ReleasesNothingForALoadThatWouldNotFitEvenThen) {
+  Keepers keepers;
+  const auto used = cache_.get(wanted(0), {});
+  for (std::size_t time = 1; time < 3; ++time) keepers.kept.push_back(cache_.get(wanted(time), {}));
+  cache_.setResting(keepers.resting());
+  EXPECT_EQ(codeOf([&] { cache_.get(wanted(3, 3 * kBytes), {}); }), ErrorCode::busy);
+  EXPECT_EQ(keepers.kept.size(), 2u);
+  EXPECT_NE(cache_.get(wanted(4, 2 * kBytes), {}), nullptr);
 }
 
 TEST_F(VolumeCacheTest, LoadsInAdvanceOnlyWhereOlderUsesGiveWay) {
@@ -197,8 +222,8 @@ TEST_F(VolumeCacheTest, EndsItsLoadsWhenItEnds) {
 }
 
 TEST_F(VolumeCacheTest, HasOneLoadAtMostThatNobodyWaitsFor) {
-  VolumeCache cache(3 * kBytes, {}, std::chrono::hours(1));
   LongLoad first, second;
+  VolumeCache cache(3 * kBytes, {}, std::chrono::hours(1));
   first.abandon(cache, first.of(wanted(0)));
   second.abandon(cache, second.of(wanted(1)));
   while (cache.usedBytes() > kBytes) std::this_thread::yield();
@@ -212,7 +237,7 @@ TEST_F(VolumeCacheTest, DropsTheVolumeThatWasLoadedLast) {
   VolumeCache one(kBytes);
   for (std::size_t time = 0; time < 5; ++time) {
     bool asked = false;
-    one.setRelease([&] { return asked = true, false; });
+    one.setResting({[] { return std::vector<const Volume*>{}; }, [&] { return asked = true, false; }});
     EXPECT_NE(one.get(wanted(time), {}), nullptr);
     EXPECT_FALSE(asked) << "nothing else has to give way";
   }

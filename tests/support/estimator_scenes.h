@@ -154,9 +154,12 @@ inline std::optional<VolumeAndScene> testScene(TestScene which) {
     const glm::ivec3 dims(8, 7, 6);
     std::uint32_t state = 9;
     const auto noise = [&](int, int, int) { return (state = state * 1664525u + 1013904223u) >> 24; };
+    // One after the other: compilers evaluate arguments in different orders.
+    auto third = channelOf<float>(dims, noise);
+    auto second = channelOf<std::int16_t>(dims, noise, -2, 300);
+    auto first = channelOf<std::uint8_t>(dims, noise);
     made.emplace();
-    made->volume = volumeOf(gridOf(dims, {1, 2, 0.5}), channelOf<std::uint8_t>(dims, noise),
-                            channelOf<std::int16_t>(dims, noise, -2, 300), channelOf<float>(dims, noise));
+    made->volume = volumeOf(gridOf(dims, {1, 2, 0.5}), std::move(first), std::move(second), std::move(third));
     made->scene = framed(*made->volume, 12);
     made->scene.macrocell = 3;
     for (auto& channel : made->scene.channels) {

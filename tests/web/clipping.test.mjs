@@ -23,7 +23,7 @@ before(async () => {
   server = await startServer([generateOrbitals(scratchFolder(), 'orbitals.nrrd', ['--size', '24'])]);
   browser = await launchBrowser();
   ({ page, faults } = await openPage(browser, server.url));
-  whole = await steadyPicture(page, 4);
+  whole = await steadyPicture(page);
 });
 after(async () => {
   await browser?.close();
@@ -33,12 +33,12 @@ after(async () => {
 test('a plane cuts the volume in two', async () => {
   await clip().getByRole('button', { name: 'Add clip plane' }).click();
   await eventually(async () => (await onServer()).clip.length === 1, 'no plane on the server');
-  const cut = await steadyPicture(page, 4);
+  const cut = await steadyPicture(page);
   assert.ok(difference(whole, cut) > 4, 'the picture hardly changes');
   await clip().getByLabel('Normal z').fill('-1');
   await clip().getByLabel('Normal z').press('Enter');
   await eventually(async () => (await onServer()).clip[0].normal[2] === -1, 'the normal did not arrive');
-  const other = await steadyPicture(page, 4);
+  const other = await steadyPicture(page);
   assert.ok(difference(cut, other) > 4, 'the other half looks the same');
 });
 
@@ -55,7 +55,7 @@ test('a plane may clip some channels', async () => {
 test('without its plane the volume is whole', async () => {
   await clip().getByRole('button', { name: 'Remove clip plane 1' }).click();
   await eventually(async () => (await onServer()).clip.length === 0, 'the plane is still there');
-  assert.ok(difference(whole, await steadyPicture(page, 4)) < 2);
+  assert.ok(difference(whole, await steadyPicture(page)) < 2);
 });
 
 test('crop keeps the regions that are chosen', async () => {
@@ -67,11 +67,11 @@ test('crop keeps the regions that are chosen', async () => {
       await crop.getByLabel(`${axis} ${end}`, { exact: true }).press('Enter');
     }
   await eventually(async () => (await onServer()).crop.z[1] === 15, 'crop did not arrive');
-  const inside = await steadyPicture(page, 4);
+  const inside = await steadyPicture(page);
   assert.ok(difference(whole, inside) > 4, 'the picture hardly changes');
   await crop.getByLabel('Regions', { exact: true }).selectOption('Outside');
   await eventually(async () => (await onServer()).crop.regions[13] === false, 'regions did not arrive');
-  const outside = await steadyPicture(page, 4);
+  const outside = await steadyPicture(page);
   assert.ok(difference(inside, outside) > 4, 'inside and outside look the same');
   await crop.getByText('Individual regions').click();
   await crop.getByRole('checkbox', { name: 'x low, y low, z low' }).uncheck();

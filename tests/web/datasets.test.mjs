@@ -18,7 +18,7 @@ test('choosing another data set shows it', async () => {
   started.push(() => browser.close());
   const { page, faults } = await openPage(browser, server.url);
 
-  const first = await steadyPicture(page, 4);
+  const first = await steadyPicture(page);
   const channels = page.locator('.channel');
   const four = await channels.count();
   assert.equal(four, 4);
@@ -29,7 +29,7 @@ test('choosing another data set shows it', async () => {
   await list.nth(1).getByRole('button').click();
   await eventually(async () => (await channels.count()) === 2, 'the channels of the pair are not shown');
   assert.match(await page.locator('.dataset').textContent(), /32 × 32 × 32 voxels/);
-  const second = await steadyPicture(page, 4);
+  const second = await steadyPicture(page);
   assert.ok(Math.max(...second.blocks) > 30, 'the pair is dark');
   assert.ok(difference(first, second) > 8, 'the picture is still the first');
   assert.notEqual(await page.locator('input[type=color].swatch').first().inputValue(), '#00ff00');

@@ -41,7 +41,7 @@ before(async () => {
   // Only the first channel is visible, so that no other one hides changes to it.
   const { channels } = (await sceneOnServer(page)).scene;
   await patchFromOutside(page, { channels: Object.fromEntries(channels.map((_, i) => [i, { visible: i === 0 }])) });
-  whole = await steadyPicture(page, 4);
+  whole = await steadyPicture(page);
 });
 after(async () => {
   await browser?.close();
@@ -71,7 +71,7 @@ test('switched on, it begins with a ramp over a range that the server has chosen
   await eventually(async () => (await barsOf(page).count()) === 2, 'the histogram is not drawn');
   assert.equal(asked.length, 1);
   assert.match(asked[0], /gradient-histogram\?channel=0$/);
-  thinned = await steadyPicture(page, 4);
+  thinned = await steadyPicture(page);
   assert.ok(difference(whole, thinned) > 8, `the picture hardly changes: ${difference(whole, thinned)}`);
 });
 
@@ -83,7 +83,7 @@ test('the curve of the factor is edited by the keyboard', async () => {
   const arrived = async () => JSON.stringify((await settings()).points) === '[[0.3,0],[1,0.5]]';
   await eventually(arrived, 'the curve did not arrive');
   assert.match(await point(2).getAttribute('aria-valuetext'), /^factor 0\.5 at [1-9]/);
-  const steeper = await steadyPicture(page, 4);
+  const steeper = await steadyPicture(page);
   assert.ok(difference(thinned, steeper) > 8, `the picture hardly changes: ${difference(thinned, steeper)}`);
 });
 
@@ -110,7 +110,7 @@ test('reset brings back the ramp and the chosen range', async () => {
   await editorsOf(page).getByRole('button', { name: 'Reset', exact: true }).click();
   await rangeEnd(0, 0, 'the range is not the chosen one again');
   assert.deepEqual(await settings(), { range, points: [[0, 0], [1, 1]] });
-  const again = await steadyPicture(page, 4);
+  const again = await steadyPicture(page);
   assert.ok(difference(thinned, again) < 4, `the picture is not the first one: ${difference(thinned, again)}`);
 });
 
@@ -118,7 +118,7 @@ test('switched off, it is gone, and the histogram is known when it comes back', 
   await switchOf(page).uncheck();
   await eventually(async () => (await settings()) === undefined, 'it is still on');
   assert.equal(await editorsOf(page).count(), 0);
-  const again = await steadyPicture(page, 4);
+  const again = await steadyPicture(page);
   assert.ok(difference(whole, again) < 4, `the volume is not whole again: ${difference(whole, again)}`);
   await switchOf(page).check();
   await eventually(async () => (await barsOf(page).count()) === 2, 'the histogram is not drawn');

@@ -35,7 +35,7 @@ function oneVoxel(folder) {
 async function choose(name) {
   await choice().selectOption(name);
   await eventually(async () => (await onServer()) === name, `${name} did not arrive`);
-  return steadyPicture(page, 4);
+  return steadyPicture(page);
 }
 
 before(async () => {
@@ -46,7 +46,7 @@ before(async () => {
   // Dense where the value is at least half of the voxel's.
   const look = { range: [0, 255], color: '#ffffff', opacity: [[0.5, 0], [0.5, 1]], density: 20 };
   await patchFromOutside(page, { channels: { 0: look } });
-  trilinear = await steadyPicture(page, 4);
+  trilinear = await steadyPicture(page);
 });
 after(async () => {
   await browser?.close();

@@ -34,7 +34,7 @@ before(async () => {
   const { channels } = (await sceneOnServer(page)).scene;
   const nothing = channels.map((_, i) => [i, { visible: i === 0, opacity: [[0, 0], [1, 0]] }]);
   await patchFromOutside(page, { channels: Object.fromEntries(nothing) });
-  initial = await steadyPicture(page, 4);
+  initial = await steadyPicture(page);
 });
 after(async () => {
   await browser?.close();
@@ -49,7 +49,7 @@ test('an isovalue that is added is in the middle of the range, and drawn', async
   const [first] = await isovalues();
   assert.ok(Math.abs(first.value - (lo + hi) / 2) < 1e-9 * Math.abs(hi), `${first.value} in ${lo} to ${hi}`);
   assert.equal(first.opacity, 1);
-  shown = await steadyPicture(page, 4);
+  shown = await steadyPicture(page);
   assert.ok(difference(initial, shown) > 0.5, `the picture hardly changes: ${difference(initial, shown)}`);
 });
 
@@ -73,7 +73,7 @@ test('its line is moved by the keyboard and dragged, which changes value and opa
     return Math.abs(first.value - (lo + 0.7 * (hi - lo))) < 0.02 * (hi - lo) && Math.abs(first.opacity - 0.5) < 0.03;
   }, 'the line was not dragged');
   assert.match(await line(1).getAttribute('aria-valuetext'), /^isovalue .+, opacity 0\.5/);
-  const moved = await steadyPicture(page, 4);
+  const moved = await steadyPicture(page);
   assert.ok(difference(shown, moved) > 0.3, `the picture hardly changes: ${difference(shown, moved)}`);
 });
 

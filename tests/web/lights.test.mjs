@@ -54,7 +54,7 @@ test('shading is switched on in the page', async () => {
 });
 
 test('a light that is added has the defaults, and takes the place of the headlight', async () => {
-  const before = await steadyPicture(page, 4);
+  const before = await steadyPicture(page);
   await add().click();
   await light(1).waitFor();
   assert.equal(await light(1).getByLabel('Type').evaluate((select) => select === document.activeElement), true);
@@ -65,22 +65,22 @@ test('a light that is added has the defaults, and takes the place of the headlig
   assert.equal(await light(1).getByLabel('Color').inputValue(), set.color);
   for (const [i, axis] of ['x', 'y', 'z'].entries())
     assert.equal(Number(await light(1).getByLabel(`Direction ${axis}`).inputValue()), set.direction[i]);
-  const lit = await steadyPicture(page, 4);
+  const lit = await steadyPicture(page);
   assert.ok(difference(before, lit) > 8, `the picture hardly changed: ${difference(before, lit)}`);
 });
 
 test('its colour and direction change the picture', async () => {
   const share = ({ mean }) => mean[0] / (mean[0] + mean[1] + mean[2]);
-  const white = await steadyPicture(page, 4);
+  const white = await steadyPicture(page);
   await light(1).getByLabel('Color').fill('#ff0000');
   await eventually(async () => (await lightsOnServer())[0].color === '#ff0000', 'the server has another colour');
-  const red = await steadyPicture(page, 4);
+  const red = await steadyPicture(page);
   assert.ok(share(red) > share(white) + 0.1, `${share(white)} of the light was red, now ${share(red)}`);
   const y = light(1).getByLabel('Direction y', { exact: true });
   await y.fill('1');
   await y.press('Enter');
   await eventually(async () => (await lightsOnServer())[0].direction[1] === 1, 'the server has another direction');
-  const turned = await steadyPicture(page, 4);
+  const turned = await steadyPicture(page);
   assert.ok(difference(red, turned) > 8, `the picture hardly changed: ${difference(red, turned)}`);
 });
 
@@ -88,11 +88,11 @@ test('its type is chosen among those of the server, which says what each is', as
   const offered = await page.evaluate(async () => (await (await fetch('api/v1/capabilities')).json()).lightTypes);
   const type = light(1).getByLabel('Type');
   assert.deepEqual(await type.locator('option').allTextContents(), offered.map(({ name }) => name));
-  const before = await steadyPicture(page, 4);
+  const before = await steadyPicture(page);
   await type.selectOption('headlight');
   await light(1).getByText(offered.find(({ name }) => name === 'headlight').doc).waitFor();
   await eventually(async () => (await lightsOnServer())[0].type === 'headlight', 'the server has another type');
-  const now = await steadyPicture(page, 4);
+  const now = await steadyPicture(page);
   assert.ok(difference(before, now) > 8, `the picture hardly changed: ${difference(before, now)}`);
 });
 
@@ -132,12 +132,12 @@ test('a light that another client adds is shown, and edited by its index', async
 });
 
 test('without the last one the headlight is back', async () => {
-  const lit = await steadyPicture(page, 4);
+  const lit = await steadyPicture(page);
   await remove(1).click();
   await remove(1).click();
   assert.equal(await focused(), 'Add light');
   await eventually(async () => (await lightsOnServer()).length === 0, 'the server still has lights');
-  const now = await steadyPicture(page, 4);
+  const now = await steadyPicture(page);
   assert.ok(difference(lit, now) > 8, `the picture hardly changed: ${difference(lit, now)}`);
 });
 

@@ -72,7 +72,7 @@ test('the first load is shown, and cancelled for the choice of another data set'
   await choice.waitFor();
   slow.id = undefined;
   await choice.getByRole('button', { name: /series/ }).click();
-  await steadyPicture(page, 4);
+  await steadyPicture(page);
   assert.equal((await sceneOnServer(page)).scene.dataset, 'series');
   assert.equal(await choice.count(), 0);
 });
@@ -81,7 +81,7 @@ test('a cancelled change of the data set leaves everything as it was', async () 
   await page.getByRole('button', { name: 'Step forward' }).click();
   await page.locator('.picture').focus();
   for (let i = 0; i < 5; ++i) await page.keyboard.press('ArrowDown');
-  const first = await steadyPicture(page, 4);
+  const first = await steadyPicture(page);
   const { scene } = await sceneOnServer(page);
   slow.id = 'orbitals';
   await list().getByRole('button', { name: /orbitals/ }).click();
@@ -90,7 +90,7 @@ test('a cancelled change of the data set leaves everything as it was', async () 
   slow.id = undefined;
   await eventually(async () => (await page.locator('.channel').count()) === 1, 'the channels do not come back');
   assert.equal(await bar().count(), 0);
-  assert.ok(difference(first, await steadyPicture(page, 4)) < 4, 'the picture is another one');
+  assert.ok(difference(first, await steadyPicture(page)) < 4, 'the picture is another one');
   assert.deepEqual((await sceneOnServer(page)).scene, scene);
 });
 
@@ -108,7 +108,7 @@ test('another data set can be chosen while one is loaded', async () => {
   await list().getByRole('button', { name: /orbitals/ }).click();
   await eventually(async () => (await page.locator('.channel').count()) === 4, 'the orbitals are not shown');
   await page.unroute('**/api/v1/sessions/*', late);
-  await steadyPicture(page, 4);
+  await steadyPicture(page);
 });
 
 test('states are asked for only while something is loaded', async () => {

@@ -35,7 +35,7 @@ test('four MRI files of one grid are four channels, and a script edits them besi
   const browser = await launchBrowser();
   try {
     const { page, faults } = await openPage(browser, server.url, { viewport: { width: 1280, height: 800 } });
-    const picture = await steadyPicture(page, 4);
+    const picture = await steadyPicture(page);
     assert.equal(await page.locator('.channel').count(), 4);
     assert.ok(Math.max(...picture.blocks) - Math.min(...picture.blocks) > 25, 'the picture is uniform');
     await eventually(async () => (await page.locator('.plot-bars').count()) === 2, 'the histogram is not drawn');

@@ -33,7 +33,7 @@ after(async () => {
 });
 
 test('the page opens without a fault and shows the volume', async () => {
-  const picture = await steadyPicture(page, 4);
+  const picture = await steadyPicture(page);
   const brightest = Math.max(...picture.blocks);
   const darkest = Math.min(...picture.blocks);
   assert.ok(brightest > 30, `the picture is dark: its brightest block is ${brightest}`);
@@ -57,7 +57,7 @@ test('the picture is as large as the window leaves it, also when that changes', 
 
 test('an edit that is not answered for a while is said to be rendering, until its picture comes', async () => {
   const sign = page.locator('.rendering');
-  await steadyPicture(page, 4);
+  await steadyPicture(page);
   assert.equal(await sign.textContent(), '');
   server.signal('SIGSTOP');
   try {
@@ -73,7 +73,7 @@ test('samples rise and the estimated error falls', async () => {
   const error = async () => Number((await page.locator('.status').textContent()).match(/([\d.e-]+) error/)?.[1]);
   // With a tracker: the error of quadrature is mostly bias, which samples do not reduce.
   await patchFromOutside(page, { integrator: { method: 'superposed' } });
-  await steadyPicture(page, 4);
+  await steadyPicture(page);
   const before = { samples: await samplesShown(page), error: await error() };
   await eventually(async () => (await samplesShown(page)) >= before.samples + 16, 'samples do not rise', 90_000);
   assert.ok((await error()) < before.error);

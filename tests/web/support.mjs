@@ -172,7 +172,7 @@ export const patchFromOutside = (page, patch) =>
   }, patch);
 
 /** Waits until a full-size picture of the newest scene has `samples` samples; returns lookAt() of it. */
-export async function steadyPicture(page, samples = 16, timeoutMs = 90_000) {
+export async function steadyPicture(page, samples = 4, timeoutMs = 90_000) {
   await page.locator('canvas[data-revision]').waitFor();
   let revision;
   // The page sends its edits with the next animation frame, and an answer of the server may cause further edits.

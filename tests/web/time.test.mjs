@@ -42,7 +42,7 @@ after(async () => {
 });
 
 test('a series begins at its first step, and says when that is', async () => {
-  const picture = await steadyPicture(page, 4);
+  const picture = await steadyPicture(page);
   assert.ok(Math.max(...picture.blocks) > 30, 'the picture is dark');
   assert.equal(await step(), 0);
   assert.match(await timePanel().textContent(), /1 \/ 6/);
@@ -50,21 +50,21 @@ test('a series begins at its first step, and says when that is', async () => {
 });
 
 test('a step forward and back changes the picture and restores it', async () => {
-  const first = await steadyPicture(page, 4);
+  const first = await steadyPicture(page);
   await button('Step forward').click();
   await eventually(async () => (await timeOnServer()) === 1, 'the step did not arrive');
-  const second = await steadyPicture(page, 4);
+  const second = await steadyPicture(page);
   assert.ok(difference(first, second) > 8, `the picture hardly changed: ${difference(first, second)}`);
   await button('Step back').click();
-  const again = await steadyPicture(page, 4);
+  const again = await steadyPicture(page);
   assert.ok(difference(first, again) < 4, 'the first step looks different now');
 });
 
 test('the slider chooses a step', async () => {
-  const first = await steadyPicture(page, 4);
+  const first = await steadyPicture(page);
   await slider().fill('4');
   await eventually(async () => (await timeOnServer()) === 4, 'the step did not arrive');
-  assert.ok(difference(first, await steadyPicture(page, 4)) > 8);
+  assert.ok(difference(first, await steadyPicture(page)) > 8);
   await slider().focus();
   await page.keyboard.press('Home');
   await eventually(async () => (await timeOnServer()) === 0, 'the keys of the slider do nothing');
@@ -151,7 +151,7 @@ test('on a telephone the panel of the time fits', async () => {
 test('a measured series is stepped through', { skip: !existsSync(kReal) && 'no shared data' }, async () => {
   await dataset(/example4d/).click();
   await eventually(async () => /1 \/ \d+/.test(await timePanel().textContent()), 'it is not shown');
-  const picture = await steadyPicture(page, 4);
+  const picture = await steadyPicture(page);
   assert.ok(Math.max(...picture.blocks) > 30, 'the picture is dark');
   await button('Step forward').click();
   await eventually(async () => (await timeOnServer()) === 1, 'the step did not arrive');

@@ -100,7 +100,7 @@ TEST(Light, OnTinyAndHugeRangesOfValuesMatchesTheReference) {
   for (const auto& [lo, hi] :
        {std::pair(0.0, 2000 * kDenormal), std::pair(-1e-38, 1e-38), std::pair(0.0, 1e-25),
         std::pair(-1e25, 1e25), std::pair(-kLargest, kLargest), std::pair(300.0, 299.9)}) {
-    const auto value = [lo = lo, hi = hi](int x, int y, int z) { return lo + (hi - lo) * lumps(1)(x, y, z); };
+    const auto value = [a = lo, b = hi](int x, int y, int z) { return a + (b - a) * lumps(1)(x, y, z); };
     const auto volume = volumeOf(gridOf(kSmallDims), channelOf<float>(kSmallDims, value));
     Scene scene = viewFrom(*volume, {15, 11, -8}, {3, 2.5, 2}, 32, kLitSide);
     scene.channels = {ramp(lo, hi, 0.5, kGreen)};
