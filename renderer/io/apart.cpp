@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "renderer/core/error.h"
+#include "renderer/core/sanitizers.h"
 
 namespace scolopax::io {
 namespace {
@@ -29,18 +30,6 @@ struct ApartHeader {
   std::uint32_t code;  ///< of the Error, if failed
   std::uint64_t bytes;
 };
-
-#if defined(__has_feature)
-#define SCOLOPAX_HAS_FEATURE(name) __has_feature(name)
-#else
-#define SCOLOPAX_HAS_FEATURE(name) 0
-#endif
-/// Sanitizers open pipes to find out whether memory can be read.
-#if defined(__SANITIZE_ADDRESS__) || SCOLOPAX_HAS_FEATURE(address_sanitizer)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 void writeFully(int pipe, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
@@ -216,7 +205,8 @@ void Sender::warn(const std::string& line) const {
 }
 
 void forbidOpening() {
-  if (!kSanitized) limitTo(RLIMIT_NOFILE, 0, 0);
+  // Sanitizers open pipes to find out whether memory can be read.
+  if (!SCOLOPAX_SANITIZED) limitTo(RLIMIT_NOFILE, 0, 0);
 }
 
 void runApart(const std::string& what, const ApartLimits& limits, const std::stop_token& stop,

@@ -9,6 +9,7 @@
 #include <csignal>
 #include <thread>
 
+#include "renderer/core/sanitizers.h"
 #include "tests/renderer/io/io_test_support.h"
 
 namespace scolopax::io {
@@ -107,9 +108,7 @@ TEST(Apart, AnEndlessWaitEnds) {
 }
 
 TEST(Apart, TooMuchMemoryIsRefused) {
-#if defined(__SANITIZE_ADDRESS__)
-  GTEST_SKIP() << "the sanitizer's allocator ends the process";
-#endif
+  if (SCOLOPAX_SANITIZED) GTEST_SKIP() << "the sanitizer's allocator ends the process";
   const auto result = runAndTell(
       [](const Sender& sender) {
         std::vector<char> fits(16 << 20, 'x');
@@ -163,9 +162,7 @@ TEST(Apart, TheChildHasNoOtherOpenFilesAndPrintsNothing) {
 }
 
 TEST(Apart, AChildCanForgoOpeningFiles) {
-#if defined(__SANITIZE_ADDRESS__)
-  GTEST_SKIP() << "sanitizers must open pipes";
-#endif
+  if (SCOLOPAX_SANITIZED) GTEST_SKIP() << "sanitizers must open pipes";
   const TempDir folder;
   const fs::path path = writeBytes(folder / "a", "secret");
   const auto result = runAndTell([&](const Sender& sender) {

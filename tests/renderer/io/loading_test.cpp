@@ -7,6 +7,7 @@
 #include <fstream>
 #include <optional>
 
+#include "renderer/core/sanitizers.h"
 #include "tests/renderer/io/io_test_support.h"
 
 namespace scolopax::io {
@@ -14,12 +15,6 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 /// A field of /proc/self/status, in bytes.
 std::uint64_t statusBytes(const std::string& field) {
@@ -53,7 +48,7 @@ std::filesystem::path zeros(const TempDir& folder, const std::string& name, std:
 constexpr std::uint64_t kVoxels = 256 * 256 * 320;
 
 TEST(Loads, PeakAtNotMuchMoreThanTheData) {
-  if (kSanitized) GTEST_SKIP() << "sanitizers keep freed memory";
+  if (SCOLOPAX_SANITIZED) GTEST_SKIP() << "sanitizers keep freed memory";
   const TempDir folder;
   struct Row {
     const char* what;
@@ -79,7 +74,7 @@ TEST(Loads, PeakAtNotMuchMoreThanTheData) {
 }
 
 TEST(Loads, OfIntegersThatTurnOutTooLargePeakAtNotMuchMoreThanTheData) {
-  if (kSanitized) GTEST_SKIP() << "sanitizers keep freed memory";
+  if (SCOLOPAX_SANITIZED) GTEST_SKIP() << "sanitizers keep freed memory";
   const TempDir folder;
   const auto path = zeros(folder, "a_256x256x320_int32.raw", 4 * kVoxels);
   std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);

@@ -28,6 +28,9 @@ CROWDED = [[0.5 + i / 1e7, i % 2] for i in range(4096)]
 
 
 FILMS = 500  # MiB that the pictures of 1920 x 1080 pixels take
+# MiB of a session that picks: 64^3 cells with 13 floats (bounds and majorants of four channels, and their sum), and a
+# film that records what is visible.
+PICKING = 20
 
 
 class Rays(HostileTest):
@@ -110,7 +113,7 @@ class Rays(HostileTest):
             asyncio.run(ask_all(over, sessions))
             for session in sessions:
                 self.server.call("DELETE", f"/api/v1/sessions/{session['id']}")
-        self.under(attack, 8 * SESSIONS, beside={"hovering": self.hovering(), "resting": self.resting(256, 256)})
+        self.under(attack, PICKING * SESSIONS, beside={"hovering": self.hovering(), "resting": self.resting(256, 256)})
 
     def test_over_curves_with_all_points_in_one_place(self):
         self.edit({"dataset": "orbitals"}, lambda number: {"channels": {"0": {"range": [-1, 1], "opacity": CROWDED[number % 9:]}}})
