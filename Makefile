@@ -24,7 +24,7 @@ SCOLOPAX := build/release/scolopax
 # Parallel recipes would run .ci/install twice at once; the tools called use all processors by themselves.
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
-.PHONY: fuzzers run build web test check check-test check-bench check-hostile check-asan-ubsan check-tsan check-tidy check-fuzz check-format check-cuda fuzz soak deps test-deps format clean
+.PHONY: fuzzers run build web test check check-test check-bench check-hostile check-asan-ubsan check-tsan check-tidy check-fuzz check-format check-cuda fuzz soak deps test-deps check-deps format clean
 
 run: build web $(if $(strip $(DATA)),,$(DEMO))
 	exec $(SCOLOPAX) serve $(if $(strip $(DATA)),$(DATA),$(DEMO)) --port $(PORT)
@@ -75,7 +75,7 @@ check-hostile: test-deps
 	cmake --build --preset release -j $(JOBS)
 	$(call run-tests,release,-L hostile)
 
-check-asan-ubsan: test-deps
+check-asan-ubsan: check-deps
 	cmake --preset asan-ubsan > /dev/null
 	cmake --build --preset asan-ubsan -j $(JOBS)
 	$(call run-tests,asan-ubsan,-j $(JOBS) -LE 'web|statistics|hostile')
@@ -92,7 +92,7 @@ check-tsan: test-deps
 check-fuzz: fuzzers
 	$(call run-tests,fuzz,-j $(JOBS) -L fuzz)
 
-fuzzers: test-deps
+fuzzers: check-deps
 	cmake --preset fuzz > /dev/null
 	cmake --build --preset fuzz -j $(JOBS)
 
@@ -126,11 +126,11 @@ TIDY := clang-tidy --quiet --extra-arg=-Wno-unknown-warning-option \
   --extra-arg=-D__cpp_impl_coroutine=201902L --extra-arg=-DBOOST_ASIO_HAS_CO_AWAIT=1 --extra-arg=-DBOOST_ASIO_HAS_STD_COROUTINE=1
 
 # Checks the sources that the build compiles, in the same units.
-check-tidy: build test-deps
+check-tidy: build check-deps
 	sed -n 's/^ *"file": "\(.*\)".*/\1/p' build/release/compile_commands.json | grep -v /tests/ | sort -u \
 	  | xargs -P $(JOBS) -n 1 $(TIDY) -p build/release
 
-check-format: test-deps
+check-format: check-deps
 	git ls-files '*.cpp' '*.h' '*.cu' | xargs clang-format --dry-run --Werror
 
 format:
@@ -141,6 +141,9 @@ deps:
 
 test-deps:
 	@.ci/install build test
+
+check-deps:
+	@.ci/install build test check
 
 clean:
 	rm -rf build client_web/dist client_web/node_modules
