@@ -195,13 +195,14 @@ TEST_F(ZarrHttpTest, ShardsAreReadByRanges) {
 
 TEST_F(ZarrHttpTest, ACancelledLoadDoesNotWaitForTheServer) {
   using std::chrono::steady_clock;
-  std::stop_source stop;
-  std::atomic<bool> ended = false;
-  answer_ = [&](const std::string& key, const httplib::Request&, httplib::Response&) {
+  const std::stop_source stop;
+  // The server may look at it after the test.
+  const auto ended = std::make_shared<std::atomic<bool>>(false);
+  answer_ = [stop, ended](const std::string& key, const httplib::Request&, httplib::Response&) {
     if (key != "0/0.0.0") return false;
     stop.request_stop();
     for (const auto start = steady_clock::now();
-         !ended && steady_clock::now() - start < std::chrono::seconds(20);)
+         !*ended && steady_clock::now() - start < std::chrono::seconds(20);)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     return false;
   };
@@ -209,7 +210,7 @@ TEST_F(ZarrHttpTest, ACancelledLoadDoesNotWaitForTheServer) {
   const auto start = steady_clock::now();
   EXPECT_THAT(errorOf([&] { load(*file, {}, LoadOptions{.stop = stop.get_token()}); }),
               HasSubstr("cancelled"));
-  ended = true;
+  *ended = true;
   EXPECT_LT(steady_clock::now() - start, std::chrono::seconds(15));
 }
 
